@@ -53,7 +53,7 @@ FAULTS = [
     ),
     Fault("core/step_limits/grid_limits.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault(
-        "core/model/mechanics_tables.py",
+        "features/motion/lower.py",
         'row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]',
         'row["sweep_a"] = 1.01 * a["mass"] / a["volume"] * row["area_a"]',
     ),
@@ -90,7 +90,7 @@ FAULTS = [
         "reference * (0.5 * u - flow / m0)",
         "reference * (0.505 * u - flow / m0)",
     ),
-    Fault("core/kernels/mechanism/body_layout.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
+    Fault("core/kernels/moving_frames.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
     Fault(
         "core/kernels/relaxation.py",
         "return per * taken, per * rate",

@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.core.assembly.lowering import Lowering
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
 from fvsolve.parts.nodes_and_links import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
@@ -342,11 +341,4 @@ class BodyPoint(Node, kind=""):
 
 
 class BodyRows(Lowering, kind="body"):
-    """Conversion to table rows of the probes of rigid bodies in space."""
-
-    def probe(self, draft, name, probe, row) -> None:
-        from fvsolve.core.kernels.mechanism.body_values import BODY_QUANTITIES  # not loaded by models without bodies
-
-        quantity = "angle" if probe.quantity == "travel" else probe.quantity
-        row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)
-        row["index"] = draft.body_names.index(name)
+    """Conversion to table rows of rigid bodies in space: none beside those that the case computes of all bodies."""

@@ -7,8 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from fvsolve.core.assembly.lowering import TORQUE, Input, Lowering, lowering_of
-from fvsolve.core.assembly.mechanics import PushLowering, join_ports, point_row, pose_of
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.network_elements import FLOW, Element, network_of
 from fvsolve.parts.nodes_and_links import Link, TwoPort
@@ -16,7 +14,6 @@ from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower_shaft import torques_on
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import CaseContext, Faults
-from fvsolve.parts.translational import brace_of
 from fvsolve.parts.value import VALUE, Quantity, Rows, Text, nonnegative, positive
 
 
@@ -63,14 +60,10 @@ class PinRows(Lowering, kind="pin"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
+        draft.join(row, ("from_point", "to_point"), (link.from_, link.to))
         directions = link.directions()
         row["rows"], row["pull"] = len(directions), link.stabilisation
         row["directions"][: directions.size] = directions.ravel()
-
-    def probe(self, draft, name, probe, row) -> None:
-        row["kind"], row["side"] = rec.PIN_VALUE, ("gap", "force").index(probe.quantity)
-        row["index"] = draft.pin_names.index(name)
 
 
 class Bushing(TwoPort, kind="bushing"):
@@ -112,15 +105,12 @@ class BushingRows(Lowering, kind="bushing"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
+        draft.join(row, ("from_point", "to_point"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["turn_stiffness"], row["turn_damping"] = link.rotational_stiffness, link.rotational_damping
-        poses = [pose_of(draft, end) for end in (link.from_, link.to)]
+        case = draft.case
+        poses = [case.as_stated.pose_of(case.body_point(end)[0]) for end in (link.from_, link.to)]
         row["attitude"] = (poses[0].attitude.T @ poses[1].attitude).ravel()
-
-    def probe(self, draft, name, probe, row) -> None:
-        row["kind"], row["side"] = rec.BUSHING_VALUE, ("gap", "force", "torque").index(probe.quantity)
-        row["index"] = draft.bushing_names.index(name)
 
 
 class Torque(Link, kind="torque"):
@@ -199,7 +189,7 @@ class TorqueRows(Lowering, kind="torque"):
         return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
 
 
-class BodyTorqueRows(PushLowering):
+class BodyTorqueRows(Lowering):
     """Conversion to table rows of torques about an axis of a body, which follow a schedule."""
 
     ledger_name = "supplied"
@@ -207,12 +197,12 @@ class BodyTorqueRows(PushLowering):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        axis = rec.ABOUT, link.axis / np.linalg.norm(link.axis)
-        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *axis)
+        axis = link.axis / np.linalg.norm(link.axis)
+        _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to), about=axis)
         row["schedule"] = draft.schedules.add(link.torque)
 
     def inputs(self, model, name, part):
-        return {"torque": Input(TORQUE, brace_of(model, name)["schedule"].item())}
+        return {"torque": Input(TORQUE, model.schedule_of(name))}
 
 
 BODY_TORQUES = BodyTorqueRows()

@@ -3,11 +3,8 @@
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.core.assembly.mechanics import PushLowering, join_ports
-from fvsolve.core.kernels import dtypes as rec
-from fvsolve.parts import law_elements as codes
+from fvsolve.core.assembly.lowering import Lowering
 from fvsolve.parts.hydraulic_nodes import Chamber
-from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.nodes_and_links import Link, Ports
 from fvsolve.parts.table_model import CaseContext, Faults, Nested, Table
@@ -162,7 +159,7 @@ class Cylinder(Link, kind="cylinder"):
         }
 
 
-class CylinderRows(PushLowering, kind="cylinder"):
+class CylinderRows(Lowering, kind="cylinder"):
     """Conversion to table rows of cylinders: a piston between two chambers, and between two masses or two points."""
 
     table = "piston"
@@ -177,18 +174,8 @@ class CylinderRows(PushLowering, kind="cylinder"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        distance, row["speed"] = join_ports(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        distance, row["speed"] = draft.join(row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
         row["position"] = distance - link.closed_length
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()
         row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
-
-    def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity == "force" and draft.case.links[name].has_dry_friction:
-            fill_network_probe(draft, row, f"links.{name}", "all flows")
-            row["side"], row["cell"] = codes.NET_PUSH, draft.push_names.index(name)
-            return None
-        if probe.quantity == "force":
-            return super().probe(draft, name, probe, row)
-        row["index"] = draft.piston_names.index(name)
-        row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY

@@ -6,9 +6,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fvsolve.core.assembly.lowering import FORCE, Input, rows_in
-from fvsolve.core.assembly.mechanics import AxisLowering, PushLowering, join_ports
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.core.assembly.lowering import FORCE, Input, Lowering
 from fvsolve.parts import law_elements as codes
 from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
 from fvsolve.parts.body import NamedPoints
@@ -38,7 +36,7 @@ class Mass(Node, kind="mass"):
     initial_velocity: Annotated[float, Quantity("velocity", about="velocity at the start [m/s]")] = 0.0
 
 
-class MassRows(AxisLowering, kind="mass"):
+class MassRows(Lowering, kind="mass"):
     """Conversion to table rows of masses: bodies on an axis, moved by forces."""
 
     def network_elements(self, case, name, part):
@@ -67,7 +65,7 @@ class Frame(Node, kind="frame"):
     points: Annotated[dict[str, tuple[float, ...]], NamedPoints("fixed points for links, in world axes [m]")] = {}
 
 
-class FrameRows(AxisLowering, kind="frame"):
+class FrameRows(Lowering, kind="frame"):
     """Conversion to table rows of frames: fixed bodies on the axis."""
 
 
@@ -99,7 +97,7 @@ class Spring(Coupling, kind="spring"):
             yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange the keys `from` and `to`"
 
 
-class SpringRows(PushLowering, kind="spring"):
+class SpringRows(Lowering, kind="spring"):
     """Conversion to table rows of springs: a force that depends on the distance of two bodies."""
 
     ledger_name = "stored"
@@ -107,7 +105,7 @@ class SpringRows(PushLowering, kind="spring"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        x, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        x, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
         row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
         if link.preload is not None and draft.case.equilibrium_nodes:
@@ -124,7 +122,7 @@ class Damper(Coupling, kind="damper"):
     damping: Annotated[float, Quantity("damping", positive, "force per relative velocity [N s/m]", changes=VALUE)]
 
 
-class DamperRows(PushLowering, kind="damper"):
+class DamperRows(Lowering, kind="damper"):
     """Conversion to table rows of dampers: a force proportional to the relative velocity of two bodies."""
 
     ledger_name = "dissipated"
@@ -132,7 +130,7 @@ class DamperRows(PushLowering, kind="damper"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["damping"], row["force"] = -1, link.damping, -link.damping * row["speed"]
 
 
@@ -164,24 +162,20 @@ class EndStop(Coupling, kind="end-stop"):
 NO_STOP = 1e300  # distance to a stop that does not exist
 
 
-class EndStopRows(PushLowering, kind="end-stop"):
+class EndStopRows(Lowering, kind="end-stop"):
     """Conversion to table rows of end stops: a spring and a damper that act while two bodies are in contact."""
 
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.core.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
-
         (row,) = rows
-        x, speed = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        x, speed = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["below"] = NO_STOP if link.minimum is None else x - link.minimum
         row["above"] = NO_STOP if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
-                row["force"] += sign * contact_force(
-                    float(link.stiffness), float(link.damping), -distance, float(-sign * speed)
-                )
+                row["force"] += sign * max(0.0, link.stiffness * -distance + link.damping * float(-sign * speed))
 
 
 class Force(Coupling, kind="force"):
@@ -224,7 +218,7 @@ class Force(Coupling, kind="force"):
         yield from length_notices("direction", self.direction)
 
 
-class ForceRows(PushLowering, kind="force"):
+class ForceRows(Lowering, kind="force"):
     """Conversion to table rows of external forces, which follow a schedule."""
 
     ledger_name = "supplied"
@@ -232,14 +226,9 @@ class ForceRows(PushLowering, kind="force"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        direction = () if link.direction is None else (rec.TOWARD, link.direction / np.linalg.norm(link.direction))
-        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *direction)
+        toward = None if link.direction is None else link.direction / np.linalg.norm(link.direction)
+        _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to), toward=toward)
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):
-        return {"force": Input(FORCE, brace_of(model, name)["schedule"].item())}
-
-
-def brace_of(model, name: str):
-    """Row of the link `name` in the table of braces (springs, dampers, forces)."""
-    return model.tables.braces[[link for link, _, _ in rows_in(model.case, "brace")].index(name)]
+        return {"force": Input(FORCE, model.schedule_of(name))}

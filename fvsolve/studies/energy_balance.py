@@ -19,6 +19,7 @@ from fvsolve.errors import CaseError, FvsolveError, did_you_mean
 from fvsolve.features.delay_lines.feature import history_of, lines_of
 from fvsolve.features.delay_lines.history import jump_times
 from fvsolve.features.delay_lines.kernels.wave_history import JUMPS_TRAVELLING, time_tolerance
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.file_replacement import write_file
 from fvsolve.studies.outcome import RowSink, end_if_interrupted, refusal_text, study_model
 from fvsolve.studies.passivity import AUTO, check_names, method_names
@@ -187,11 +188,11 @@ class EnergyLoop(RunLoop):
         step; the remainder is dissipated. The rate of the stored energy has a kink where the contact force ends, which
         stage values do not resolve.
         """
-        tables, lines = self.model.tables, self.accounts.stops
+        lines = self.accounts.contacts
         if not lines:
             return part
         travels = [stop_travels(self.model, *state) for state in ((t, y), (self.t, self.now))]
-        for k, ((rate, loss), stop) in enumerate(zip(lines, tables.stops, strict=True)):
+        for k, ((rate, loss), stop) in enumerate(zip(lines, motion_of(self.model).stop_table, strict=True)):
             was, leaves_before = stop_compression(stop, *travels[0][k])
             now, leaves_after = stop_compression(stop, *travels[1][k])
             if leaves_before or leaves_after:
@@ -210,9 +211,9 @@ class EnergyLoop(RunLoop):
 
 def stop_travels(model, t: float, y: np.ndarray) -> np.ndarray:
     """Travel [m] and speed [m/s] of the body at every end stop, at the state (t, y) : float64[stops, 2]."""
-    out, tables = model.evaluate(t, y)[1], model.tables
-    first = int(model.layout["travel"]) + 2 * len(tables.braces)
-    return out[first : first + 2 * len(tables.stops)].reshape(-1, 2)
+    out, motion = model.evaluate(t, y)[1], motion_of(model)
+    first = int(model.layout["travel"]) + 2 * len(motion.brace_table)
+    return out[first : first + 2 * len(motion.stop_table)].reshape(-1, 2)
 
 
 def stop_compression(stop, x: float, speed: float) -> tuple[float, bool]:

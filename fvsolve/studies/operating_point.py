@@ -150,8 +150,7 @@ def with_held_schedules(model, t: float, before: bool = False):
     for k, record in enumerate(tables.schedules):
         if record["pieces"] != 0:  # it does not follow a block
             schedules[k] = (len(tables.pieces) + k, 1)
-    driving = [int(row["schedule"]) for row in tables.bodies]
-    for k in {*driving, *(k for feature in model.features for k in feature.driven())} - {-1}:
+    for k in {k for feature in model.features for k in feature.driven()} - {-1}:
         rows[k][4] = slope_at(tables, k, t, limit)
     pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])  # the first ones contain formulas of blocks
     tables = tables._replace(schedules=schedules, pieces=pieces)

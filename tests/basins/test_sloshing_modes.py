@@ -14,6 +14,7 @@ from fvsolve import advance, load, run
 from fvsolve.case import sloshing
 from fvsolve.core.model.model import State
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.studies import linearise
 from fvsolve.studies.energy_balance import energy
 
@@ -169,12 +170,12 @@ def test_a_free_tank_on_rails_conserves_its_momentum():
     case = case_of(body, tank(), 3.0, {"step": 0.01}, links={"push": push})
     case["nodes"]["world"] = {"type": "frame", "points": {"o": [-5, 0, 0]}}
     model = model_of(case)
-    bodies, names = model.tables.bodies, model.body_names
+    bodies, names = motion_of(model).body_table, motion_of(model).body_names
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]
-        from fvsolve.core.kernels.mechanism.body_kinematics import centre_of
-        from fvsolve.core.kernels.mechanism.body_layout import body_row
+        from fvsolve.core.kernels.moving_frames import body_row
+        from fvsolve.features.motion.kernels.body_kinematics import centre_of
 
         return sum(row["mass"] * centre_of(row, out, body_row(model.tables, k))[3] for k, row in enumerate(bodies))
 

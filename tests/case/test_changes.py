@@ -12,6 +12,7 @@ from reference.scenes import pipe, reservoir, scene
 import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.value import SHAPE
 
@@ -30,13 +31,16 @@ def moved(table: dict, keys: tuple, to) -> dict:
 
 def form(model) -> tuple:
     """Sizes, names and integers of a model."""
+    motion = motion_of(model)
+    of_motion = {} if motion is None else motion.tables()._asdict()
     tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
-              for name, table in zip(model.tables._fields, model.tables, strict=True)}  # fmt: skip
+              for name, table in {**model.tables._asdict(), **of_motion}.items()}  # fmt: skip
     tables["integers"] = model.tables.integers.tobytes()
     if (network := network_of(model)) is not None:
         tables["network"] = network.arrays(network.conducting)[0].tobytes()
     names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
-             model.piston_names, model.mass_names, model.events, [probe.text for probe in model.probes])  # fmt: skip
+             () if motion is None else (motion.piston_names, motion.mass_names), model.events,
+             [probe.text for probe in model.probes])  # fmt: skip
     return tables, names, model.shapes
 
 

@@ -51,7 +51,7 @@ print((highest[0] <= highest[1]).all(), abs(highest[1] - highest[2]).max() < 1e-
 
 def test_built_in_features_have_slots_of_their_own():
     headers = list(features.headers())
-    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 5
+    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 6
     assert all(header.declaration.load().slot == header.slot for header in headers)
     assert all(header.declaration.load().wakes == header.wakes for header in headers)
 

@@ -7,10 +7,11 @@ from reference.scenes import GRAVITY, scene
 
 import fvsolve
 from fvsolve.core.kernels.dtypes import BODY_OUT
-from fvsolve.core.kernels.mechanism.body_layout import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
+from fvsolve.core.kernels.moving_frames import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
 from fvsolve.core.model import RunData
 from fvsolve.core.model.energy_accounts import Accounts
-from fvsolve.core.model.static_forces import mass_factor
+from fvsolve.features.motion.kernels.tables import motion_of
+from fvsolve.features.motion.static_forces import mass_factor
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
@@ -21,7 +22,7 @@ def model_of(bodies: dict, **numerics):
 
 
 def row(model, out, name: str) -> np.ndarray:
-    at = int(model.layout["body"]) + BODY_OUT * model.body_names.index(name)
+    at = int(model.layout["body"]) + BODY_OUT * motion_of(model).body_names.index(name)
     return out[at : at + BODY_OUT]
 
 
@@ -65,7 +66,7 @@ def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed)
     model = model_of(bodies, initial="equilibrium")
     pin, peer, data, _, _, rows = pinocchio_of(bodies, GRAVITY)
     q = np.zeros(peer.nq)
-    for name, row in zip(model.body_names, model.tables.bodies, strict=True):
+    for name, row in zip(motion_of(model).body_names, motion_of(model).body_table, strict=True):
         q[rows[name]] = row["start"][0]
     stiff = np.array([bodies[name]["joint"]["stiffness"] for name in bodies])
     left = pin.computeGeneralizedGravity(peer, data, q) + stiff * q
@@ -81,12 +82,12 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     pin, peer, data, q, _, rows = pinocchio_of(bodies, GRAVITY)
     truth = pin.crba(peer, data, q)
     truth = np.triu(truth) + np.triu(truth, 1).T
-    freedoms, n = model.tables.freedoms, len(model.tables.freedoms)
+    freedoms, n = motion_of(model).freedom_table, len(motion_of(model).freedom_table)
     factor, entries = np.zeros((n, n)), mass_factor(model, model.start)[8 * n :]
     for j, row in enumerate(freedoms):
         path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
         factor[j, path] = entries[row["row"] : row["row"] + row["depth"] + 1]
-    table = dict(zip(model.body_names, model.tables.bodies, strict=True))
+    table = dict(zip(motion_of(model).body_names, motion_of(model).body_table, strict=True))
     own = [int(table[name]["freedom"]) + k for name in rows for k in range(table[name]["freedoms"])]
     assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(truth, abs=1e-13 * np.abs(truth).max())
 

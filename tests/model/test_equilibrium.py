@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.core.model.build import tables_with_start
-from fvsolve.core.model.equilibrium_search import Configuration
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.equilibrium_search import Configuration
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}
@@ -30,7 +31,7 @@ def built(case: dict, **top):
 
 
 def angles(model) -> list[float]:
-    return [float(row["start"][0]) for row in model.tables.bodies]
+    return [float(row["start"][0]) for row in motion_of(model).body_table]
 
 
 def hinged(on: str | None = None, angle: float = 0.0, length: float = 1.0, mass: float = 3.0, **more) -> dict:
@@ -340,8 +341,9 @@ def test_a_balance_is_the_same_scene_with_the_computed_places_written_explicitly
     )
     if initial == "equilibrium":
         assert not [one for one in other.warnings if one.key in ("joint.angle", "joint.at")]
+    tables = [{"nodes": own.tables.nodes, **motion_of(own).tables()._asdict()} for own in (model, other)]
     for name in ("bodies", "lines", "nodes", "pins"):
-        mine, its = getattr(model.tables, name), getattr(other.tables, name)
+        mine, its = (own[name] for own in tables)
         for key in mine.dtype.names:
             assert np.all(np.abs(mine[key] - its[key]) <= 1e-11 * (1.0 + np.abs(mine[key])) * (key != "force") +
                           1e-8 * (key == "force")), key  # fmt: skip
@@ -357,7 +359,7 @@ def test_the_order_of_a_file_its_axes_and_where_the_search_begins_do_not_matter(
     truth = angles(built(balanced(nodes, links)))
     backwards = dict(reversed(nodes.items())), dict(reversed(links.items()))
     model = built(balanced(*backwards))
-    assert dict(zip(model.body_names, angles(model), strict=True)) == approx(
+    assert dict(zip(motion_of(model).body_names, angles(model), strict=True)) == approx(
         {"arm": truth[0], "hand": truth[1]}, abs=1e-13
     )
     turned = {**nodes, "arm": {**nodes["arm"], "joint": {**nodes["arm"]["joint"], "axis": [0, 1, 0], "angle": -0.3}}}
@@ -494,7 +496,8 @@ def test_bushings_and_preloads_count_from_stated_places():
     model = built(balanced({"top": nodes["top"], **rod}, rubber, ["rod.angle", "rubber.torque"]))
     angle, torque = model.observe(fvsolve.initial_state(model))
     assert torque == approx(GRAVITY * math.cos(angle), rel=1e-12) and angle == approx(-math.atan(GRAVITY / 30.0))
-    assert model.tables.bushings["energy"] == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)  # at t = 0
+    stored = motion_of(model).bushing_table["energy"]  # at t = 0
+    assert stored == approx([2.0 * 30.0 * math.sin(0.5 * angle) ** 2], rel=1e-12)
 
 
 def test_a_mass_on_an_axis_goes_to_where_its_spring_balances_its_load():

@@ -36,6 +36,9 @@ def in_folder_of_cases(monkeypatch):
 def model_bytes(model) -> dict[str, bytes]:
     """Contents of a model as bytes."""
     tables = {name: table.tobytes() for name, table in zip(model.tables._fields, model.tables, strict=True)}
+    for own in model.features:
+        found = {name: value for name, value in vars(own).items() if isinstance(value, np.ndarray)}
+        tables |= {f"{own.slot}.{name}": value.tobytes() for name, value in found.items()}
     arrays = {"scale": model.scale, "start": model.start, "profiles": np.concatenate([[0.0], *model.profiles.values()])}
     words = (model.breaks, model.step_max, model.shapes, model.state_names, model.node_names, model.link_names,
              model.events, model.laws, model.elevation, [probe.text for probe in model.probes], model.steady,

@@ -7,6 +7,7 @@ from reference.refusals import refused
 import fvsolve
 from fvsolve.case import load
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.kernels.tables import motion_of
 
 PROBES = ["arm.x"]
 
@@ -171,7 +172,7 @@ def test_a_faulty_body_is_no_fault_of_parts_that_name_it():
 def test_an_axis_that_is_not_of_unit_length_is_divided_by_it_and_noted():
     model = fvsolve.build(fvsolve.load(bodies(arm(joint=hinge(axis=[0, 2, 0], angle=1.0)), 1.0)))
     assert [one.key for one in model.warnings] == ["joint.axis"] and "not 1" in model.warnings[0].text
-    assert model.tables.bodies[0]["axis"].tolist() == [0.0, 1.0, 0.0]
+    assert motion_of(model).body_table[0]["axis"].tolist() == [0.0, 1.0, 0.0]
 
 
 def test_motion_at_the_start_is_reported():
@@ -493,7 +494,7 @@ def test_a_case_without_masses_loads_none_of_their_kernels(tmp_path):
     import sys
 
     code = ("import sys, fvsolve; result = fvsolve.run('cases/chamber-and-orifice.toml');"
-            "ends = 'mechanics_tables', 'mass_dynamics';"
+            "ends = 'motion.lower', 'mass_dynamics';"
             "print([name for name in sys.modules if name.endswith(ends)])")  # fmt: skip
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

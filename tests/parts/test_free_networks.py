@@ -14,6 +14,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.build import build
 from fvsolve.core.solve import initial_state
 from fvsolve.errors import CaseError
+from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.studies.energy_balance import energy
 
 MASS, LOW, TURN = 60e3, 0.8, 4e5  # hull: mass [kg], depth of its centre [m], inertia about it [kg m2]
@@ -304,7 +305,7 @@ def momenta(model, t, y):
     """Momentum and angular momentum about the origin of the world, of a body with its network : float64[6]."""
     out, tables, found = model.evaluate(t, y)[1], model.tables, np.zeros(6)
     row, linear = out[int(model.layout["body"]) :], model.case.law.linear
-    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `mechanism.body_layout`
+    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `kernels.moving_frames`
 
     def add(momentum, r, own=0.0):
         found[:3] += momentum
@@ -315,27 +316,28 @@ def momenta(model, t, y):
         carried = mass * (speed + np.cross(spin, turn @ r))
         add(carried + 2.0 * flow * half, r, mass / 3.0 * np.cross(half, np.cross(spin, half)))
 
-    body, levels = tables.bodies[0], {}
+    body, levels = motion_of(model).body_table[0], {}
+    segments = motion_of(model).moving_segment_table
     line(body["mass"], body["centre"], body["centre"])
     found[3:] += turn @ body["inertia"].reshape(3, 3) @ turn.T @ spin
     for i, node in enumerate(tables.nodes):
-        r = tables.moving_segments[node["moving_segment"]]["start"]
+        r = segments[node["forcing"]]["start"]
         mass = node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0)
         levels[i] = np.array([0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0])
         line(mass, r, r + levels[i])
     for pipe in tables.pipes:
         for k in range(n := int(pipe["cells"])):
             forth, back, ride = (
-                y[pipe["y"] + k], y[pipe["y"] + n + k], tables.moving_segments[pipe["moving_segment"] + k],
+                y[pipe["y"] + k], y[pipe["y"] + n + k], segments[pipe["forcing"] + k],
             )  # fmt: skip
             per = RHO * pipe["area"] if linear else tables.profile[pipe["center"] + k]
             mass = (per + (forth + back) / pipe["speed"]) * pipe["dx"]
             line(mass, ride["start"], ride["end"], pipe["flow"] + forth - back)
     for column in tables.columns:
-        flow, ride = column["flow"] + y[column["y"]], tables.moving_segments[column["moving_segment"]]
+        flow, ride = column["flow"] + y[column["y"]], segments[column["forcing"]]
         line(RHO * column["area"] * column["length"], ride["start"], ride["end"], flow)
         for i, sign in ((column["from_node"], -1.0), (column["to_node"], 1.0)):
-            foot = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
+            foot = segments[tables.nodes[i]["forcing"]]["start"]
             line(0.0, foot, foot + levels[i], sign * flow)
     return found
 

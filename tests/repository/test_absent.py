@@ -18,7 +18,7 @@ from fvsolve.jit import COMPILING
 
 PIPES = {"pipes", "ghost_cells", "reconstruction", "fused_step"}
 MASSES = {"mass_dynamics"}
-BODIES = {"body_kinematics", "mass_matrix", "body_layout", "bushings_and_pins"}
+BODIES = {"body_kinematics", "mass_matrix", "moving_frames", "bushings_and_pins"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"relaxation"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "structure", "linear_dense", "linear_banded", "linear_sparse"}

@@ -20,6 +20,7 @@ AWAKE = {
     "scalars": ["temperature-front"],
     "basins": ["dam-break"],
     "networks": ["clutch"],
+    "motion": ["closed-cylinder"],
 }
 RUN = "import sys, fvsolve; from fvsolve.cli import main; print(fvsolve.__file__); sys.exit(main())"
 

@@ -20,7 +20,11 @@ class ArraySizes:
         self.offsets: dict[str, int] = {}
         self.size = 0
         self.run_arrays: dict[str, int | tuple[int, int]] = {}
-        self.marks = 0
+        self.marks = self.feature_marks = 0
+        self.first_mark = 0  # of those of features
+        self.event_flags = 0
+        self.feature_power = self.feature_stored = 0
+        self.reads_rates = False  # True if `out` depends on rates, also where they are not requested
         self.scratch: list[Callable[[int], int]] = []
         self.spare: list[Callable[[int], int]] = [lambda out: out]
         self.places = [0]
@@ -36,6 +40,16 @@ class ArraySizes:
     def run_array(self, name: str, shape: int | tuple[int, int]) -> None:
         """State the shape of an array of `RunArrays`."""
         self.run_arrays[name] = shape
+
+    def flags(self, count: int) -> int:
+        """Reserve event flags of the run, behind those that are reserved; return the number of the first."""
+        self.event_flags += int(count)
+        return self.event_flags - int(count)
+
+    def mark(self, count: int) -> int:
+        """Reserve entries of `marks` before those of devices; return the number of the first."""
+        self.feature_marks += int(count)
+        return self.first_mark + self.feature_marks - int(count)
 
     def need_places(self, count: int) -> None:
         """State the number of cells of a pipe, or of places that are computed like them."""
@@ -58,6 +72,8 @@ class ArraySizes:
                 layout[name] = self.offsets[name]
         layout["size"] = self.size = at
         layout["forces"] = layout["rates"] = -1
+        layout["device_mark"] = self.first_mark + self.feature_marks
+        layout["feature_power"], layout["feature_stored"] = self.feature_power, self.feature_stored
         return layout
 
     def shapes(self) -> rec.RunArrays:
@@ -66,5 +82,5 @@ class ArraySizes:
         places = max(self.places)
         found["scratch"] = max((int(size(places)) for size in self.scratch), default=0)
         found["spare"] = max(int(size(self.size)) for size in self.spare)
-        found["marks"] = self.marks
+        found["marks"], found["armed"] = self.marks + self.feature_marks, self.event_flags
         return rec.RunArrays(**found)

@@ -82,16 +82,55 @@ def features_of(case, given_up: Collection[str] = ()) -> list[Feature]:
     return [awake[slot].declaration.load()(case, given_up) for slot in sorted(awake)]
 
 
+class Squares(NamedTuple):
+    """Energy of small deviations as squares of linear forms, a form given by the factor of each state in it.
+
+    stored : state of a stored amount -> its form; first, last : (name of a part, form), before and behind those of
+    devices
+    """
+
+    stored: dict[int, dict[int, float]] = {}
+    first: list[tuple[str, dict[int, float]]] = []
+    last: list[tuple[str, dict[int, float]]] = []
+
+
+class Coordinate(NamedTuple):
+    """Coordinate of a part that moves along a line.
+
+    net : place of the force on it among the net forces in `out`, -1 for none; frame : its number among frames, or -1
+    y, rate : offsets in y of its position and velocity, as deviations, or -1; schedule : that sets it, or -1
+    position [m], velocity [m/s], force [N] : at the start; inertia [kg]; lightness : 1 / inertia, 0 if fixed [1/kg]
+    """
+
+    net: int
+    frame: int
+    y: int
+    rate: int
+    schedule: int
+    position: float
+    velocity: float
+    force: float
+    inertia: float
+    lightness: float
+
+
 class Feature:
     """Base of features, with one object for each case. `draft` is the `ModelDraft`, `model` the `Model`, of the case.
 
     slot : number of the feature, by which its compiled functions find its tables
     packages : names of further modules with compiled functions, such as laws of parts
     sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
+    reads_nodes : True if its functions need pressures or flows of nodes, also in a model that has only basins
     reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
     shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
     step_histories : names of arrays in the memory of a state that contain values at past steps
     single_thread_reason : reason why a model with the feature is stepped by a single thread; "" if it is not
+    frames : names of frames that move, whose data it writes to `out`, see `kernels.moving_frames`
+    leaks : rows of links that leak between nodes a and b and change their volumes: `leakage` [m3/s/Pa], `speed`,
+    `sweep_a`, `sweep_b`; leak_names : names of these links
+    fast_parts : names of parts that can limit the step
+    marks : kind and place of each entry of `marks` that the feature has reserved
+    link_schedules : link -> number of its schedule; -1 for none
     further_cells : number of cells whose cost the feature adds to that of pipes and meshes; negative if it saves
     meshed : its parts with a mesh of cells, see `assembly.meshed_parts`
     sources : names of its rows in the ledger of mass that does not pass nodes, such as "street.rain"
@@ -101,10 +140,16 @@ class Feature:
     slot = 0
     wakes: frozenset[str] = frozenset()
     packages: Sequence[str] = ()
-    sets_arrivals = reads_solved = False
+    sets_arrivals = reads_nodes = reads_solved = False
     shortest_delay = np.inf
     step_histories: Sequence[str] = ()
     single_thread_reason = ""
+    frames: Sequence[str] = ()
+    leaks: Any = ()
+    leak_names: Sequence[str] = ()
+    fast_parts: Sequence[str] = ()
+    marks: Sequence[tuple[str, str]] = ()
+    link_schedules: dict[str, int] = {}
     further_cells = 0
     meshed: Sequence[Any] = ()
     sources: Sequence[str] = ()
@@ -130,6 +175,22 @@ class Feature:
 
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
+
+    def join(self, draft, row, ports, places, toward=None, about=None) -> tuple[float, float] | None:
+        """Write to the row of a force element what it joins; None if the feature has no such parts.
+
+        Returns the distance of the second part from the first at the start [m], and its rate [m/s]; for points
+        `toward` a direction only the rate along it, and `about` an axis that of the angle [rad/s].
+        ports : columns of the row for both parts, or for both points of a joint; places : names of parts or points
+        """
+        return None
+
+    def coordinate(self, name: str) -> Coordinate | None:
+        """Coordinate of a part that the feature moves along a line; None for others."""
+        return None
+
+    def lower_behind_links(self, draft) -> None:
+        """Fill the tables of the feature, after those of links and devices; add faults."""
 
     def lower_behind_nodes(self, draft) -> None:
         """Fill the tables of the feature, after those of nodes and links; add faults."""
@@ -164,9 +225,21 @@ class Feature:
     def placed(self, draft) -> None:
         """Read the offsets of stretches of `out`, in `draft.sizes.offsets`."""
 
+    def rest(self, case, draft) -> tuple[Any, list]:
+        """Case whose parts begin at rest where their forces balance, and notices; draft : with its steady start."""
+        return case, []
+
     def balanced(self, draft, start: Callable[[Any], Any]):
         """Draft whose start the feature has balanced; start : function of a draft -> model with its steady start."""
         return draft
+
+    def supported(self, draft, start) -> dict[int, float]:
+        """Pressures of closed nodes that support loads, in a solved steady start : node -> pressure [Pa]."""
+        return {}
+
+    def begin_forces(self, draft, start) -> list[str]:
+        """Set forces from the steady start of the flow, start; texts on what moves."""
+        return []
 
     def prepare_start(self, draft, trial: Callable[[Any], Any]) -> None:
         """Set values that the steady start needs. trial : function of a copy of the draft, which fills its start in."""
@@ -208,10 +281,12 @@ class Feature:
 
         cast : `ModelFeatures` of the model without those of features
         Places: first: before all others; pipes: behind those of pipes; events: with event functions of restrictions;
-        devices: behind those of devices; flow: behind those of the memory of pipes; carried: then, of what flows carry;
-        cells: then, of what is carried in meshes; last: behind all others but records of nodes.
-        Places of event functions, in this order, after the nodes are solved: given: values that follow from states and
-        nodes; sources: schedules that the feature sets; followed: what follows such schedules; solved: other values.
+        links: behind those of pipes, restrictions and columns; devices: behind those of devices; flow: behind those of
+        the memory of pipes; carried: then, of what flows carry; cells: then, of what is carried in meshes; last: behind
+        all others but records of nodes.
+        Places of event functions, in this order, after the nodes are solved: closed: forces; given: values that follow
+        from states, nodes and forces; sources: schedules that the feature sets; followed: what follows such schedules;
+        solved: other values.
         """
         return ()
 
@@ -230,6 +305,10 @@ class Feature:
     def modes(self, model) -> list[tuple[str, np.ndarray]]:
         """Modes of cells: pairs of a name and eigenvalues [1/s], see `step_limits.growing_modes`."""
         return []
+
+    def squares(self, model, y: np.ndarray) -> Squares:
+        """Squares of linear forms in deviations from the state y, whose sum is the energy of the feature."""
+        return Squares()
 
     def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
         """Write the weights of its states in the norm of deviations from y, see `model.energy_norm`.
@@ -267,10 +346,14 @@ class Feature:
         return ()
 
     def add_accounts(self, accounts) -> None:
-        """Add accounts with the rows of power and stored energy behind those of masses, see `model.energy_accounts`."""
+        """Add accounts of energy with rows behind those of others and before those of devices."""
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         """Add values along pipes and at nodes to the result of `Model.fields`."""
+
+    def drawn(self, model):
+        """Lines that move with parts, in the way of `motion.drawing.BodyLines`; None for none."""
+        return None
 
     def facts(self, model) -> dict[str, Any]:
         """Facts for `fvsolve check`."""
@@ -286,6 +369,13 @@ class Feature:
 
     def ledgers(self, model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict]:
         """Balances of a run, by name; y : its last state; ledger : float64[2, m], sums of its rates by sign"""
+        return {}
+
+    def begin_accounts(self, accounts) -> None:
+        """Add accounts of energy with rows behind those of columns, see `model.energy_accounts`."""
+
+    def above(self, model) -> dict[str, float]:
+        """Energy of parts at the start, above that at rest, see `model.energy_accounts.available_energy` [J]."""
         return {}
 
     def inputs(self, model) -> dict[str, Any]:
@@ -322,6 +412,18 @@ class FeaturePattern:
     def schedule(self, *indices: int) -> np.ndarray:
         """States on which schedules with these numbers depend."""
         return np.zeros(0, dtype=np.int64)
+
+    def pressure(self, i: int) -> np.ndarray:
+        """States on which the pressure of storing node i depends, in addition to its mass."""
+        return np.zeros(0, dtype=np.int64)
+
+    def inflows(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield (storing node, states on which a flow of the feature into it depends)."""
+        yield from ()
+
+    def schedules(self) -> set[int]:
+        """Numbers of the schedules that `pairs` contain, wherever blocks set them."""
+        return set()
 
     def source(self, row) -> np.ndarray | None:
         """States on which a source of a network depends; None if the feature knows none. row : of the source"""
@@ -381,9 +483,6 @@ class FeatureRun:
     def written_tables(self) -> dict[str, np.ndarray]:
         """Tables of the model that the run writes, as copies by name."""
         return {}
-
-    def for_energy(self) -> None:
-        """Let functions compute what only energies need."""
 
     def views(self) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
         """Views that compiled functions open : name -> (array for its handle, tables of the model replaced in it)."""
@@ -456,11 +555,28 @@ class FeatureRun:
         """True if the feature corrected the state at t, so that the step before it cannot be repeated."""
         return False
 
+    def for_energy(self) -> None:
+        """Let functions compute what only energies need; raises FvsolveError if that is not possible."""
+
     def notices(self) -> list:
         """Notices at the end of a run."""
+        return []
+
+    def end_notices(self, y: np.ndarray) -> list:
+        """Notices on the last state of a run."""
         return []
 
 
 def with_slot(members: list[Any], slot: int) -> Any:
     """Feature with a slot, or its data of a run; None if the case does not have the feature."""
     return next((member for member in members if getattr(member, "feature", member).slot == slot), None)
+
+
+def frames_of(owner) -> list[str]:
+    """Names of frames that move in a draft or model, in the order of their data in `out`, see `Feature.frames`."""
+    return [name for feature in owner.features for name in feature.frames]
+
+
+def coordinate_of(owner, name: str) -> Coordinate:
+    """Coordinate of a part that moves along a line, of a draft or a model."""
+    return next(found for feature in owner.features if (found := feature.coordinate(name)) is not None)

@@ -451,7 +451,7 @@ def lower_devices(draft) -> None:
     lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
     draft.devices = [(name, part, device) for name, part, device in lowered if device.is_device]
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
-    for column in ("valve", "node", "second", "schedule", "y", "row", "mass"):
+    for column in ("valve", "node", "second", "schedule", "y", "row", "travel"):
         table[column] = -1
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)

@@ -126,6 +126,9 @@ class Hydraulics:
         return reynolds * math.pi / 4.0 * diameter * viscosity
 
 
+ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
+# likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
+EQUILIBRIUM_SHARE = 1e-9
 CACHE_LINE = 8  # floats of a cache line
 
 
@@ -214,17 +217,6 @@ class ModelDraft:
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
     valve_names: list[str] = field(default_factory=list)
-    body_names: list[str] = field(default_factory=list)
-    point_index: dict[str, int] = field(default_factory=dict)
-    points: list[tuple] = field(default_factory=list)  # rows, added on first use
-    pin_names: list[str] = field(default_factory=list)
-    bushing_names: list[str] = field(default_factory=list)
-    lines: list[tuple] = field(default_factory=list)
-    factor_size: int = 0  # entries of a mass matrix factor
-    mass_names: list[str] = field(default_factory=list)
-    mass_index: dict[str | None, int] = field(default_factory=dict)
-    piston_names: list[str] = field(default_factory=list)
-    push_names: list[str] = field(default_factory=list)
     wall_names: list[str] = field(default_factory=list)
     devices: list[tuple] = field(default_factory=list)  # (name, part, lowering)
     laws: list[str] = field(default_factory=list)  # modules of compiled laws, in the order of the rows of `hooks`
@@ -243,16 +235,6 @@ class ModelDraft:
     valve_table: np.ndarray = no_rows(rec.VALVE)
     cluster_table: np.ndarray = no_rows(rec.CLUSTER_RECORD)
     device_table: np.ndarray = no_rows(rec.DEVICE)
-    body_table: np.ndarray = no_rows(rec.BODY)
-    freedom_table: np.ndarray = no_rows(rec.FREEDOM)
-    line_table: np.ndarray = no_rows(rec.LINE)
-    pin_table: np.ndarray = no_rows(rec.PIN)
-    bushing_table: np.ndarray = no_rows(rec.BUSHING)
-    moving_segment_table: np.ndarray = no_rows(rec.MOVING_SEGMENT)
-    mass_table: np.ndarray = no_rows(rec.MASS)
-    brace_table: np.ndarray = no_rows(rec.BRACE)
-    stop_table: np.ndarray = no_rows(rec.STOP)
-    piston_table: np.ndarray = no_rows(rec.PISTON)
     basin_table: np.ndarray = no_rows(rec.BASIN)
     patch_table: np.ndarray = no_rows(rec.PATCHES)
     scalar_table: np.ndarray = no_rows(rec.SCALAR)
@@ -267,9 +249,6 @@ class ModelDraft:
     start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start that no state tells
 
     # results of the start
-    # piston -> sides whose closed chambers may support a load
-    locked: dict[int, list[str]] = field(default_factory=dict)
-    shut: dict[int, list[str]] = field(default_factory=dict)  # piston -> sides that no open link joins to another node
     tables: Any = None  # all tables, as kernels read them
     shapes: Any = None  # shapes of the arrays that runs write
     watched_start: np.ndarray = field(default_factory=lambda: np.zeros(0))  # see `Model`
@@ -376,6 +355,11 @@ class ModelDraft:
         return f"{name}.inside" if f"{name}.inside" in self.node_index else name
 
     @property
+    def rounding(self) -> float:
+        """Fraction of the sum of force magnitudes below which the sum of these forces counts as rounding error."""
+        return EQUILIBRIUM_SHARE if self.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
+
+    @property
     def device_names(self) -> list[str]:
         """Names of devices, in the order of their table."""
         return [name for name, _, _ in self.devices]
@@ -389,12 +373,16 @@ class ModelDraft:
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
             table_rows["command"] = table_rows["hold"] = -1
             table_rows["back"] = 1.0
-        if "moving_segment" in record.names:
-            table_rows["moving_segment"] = -1
+        if "forcing" in record.names:
+            table_rows["forcing"] = -1
         for name, link, lowering in parts:
             lowering.fill(self, name, link, table_rows[at : at + lowering.rows])
             at += lowering.rows
         return names, table_rows
+
+    def join(self, row, ports: tuple[str, str], places: tuple[str | None, str], **line) -> tuple[float, float]:
+        """Write to the row of a force element what it joins, see `Feature.join`."""
+        return next(found for feature in self.features if (found := feature.join(self, row, ports, places, **line)))
 
     def ends(self, link, row) -> None:
         """Write the indices of the nodes at both ends of a link to its row."""

@@ -59,13 +59,13 @@ def is_column_junction(tables, out, i):
 
 
 @njit(forceinline=True)
-def body_drive(tables, out, column):
-    """Change since the start of the energy per mass that the motion of its body gives a column [J/kg].
+def forcing_of(tables, out, column):
+    """Forcing of a column, the change since the start of the work that a feature does on it [J/kg].
 
-    It is 0 for a fixed column.
+    It is 0 for a column without it.
     """
-    total, at = 0.0, tables.layout[0]["moving_segment"] + column["moving_segment"]
-    for k in range(column["moving_segments"]):
+    total, at = 0.0, tables.layout[0]["forcing"] + column["forcing"]
+    for k in range(column["forcings"]):
         total += out[at + k]
     return total
 
@@ -74,9 +74,9 @@ def body_drive(tables, out, column):
 def driving_offset(tables, out, column):
     """Driving pressure of a column in addition to the pressure changes of its ends [Pa].
 
-    It contains the initial driving pressure not balanced by friction, and the motion of the column's body.
+    It contains the initial driving pressure not balanced by friction, and the forcing of the column.
     """
-    return column["offset"] + tables.settings[0]["rho"] * body_drive(tables, out, column)
+    return column["offset"] + tables.settings[0]["rho"] * forcing_of(tables, out, column)
 
 
 @njit

@@ -68,7 +68,7 @@ def record_devices(t, y, out, handle, values):
     """
     tables = open_tables(handle)
     marks, devices = tables.marks, tables.devices
-    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size + tables.pistons.size
+    first = tables.layout[0]["device_mark"]
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], OUTSIDE]
         beyond = calls.call_outside(hook, out, tables, devices[k]) if hook != 0 else 0

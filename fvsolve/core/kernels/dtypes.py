@@ -12,7 +12,7 @@ import numpy as np
 
 # Codes of kinds, for kernels.
 FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: given pressure, storage, storage, no storage
-MOVING, VESSEL = 4, 5  # storage with pressure known before nodes are solved: chamber of a piston, vessel of a device
+MOVING, VESSEL = 4, 5  # storage with pressure known before nodes are solved: its volume changes; vessel of a device
 PATCH = 6  # patch of a basin, which sets its pressure and receives its flow
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
 UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4  # scheme families; LINEAR: six weights, SHORT: upwind3
@@ -60,6 +60,7 @@ SETTINGS = record(
     reads_solved=i8,  # 1 if a feature reads values that only the solved nodes determine, before rates are computed
     gravity=f8,
     datum=f8,  # elevation of zero height in energy studies [m]
+    swept=i8,  # 1 if a feature changes volumes of nodes
     vapor=f8,  # vapour pressure [Pa]
     unmarked=f8,  # pressure below which a node stands for a flow that a patch does not have [Pa]
     rate=f8,  # greatest constant wave rate, speed / dx [1/s]
@@ -116,7 +117,7 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
     to_base=f8,
     from_mass=f8,  # mass per length at the end, computed for the profile [kg/m]
     to_mass=f8,
-    moving_segment=i8,  # row of its first cell in `moving_segments`; -1 for a fixed pipe
+    forcing=i8,  # of its first cell among the forcings of stretches, see `LAYOUT`; -1 for none
     temperature=f8,  # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
     heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
 )
@@ -151,7 +152,7 @@ NODE = record(
     columns=i8,  # number of these columns
     head_given=i8,  # laws log and table: 1 if the schedule is a head [m]
     density=f8,  # density in a tank [kg/m3]
-    moving_segment=i8,  # row of `moving_segments`; -1 for a fixed node
+    forcing=i8,  # among the forcings of stretches, see `LAYOUT`; -1 for none
 )
 
 VALVE = record(
@@ -201,134 +202,8 @@ COLUMN = record(
     drag=f8,
     offset=f8,  # driving pressure of the profile not balanced by friction [Pa]
     base=f8,  # laws log and table: driving pressure of the profile [Pa]
-    moving_segment=i8,  # row of its first stretch in `moving_segments`; -1 for a fixed column
-    moving_segments=i8,  # number of these stretches
-)
-
-BODY = record(  # its axes have their origin at its joint
-    parent=i8,  # row of its parent body, a smaller number; -1 for the world
-    root=i8,  # row of the first body of its tree
-    joint=i8,  # REVOLUTE ...
-    y=i8,  # offset in y of its coordinates, as deviations; -1 for none
-    rate=i8,  # offset in y of its velocities, as deviations; -1 for none
-    freedom=i8,  # its first row of `freedoms`
-    freedoms=i8,  # number of its degrees of freedom
-    schedule=i8,  # angle [rad] or travel [m] of a driven joint; -1 for none
-    at="(3,)f8",  # position of the joint in the axes of the parent [m]
-    attitude="(9,)f8",  # rotation matrix of the joint axes in the axes of the parent, by rows
-    axis="(3,)f8",  # axis of the joint, in the joint axes and in its own
-    mass=f8,
-    centre="(3,)f8",  # centre of mass [m]
-    inertia="(9,)f8",  # about the centre of mass [kg m2]
-    damping=f8,  # damping of its joint [N m s] or [N s/m]
-    stiffness=f8,  # stiffness of its joint [N m/rad] or [N/m]
-    start="(7,)f8",  # coordinates at the start
-    speed="(6,)f8",  # velocities at the start
-    height=f8,  # height of its centre of mass at the start [m]
-    energy=f8,  # kinetic energy at the start [J]
-)
-REVOLUTE, PRISMATIC, BALL, FREE, WELD = 0, 1, 2, 3, 4  # joints
-
-FREEDOM = record(
-    depth=i8,  # number of degrees of freedom on which its position depends
-    path=i8,  # offset in `integers` of these, from the root on, and of itself
-    row=i8,  # offset of its row of the mass matrix, for those on its path
-    balance=f8,  # generalised force at the start that is rounding [N] or [N m]
-)
-
-POINT = record(
-    body=i8,  # -1: the world
-    place="(3,)f8",  # in the axes of the body
-)
-
-LINE = record(  # line of action of a force element on points of bodies
-    push=i8,
-    from_point=i8,  # -1 for none
-    to_point=i8,
-    acts=i8,  # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
-    direction="(3,)f8",
-    length=f8,  # length at the start [m]
-)
-ALONG, TOWARD, ABOUT = 0, 1, 2
-
-PIN = record(
-    from_point=i8,
-    to_point=i8,
-    rows=i8,  # number of constrained directions
-    directions="(9,)f8",  # in the axes of the body of `from`
-    pull=f8,  # rate of stabilisation (Baumgarte) [1/s]
-    gap="(3,)f8",  # gap along each direction at the start [m]
-    force="(3,)f8",  # constraint force at the start [N]
-)
-
-BUSHING = record(
-    from_point=i8,
-    to_point=i8,
-    stiffness=f8,
-    damping=f8,
-    turn_stiffness=f8,
-    turn_damping=f8,
-    attitude="(9,)f8",  # rotation matrix of the body of `to` in the axes of that of `from` at the start
-    energy=f8,  # energy stored at the start [J]
-)
-
-MOVING_SEGMENT = record(  # moving stretch of a pipe or column, or content of a node, on a body and in its axes
-    body=i8,
-    start="(3,)f8",  # its start [m]; position of a node
-    end="(3,)f8",  # its end [m]; the level of a tank rises along z
-    swept="(3,)f8",  # integral of r x dr along it [m2]
-    rest=f8,  # work of gravity along it at the start [J/kg]
-    loads_body=i8,  # load on the body: MOVED_BY_FORCES, JOINT_LOAD_READ, or 0 if neither applies
-)
-
-MASS = record(
-    y=i8,  # offset in y of its position, then velocity, both as deviations; -1 for a frame
-    lightness=f8,  # 1 / mass, 0 for a frame [1/kg]
-    position=f8,  # at the start [m]
-    velocity=f8,  # at the start [m/s]
-    force=f8,  # sum of all forces at the start, rounding set to zero [N]
-)
-
-BRACE = record(  # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
-    from_mass=i8,
-    to_mass=i8,
-    schedule=i8,  # -1 for none
-    given=f8,  # value of the schedule at the start [N]
-    stiffness=f8,
-    damping=f8,
-    speed=f8,  # v_to - v_from at the start [m/s]
-    force=f8,  # push at the start [N]
-    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
-)
-
-STOP = record(
-    from_mass=i8,
-    to_mass=i8,
-    stiffness=f8,
-    damping=f8,
-    below=f8,  # free travel at the start before it pushes forward, infinite for none [m]
-    above=f8,  # free travel at the start before it pushes back [m]
-    force=f8,
-    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
-)
-
-PISTON = record(
-    case=i8,  # masses
-    rod=i8,
-    a=i8,  # nodes
-    b=i8,
-    area_a=f8,
-    area_b=f8,
-    sweep_a=f8,  # mass in A per travel at the density of the start, not part of the excess [kg/m]
-    sweep_b=f8,  # likewise in B, negative
-    position=f8,  # x at the start [m]
-    stroke=f8,
-    leakage=f8,  # [m3/s/Pa]
-    leak=f8,  # mass flow from A to B in the profile [kg/s]
-    damping=f8,
-    speed=f8,
-    force=f8,
-    line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
+    forcing=i8,  # of its first stretch among the forcings of stretches, see `LAYOUT`; -1 for none
+    forcings=i8,  # number of these stretches
 )
 
 DEVICE = record(
@@ -345,7 +220,7 @@ DEVICE = record(
     data=i8,  # offset of its numbers in `floats`
     schedule=i8,  # -1 for none
     row=i8,  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
-    mass=i8,  # mass whose position it reads; -1 for none
+    travel=i8,  # offset in y of a position and its velocity that it reads; -1 for none
     opens_by_event=i8,  # 1 if only events open it
     controls_column=i8,  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
 )
@@ -386,8 +261,8 @@ LAYOUT = record(
     stiffness=i8,  # of moving chambers: pressure per mass [Pa/kg]
     outflow_fraction=i8,  # of patches: fraction of the requested outflow for which there is water
     swept=i8,  # mass flow out of moving chambers by piston and leak [kg/s]
-    net_force=i8,  # on masses [N]
-    push=i8,  # forces of braces, then of stops, then of pistons [N]
+    net_force=i8,  # on what moves along a line [N]
+    push=i8,  # forces of the elements between [N]
     conductance=i8,  # present conductances of valves, 0 if closed [kg2/s2/Pa]
     drive=i8,  # present relative speeds of pumps, an entry for each valve
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
@@ -401,22 +276,25 @@ LAYOUT = record(
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
     scalar_inflow=i8,  # flow of scalars from links into nodes [kg/s]
     exchange=i8,  # of each heat exchanger: value of the scalar at the thermal node, heat out of the fluid [W]
-    moving_segment=i8,  # change of the driving energy of moving stretches since the start [J/kg]
+    forcing=i8,  # forcing of stretches of fluid: change since the start of the work that a feature does [J/kg]
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
-    tank=i8,  # inertia of basins on bodies, see `kernels.mechanism.body_layout`
+    tank=i8,  # inertia of basins on frames, see `kernels.moving_frames`
     wall=i8,  # outward force of the water on moving walls, minus that of the profile [N]
     travel=i8,  # of force elements: change of length since the start and its rate [m, m/s]
     along=i8,  # unit vectors of lines, between their points
-    pin=i8,  # forces of pins, three for each [N]
-    body=i8,  # data of bodies, see `kernels.mechanism.body_layout`
+    pin=i8,  # forces of constraints, three for each [N]
+    body=i8,  # data of frames that move, see `kernels.moving_frames`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
     shaft=i8,  # speeds of shafts that laws of devices read before the nodes are solved [rad/s]
     size=i8,
+    device_mark=i8,  # offset in `marks` of those of devices
+    feature_power=i8,  # number of rows of `power` that features fill, between those of networks and of devices
+    feature_stored=i8,  # likewise of `stored`
 )
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
-TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.body_layout`
+TANK_OUT = 24  # numbers in `out` of each basin on a body, see `kernels.moving_frames`
 RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
 # Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
 # steps, of the steady start, and of the density laws other than `linear`.
@@ -428,7 +306,6 @@ OUT_HEAD = 8
 # Functions that spend time on this rate leave the value; others raise it as always.
 RATE_UNWANTED = -1.0
 NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
-MOVED_BY_FORCES, JOINT_LOAD_READ = 1, 2  # load of a stretch: forces move its body; or the joint load is an output
 
 PROBE = record(
     kind=i8,
@@ -450,7 +327,12 @@ NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
 GIVEN_FLOW = 18  # of a patch with given velocity
 WALL_VALUE = 19  # of a moving wall
-BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_values`
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = (
+    20,
+    21,
+    22,
+    23,
+)  # quantity in `side`, see `features.motion.kernels.body_values`
 SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 SCHEDULE_VALUE = 28  # of schedule `index`
@@ -587,10 +469,14 @@ WALL = record(
     basin=i8,
     node=i8,  # node of its patch
     y=i8,  # offset of its travel since the start [m]
-    mass=i8,  # mass that moves with it
-    body=i8,  # or body whose prismatic joint moves it
-    toward=f8,  # 1 if mass or body travels in the direction of the wall, -1 if in the opposite
-    schedule=i8,  # or schedule of its travel; -1 for none
+    mass=i8,  # row of the force on what moves with it, among the net forces in `out`; -1 for none
+    body=i8,  # frame on which it pushes; -1 for none
+    rate=i8,  # offset in y of its speed; -1 for none
+    speed=f8,  # at the start [m/s]
+    toward=f8,  # 1 if this speed is in the direction of the wall, -1 if in the opposite
+    inertia=f8,  # of what moves with it [kg]
+    lightness=f8,  # 1 / inertia, 0 for a fixed wall [1/kg]
+    schedule=i8,  # schedule of its travel; -1 for none
     weights=i8,  # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
     faces=i8,  # offset in `integers` of its face numbers on the boundary
     count=i8,  # number of its faces
@@ -661,17 +547,6 @@ RECORDS = {
     "clusters": CLUSTER_RECORD,
     "schedules": SCHEDULE,
     "probes": PROBE,
-    "bodies": BODY,
-    "freedoms": FREEDOM,
-    "points": POINT,
-    "lines": LINE,
-    "pins": PIN,
-    "bushings": BUSHING,
-    "moving_segments": MOVING_SEGMENT,
-    "masses": MASS,
-    "braces": BRACE,
-    "stops": STOP,
-    "pistons": PISTON,
     "devices": DEVICE,
     "basins": BASIN,
     "patches": PATCHES,

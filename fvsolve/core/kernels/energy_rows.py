@@ -1,12 +1,12 @@
 """Index of the first entry of each kind of part at the end of the energy arrays `power` and `stored`.
 
-The order is: rows of features, bushings, bodies, devices, moving walls, basins.
+The order is: rows of features, devices, moving walls, basins.
 """
 
 from fvsolve.jit import njit
 
 # Rows of `power` for each part. `stored` has one row for each of these parts and none for a wall.
-BUSHING_ROWS, BODY_ROWS, DEVICE_ROWS, WALL_ROWS, BASIN_ROWS = 2, 3, 3, 2, 5
+DEVICE_ROWS, WALL_ROWS, BASIN_ROWS = 3, 2, 5
 
 
 @njit(forceinline=True)
@@ -28,30 +28,6 @@ def device_power_row(tables, power):
 
 
 @njit(forceinline=True)
-def body_power_row(tables, power):
-    """Index of the first entry of bodies in `power`."""
-    return device_power_row(tables, power) - BODY_ROWS * tables.bodies.size
-
-
-@njit(forceinline=True)
-def bushing_power_row(tables, power):
-    """Index of the first entry of bushings in `power`."""
-    return body_power_row(tables, power) - BUSHING_ROWS * tables.bushings.size
-
-
-@njit(forceinline=True)
 def device_stored_row(tables, stored):
     """Index of the first entry of devices in `stored`."""
     return stored.size - tables.basins.size - tables.devices.size
-
-
-@njit(forceinline=True)
-def body_stored_row(tables, stored):
-    """Index of the first entry of bodies in `stored`."""
-    return device_stored_row(tables, stored) - tables.bodies.size
-
-
-@njit(forceinline=True)
-def bushing_stored_row(tables, stored):
-    """Index of the first entry of bushings in `stored`."""
-    return body_stored_row(tables, stored) - tables.bushings.size

@@ -76,9 +76,10 @@ def net_flows(out, tables):
         change = out[layout["column"] + k] - columns[k]["flow"]
         out[net + columns[k]["from_node"]] -= change
         out[net + columns[k]["to_node"]] += change
-    # The state of a moving chamber is its excess mass, so a growing volume counts as an outflow.
-    for k in range(tables.pistons.size):
-        for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
+    # The state of a moving chamber is its excess mass, so a growing volume counts as an outflow. A model without such
+    # nodes skips the loop.
+    for i in range(nodes.size if tables.settings[0]["swept"] == 1 else 0):
+        if nodes[i]["kind"] == MOVING:
             out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
 
 

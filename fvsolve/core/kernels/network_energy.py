@@ -1,4 +1,4 @@
-"""Power and stored energy of nodes and links; of masses and pistons : `mass_energy.py`.
+"""Power and stored energy of nodes and links.
 
 Density law `linear`: P = p - p_ambient + rho g z is the potential [Pa], z the elevation above datum. A mass flow M at a
 port carries the power P M / rho. A chamber of volume V stores V p^2 / (2 beta) with gauge pressure p, a tank its mass
@@ -16,13 +16,9 @@ NODE : power supplied from outside, rate of stored energy
 PIPE : inflow of power, friction, loss of jets, rate of stored energy, dissipation by creep, residual of the density law
 VALVE : loss
 COLUMN : inflow of power, friction, rate of stored energy
-MASS : rate of stored energy
-BRACE : power absorbed by a spring or damper, or supplied by a force
-STOP : rate of stored energy, loss
-PISTON : loss of the leak, friction, residual of the density law where a volume changes
 
 Entries of `stored` [J]: each node; kinetic and elastic (with potential) energy of each pipe, or energy of the forward
-and the backward wave of a delay line; each column, mass, brace, stop.
+and the backward wave of a delay line; each column.
 """
 
 from fvsolve.core.kernels.density import enthalpy
@@ -39,7 +35,7 @@ from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.tanks import tank_level
 from fvsolve.jit import njit, specialise
 
-NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 6, 1, 3, 1, 1, 2, 3  # rows of `power` for each part
+NODE, PIPE, VALVE, COLUMN = 2, 6, 1, 3  # rows of `power` for each part
 CREEP = 4  # the row of creep among the rows of a pipe
 
 

@@ -32,12 +32,12 @@ class RhsTerms(NamedTuple):
     incoming_waves: str = ""  # incoming waves from nodes into pipes
     balance: str = ""  # net flows into nodes, rates of storage in nodes
     rate_limits: str = ""  # rates that limit the step; event functions need the phases up to here
-    move: str = ""  # rates of columns, bodies, devices
+    move: str = ""  # rates of columns, devices, and what moves
     rates: str = ""  # rates of cells
     boundary_exchange: str = ""  # exchange between bands of flows through boundaries
     boundary_inflow: str = ""  # flows into cells through patches
-    accelerate: str = ""  # accelerations of bodies, from all forces
-    fluid_response: str = ""  # terms that depend on the accelerations of bodies
+    accelerate: str = ""  # accelerations of frames that move, from all forces
+    fluid_response: str = ""  # terms that depend on the accelerations of frames
     outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells
     mix: str = ""  # values of scalars at nodes
     scalar_rates: str = ""  # rates of scalars in cells
@@ -107,13 +107,6 @@ READ = {
     ),
 }
 UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relaxation: add_friction_stored"}
-FLUID_LOADS = {
-    "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
-    "accelerate": "mechanism.inertial_forces: pipe_rate_limit",
-    "fluid_response": "mechanism.inertial_forces: accelerate_network_flow",
-    "power": "mechanism.fluid_energy: add_power",
-    "stored": "mechanism.fluid_energy: add_stored",
-}
 COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
 COMPONENTS = {
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
@@ -127,49 +120,6 @@ COMPONENTS = {
         column_nodes="rigid_columns: column_pressures_barotropic",
         move="rigid_columns: column_rates_barotropic",
         **COLUMNS,
-    ),
-    "bodies": RhsTerms(
-        prepare="mechanism.body_kinematics: kinematics",
-        observe="mechanism.body_values: observe_bodies",
-        power="mechanism.body_values: power_bodies",
-        stored="mechanism.body_values: stored_bodies",
-    ),
-    "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
-    "pins": RhsTerms(
-        accelerate="mechanism.bushings_and_pins: solve_pinned_accelerations",
-        observe="mechanism.bushings_and_pins: observe_pins",
-    ),
-    "bushings": RhsTerms(
-        move="mechanism.bushings_and_pins: add_bushing_loads",
-        accelerate="mechanism.bushings_and_pins: bushing_rate_limit",
-        observe="mechanism.bushings_and_pins: observe_bushings",
-        power="mechanism.bushings_and_pins: power_bushings",
-        stored="mechanism.bushings_and_pins: stored_bushings",
-    ),
-    "stretches": RhsTerms(events="mechanism.body_kinematics: kinematics_for_events"),
-    "lines": RhsTerms(move="mechanism.bushings_and_pins: add_element_forces"),
-    "moving segments": RhsTerms(
-        prepare="mechanism.inertial_forces: set_segment_drives",
-        known_pressures="mechanism.inertial_forces: moving_tank_pressures",
-        rates="mechanism.inertial_forces: add_cell_drives",
-        **FLUID_LOADS,
-    ),
-    "moving segments, barotropic": RhsTerms(
-        prepare="mechanism.inertial_forces: set_segment_drives",
-        known_pressures="mechanism.inertial_forces: moving_tank_pressures_barotropic",
-        rates="mechanism.inertial_forces: add_cell_drives_barotropic",
-        **FLUID_LOADS,
-    ),
-    "masses": RhsTerms(
-        prepare="mass_dynamics: piston_chambers",
-        move="mass_dynamics: mass_rates",
-        observe="mass_dynamics: observe_masses",
-        record="mass_dynamics: record_masses",
-        events="mass_dynamics: mass_events",
-    ),
-    "energy of masses": RhsTerms(power="mass_energy: add_power_linear", stored="mass_energy: add_stored_linear"),
-    "energy of masses, barotropic": RhsTerms(
-        power="mass_energy: add_power_barotropic", stored="mass_energy: add_stored_barotropic"
     ),
     "devices": RhsTerms(
         prepare="devices: set_devices",
@@ -206,7 +156,6 @@ class ModelFeatures(NamedTuple):
 
     family : kernels of the density law, "linear", "barotropic" or "cavitating"
     laws : names of the modules of parts' laws, in the order of the rows of `hooks`
-    lines : True if force elements join points of bodies
     features, further_packages : place and terms of features, and their further modules, see `assembly.features`
     alone : True if there are only meshes, and no link
     bands : True if threads or processes step bands of the state
@@ -220,12 +169,6 @@ class ModelFeatures(NamedTuple):
     pipes: bool
     clusters: bool = False
     columns: bool = False
-    masses: bool = False
-    bodies: bool = False
-    lines: bool = False
-    pins: bool = False
-    bushings: bool = False
-    moving_segments: bool = False
     unsteady_friction: bool = False
     viscoelastic_walls: bool = False
     devices: bool = False
@@ -251,20 +194,19 @@ class ModelFeatures(NamedTuple):
         # Only pipes have cavities: without pipes the barotropic functions serve a cavitating law too.
         family = self.family if linear or self.pipes else "barotropic"
         yield from self.terms_at("first")
-        # Without pipes and delay lines no waves reach the nodes, which then have simpler functions.
+        # Without pipes, and waves of features, no waves reach the nodes, which then have simpler functions.
         lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
-        if self.masses:
-            yield COMPONENTS["energy of masses" if linear else "energy of masses, barotropic"]
         if self.pipes:
             yield PIPES[family]
         yield from self.terms_at("pipes")
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or any(terms.events for _, terms in self.features):
+        if self.devices or bends or any(terms.events for place, terms in self.features if place != "links"):
             yield COMPONENTS["closed"]  # their event functions need solved nodes
+        yield from self.terms_at("closed")
         yield from self.terms_at("given")
         if setting := list(self.terms_at("sources")):
             yield from setting
@@ -281,22 +223,7 @@ class ModelFeatures(NamedTuple):
                 yield COUPLED
         if self.columns:
             yield COMPONENTS["columns" if linear else "columns, barotropic"]
-        if self.bodies:
-            yield COMPONENTS["bodies"]
-            yield COMPONENTS["pins" if self.pins else "no pins"]
-        # After the accelerations, whose factored mass matrix the rate limits of bushings and pipes use.
-        if self.bushings:
-            yield COMPONENTS["bushings"]
-        if self.moving_segments:
-            yield COMPONENTS["moving segments" if linear else "moving segments, barotropic"]
-        # Before the masses: their event functions read the lengths of elements between bodies.
-        if self.lines:
-            yield COMPONENTS["stretches"]
-        if self.masses:
-            yield COMPONENTS["masses"]
-        # After the masses, whose functions compute the forces of all elements.
-        if self.lines:
-            yield COMPONENTS["lines"]
+        yield from self.terms_at("links")
         if self.devices:
             yield COMPONENTS["devices"]
         yield from self.terms_at("devices")
@@ -318,9 +245,9 @@ class ModelFeatures(NamedTuple):
             yield COMPONENTS["pipes"]
         yield ALWAYS
 
-    def terms_at(self, place: str) -> Iterator[RhsTerms]:
-        """Yield the terms of features at a place in the order of functions."""
-        yield from (terms for where, terms in self.features if where == place)
+    def terms_at(self, *places: str) -> Iterator[RhsTerms]:
+        """Yield the terms of features at these places in the order of functions."""
+        yield from (terms for where, terms in self.features if where in places)
 
     def modules(self) -> list:
         """Loaded modules of the laws of parts, in the order of `laws`."""

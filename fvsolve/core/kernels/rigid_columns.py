@@ -441,14 +441,14 @@ def column_pressures(t, y, dydt, out, handle):
 def driving_pressure_change(tables, out, k):
     """Change of the driving pressure of rigid column k since the initial steady state [Pa].
 
-    The driving pressure contains the pressures at both ends, gravity and the motion of a body that carries the column.
+    The driving pressure contains the pressures at both ends, gravity and the forcing of the column.
     """
     st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
     i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
     now = driving_pressure(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-    if column["moving_segment"] >= 0:
-        now += mean_density(st, tables.floats, p_i, p_j) * junctions.body_drive(tables, out, column)
+    if column["forcing"] >= 0:
+        now += mean_density(st, tables.floats, p_i, p_j) * junctions.forcing_of(tables, out, column)
     return now - column["base"]
 
 
@@ -457,7 +457,7 @@ def driving_pressure_change_linear(tables, out, k):
     """Result of `driving_pressure_change` under the density law `linear` [Pa]."""
     column, pressure = tables.columns[k], tables.layout[0]["pressure"]
     change = out[pressure + column["from_node"]] - out[pressure + column["to_node"]]
-    return change + tables.settings[0]["rho"] * junctions.body_drive(tables, out, column)
+    return change + tables.settings[0]["rho"] * junctions.forcing_of(tables, out, column)
 
 
 @njit
@@ -567,7 +567,7 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
         if end == -1:
             i, controlled = controlled, i
         rise = st["gravity"] * (nodes[controlled]["elevation"] - nodes[i]["elevation"])
-        rise -= end * junctions.body_drive(tables, out, column)
+        rise -= end * junctions.forcing_of(tables, out, column)
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
         out[pressure + controlled] = pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
         if seating_valve(tables, controlled) >= 0:

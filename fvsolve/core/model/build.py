@@ -45,13 +45,10 @@ def steady_profile(draft) -> dict[str, Any]:
 
         start = NonlinearStart(draft)
     start.solve()
-    if len(draft.piston_table):
-        from fvsolve.core.model.mechanics_tables import find_closed_chambers, supporting_pressures
-
-        find_closed_chambers(draft, start)
-        start.loads = supporting_pressures(draft, start)
-        if start.loads:
-            start.solve()
+    for feature in draft.features:
+        start.loads |= feature.supported(draft, start)
+    if start.loads:
+        start.solve()
     start.report_frictionless()
     start.freeze_factors()
     start.fill_nodes()
@@ -119,10 +116,10 @@ def build_like(case: Case, like: Model | None = None) -> Model:
     """
     notices = []
     if case.needs_equilibrium:
-        from fvsolve.core.model.equilibrium_search import with_equilibrium
-
-        steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
-        case, notices = with_equilibrium(case, tables_with_start(steady))
+        draft = tables_with_start(replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"})))
+        for feature in draft.features:
+            case, found = feature.rest(case, draft)
+            notices += found
     if like is not None and not like.tables_before_start:
         like.tables_before_start.append(tables_before_start(like.case))
     reused = None if like is None else with_new_sizes(like.tables_before_start[0], case)
@@ -182,7 +179,7 @@ def model_with_start(draft: ModelDraft) -> Model:
 def fill_nodes(draft: ModelDraft) -> None:
     """Fill the table of fluid nodes, one NODE row for each."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
-    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["moving_segment"] = -1
+    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["forcing"] = -1
     table["full"] = np.inf
     for row, (name, node) in zip(table, draft.case.places.items(), strict=True):
         row["elevation"] = draft.case.elevations[name]
@@ -190,7 +187,7 @@ def fill_nodes(draft: ModelDraft) -> None:
 
 
 def fill_links(draft: ModelDraft) -> None:
-    """Fill the tables of links, devices, bodies and masses."""
+    """Fill the tables of links and devices, and of features between them."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
     for feature in draft.features:
         feature.lower(draft)
@@ -200,21 +197,8 @@ def fill_links(draft: ModelDraft) -> None:
     for row in draft.pipe_table:
         for end in ("from_node", "to_node"):
             draft.node_table["admittance"][row[end]] += row["end_admittance"]
-    draft.mass_index = {None: 0}
-    if has_motion(draft):
-        from fvsolve.core.model import mechanics_tables  # only cases with masses or bodies need it
-
-        mechanics_tables.lower_bodies(draft)
-        mechanics_tables.lower_moving_segments(draft)
-        mechanics_tables.lower_masses(draft)
-        mechanics_tables.lower_lines(draft)
-
-
-def has_motion(draft: ModelDraft) -> bool:
-    """True if a case has masses, bodies, or elements between them."""
-    case, elements = draft.case, ("brace", "stop", "piston", "pin", "bushing")
-    has_masses = any(node.domain == "translational" for node in case.nodes.values())
-    return bool(case.poses) or has_masses or any(draft.links.get(table) for table in elements)
+    for feature in draft.features:
+        feature.lower_behind_links(draft)
 
 
 def profile_size(draft: ModelDraft) -> int:
@@ -262,10 +246,6 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     reserve_network(draft)
     for feature in draft.features:
         feature.reserve_ledger(draft)
-    if has_motion(draft):
-        from fvsolve.core.model.mechanics_tables import reserve_mechanics
-
-        reserve_mechanics(draft)
     for feature in draft.features:
         feature.reserve(draft)
     layout = sizes.place()
@@ -273,15 +253,12 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         feature.placed(draft)
     if (draft.probe_table["kind"] == rec.PIPE_FORCE).any():
         layout["forces"] = draft.to_work(most_states(draft))
-    if draft.moving_segment_table["loads_body"].any():
+    if sizes.reads_rates:
         layout["rates"] = draft.to_work(most_states(draft))
     draft.tables = rec.Tables(
         settings=settings, layout=layout, pipes=draft.pipe_table, nodes=draft.node_table, valves=draft.valve_table,
         columns=draft.column_table, clusters=draft.cluster_table, schedules=schedules, probes=draft.probe_table,
-        bodies=draft.body_table, freedoms=draft.freedom_table, points=np.array(draft.points, rec.POINT),
-        lines=draft.line_table, pins=draft.pin_table, bushings=draft.bushing_table,
-        moving_segments=draft.moving_segment_table, masses=draft.mass_table, braces=draft.brace_table,
-        stops=draft.stop_table, pistons=draft.piston_table, devices=draft.device_table, basins=draft.basin_table,
+        devices=draft.device_table, basins=draft.basin_table,
         patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
         exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
         reactions=draft.reaction_table, integers=np.array(draft.integers, dtype=np.int64),
@@ -307,10 +284,11 @@ def reserve_network(draft: ModelDraft) -> None:
     # location of the first cavity, greatest cavity volume, and its time. The last are: for each valve the time at which
     # it shut off a demand; for each node the first and the last time at which its demand is not supplied, and the first
     # at which its pressure is not determined.
+    sizes.first_mark = pipes + 3 * nodes + columns
     sizes.marks = pipes * (4 if draft.case.law.cavitates else 1) + 3 * nodes + columns
-    sizes.marks += 2 * len(draft.device_table) + len(draft.piston_table) + valves + 3 * nodes
+    sizes.marks += 2 * len(draft.device_table) + valves + 3 * nodes
     sizes.run_array("clock", 1)
-    sizes.run_array("armed", tanks.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table))
+    sizes.flags(tanks.EVENTS * draft.tanks + len(draft.events))
     sizes.run_array("envelope", (4, draft.cells))
     sizes.run_array("extremes", (4, len(draft.probe_table)))
     sizes.run_array("stack", draft.schedules.stack)
@@ -349,6 +327,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     s["start"] = case.numerics.start
     s["reads_solved"] = any(feature.reads_solved for feature in draft.features)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
+    s["swept"] = (draft.node_table["kind"] == rec.MOVING).any()
     s["vapor"], s["unmarked"] = case.law.cavity_pressure, -np.inf
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
@@ -397,8 +376,7 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
-        draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,
-        draft.mass_names, draft.body_names, draft.bushing_names,
+        draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
         case.extreme_probes, draft.watched_start, closed(draft),

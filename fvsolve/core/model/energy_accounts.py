@@ -31,8 +31,8 @@ def available_energy(model: Model) -> dict[str, float]:
     """Energy of every part at the start [J], above its energy at rest and at P = 0 : name -> energy.
 
     P = p - p_ambient + rho g z is the reduced pressure [Pa], z the elevation above the datum in the settings [m]. A
-    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Bodies and bushings are
-    not included; without them the sum over all parts is an upper bound of the energy that the model can release.
+    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Parts that move in space
+    are not included; without them the sum over all parts is an upper bound of the energy that the model can release.
     """
     tables, nodes, energies = model.tables, model.tables.nodes, {}
     datum = float(tables.settings[0]["datum"])
@@ -47,16 +47,10 @@ def available_energy(model: Model) -> dict[str, float]:
         energies[pipe.name] = pipe_energy(model, k) + friction_memory_energy(model, k) + creep_energy(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
         energies[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
-    for name, row in zip(model.mass_names, tables.masses, strict=False):
-        if row["y"] >= 0:
-            energies[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for part in model.meshed:
         energies[part.name] = part.above(part.deviations(model.start), datum)
-    for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
-        if row["stiffness"] > 0.0:
-            energies[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
-    for (name, *_), row in zip(rows_in(model.case, "stop"), tables.stops, strict=True):
-        energies[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
+    for feature in model.features:
+        energies |= feature.above(model)
     return {name: float(value) for name, value in energies.items()}
 
 
@@ -186,25 +180,21 @@ class Accounts:
     """Energy accounts of a model, for the run data of a run.
 
     Accounts of stored energy (`stored_accounts`) and of its rates (category "rate") are in the same order. Tables of
-    `run_data` are changed, so that all loads of fluid on bodies are computed. Raises FvsolveError if the energy of the
+    `run_data` are changed, so that all that energies need is computed. Raises FvsolveError if the energy of the
     case cannot be computed.
     """
 
     def __init__(self, run_data: RunData) -> None:
         self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
-        if case.poses:
-            from fvsolve.case.bodies import missing_reactions
-
-            if faults := [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]:
-                raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
-        compute_all_loads(run_data)
+        for own in run_data.features:
+            own.for_energy()
         if reason := next((text for feature in model.features if (text := feature.energy_refusal())), ""):
             raise FvsolveError(reason)
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
-        self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
+        self.contacts: list[tuple[int, int]] = []  # lines of the rate and of the loss of every contact
         self.power_count = self.stores = 0
         nodes = model.tables.nodes
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):
@@ -225,10 +215,10 @@ class Accounts:
             self.hold(name, "rigid column", at + 2)
             self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
-        self.mechanics()
+        for feature in model.features:
+            feature.begin_accounts(self)
         for feature in model.features:
             feature.add_accounts(self)
-        self.bodies()
         self.devices()
         for feature in model.features:
             feature.end_accounts(self)
@@ -273,41 +263,6 @@ class Accounts:
                 else:
                     self.add("dissipated", name, "valve", at)
 
-    def mechanics(self) -> None:
-        model, tables = self.model, self.model.tables
-        names = [*model.mass_names, *[""] * (len(tables.masses) - len(model.mass_names))]
-        for name, row in zip(names, tables.masses, strict=True):
-            at = self.take(1)
-            self.hold(name, "mass", at if row["y"] >= 0 else None)
-        for name, link, lowering in rows_in(model.case, "brace"):
-            at, stores = self.take(1), lowering.ledger_name == "stored"
-            self.hold(name, link.kind, at if stores else None)
-            if not stores:
-                self.add(lowering.ledger_name, name, link.kind, at)
-        for name, link, _ in rows_in(model.case, "stop"):
-            at = self.take(2)
-            self.stops.append((len(self.accounts), len(self.accounts) + 1))
-            self.hold(name, link.kind, at)
-            self.add("dissipated", name, link.kind, at + 1)
-        for name in model.piston_names:
-            at = self.take(3)
-            self.add("dissipated", name, "leak", at)
-            self.add("dissipated", name, "friction", at + 1)
-            self.add("law", name, "cylinder", at + 2)
-
-    def bodies(self) -> None:
-        for name in self.model.bushing_names:
-            at = self.take(2)
-            self.hold(name, "bushing", at)
-            self.add("dissipated", name, "bushing", at + 1)
-        for name, row in zip(self.model.body_names, self.model.tables.bodies, strict=True):
-            at = self.take(3)
-            self.hold(name, "body", at)
-            if row["damping"] > 0.0:
-                self.add("dissipated", name, "joint", at + 1)
-            if row["schedule"] >= 0:
-                self.add("supplied", name, "drive", at + 2)
-
     def devices(self) -> None:
         for name, part, _ in self.model.devices:
             at, kind = self.take(3), part.kind.replace("-", " ")
@@ -339,14 +294,6 @@ class Accounts:
         self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
         self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
         return sums_of(self.stored_terms, rows, len(self.stored_accounts))
-
-
-def compute_all_loads(run_data: RunData) -> None:
-    """Let the right-hand side compute all loads of fluid on bodies, for their work; changes tables of `run_data`."""
-    if len(run_data.model.tables.moving_segments):
-        run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
-    for own in run_data.features:
-        own.for_energy()
 
 
 def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from fvsolve.core.assembly.lowering import rows_in
 from fvsolve.core.assembly.pipe_terms import elements, memory_shares
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.static_forces import mass_factor
 from fvsolve.errors import FvsolveError
 
 RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
@@ -27,7 +24,7 @@ class EnergyForm:
 
     rows : sparse float64[m, n]  matrix L, a row for each store of energy; parts : name of the part of each row
     forward : sparse float64[r, n], back : sparse float64[n, r]  forward back = 1
-    idle : float64[n, k]  motions without energy, such as a common displacement of all masses of a train; each is small
+    idle : float64[n, k]  motions without energy, such as a common displacement of a whole train; each is small
     idle_rows : float64[k, n]  matrix that gives the amount of each motion without energy in a deviation
     least : least energy of a deviation of the size `Model.scale` [J]
     """
@@ -89,19 +86,14 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     g z^2 dx / (2 n rho A)
     excess mass m [kg] in a chamber or tank : m^2 dp/dm / (2 rho)
     mass flow M [kg/s] in a rigid column of length L : M^2 L / (2 rho A)
-    velocity v of a mass m : m v^2 / 2; velocities v of bodies with mass matrix M : v' M v / 2
-    elongation s of a spring, of a stop in contact, or of the spring of a joint, stiffness k : k s^2 / 2
-    excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
-    volume V and excess mass e0 at y
-
     potential or flow d of a store of rotation or electricity with the value C : C d^2 / 2; of a heat capacity 1e-6 of
     this
 
-    Devices add rows (`energy_rows`), features weights of their states. The form is exact under the density law
-    `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of
-    its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
-    Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError if springs join too many
-    positions.
+    Devices and features add rows (`energy_rows`, `squares`), features weights of their states. The form is exact under
+    the density law `linear` about a steady state at rest. A scalar stores no energy, and no other state depends on it;
+    a deviation of its amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass
+    would store. Displacements without stiffness store nothing, see `EnergyForm.idle`. Raises FvsolveError if springs
+    join too many positions.
     """
     from scipy.sparse import csr_array
 
@@ -109,10 +101,10 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     own = energy_weights(model, y)
     names = [name.rsplit(".", 1)[0] for name in model.state_names]
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
-    elongations = Elongations(model, y)
-    stored |= {e: (names[e], row) for e, row in chamber_rows(model, y, elongations)}
-    parts = [*stored.values(), *spring_rows(model, y, elongations), *device_rows(model, y)]
-    parts += [*kinetic_rows(model, y), *joint_spring_rows(model)]
+    squares = [feature.squares(model, y) for feature in model.features]
+    stored |= {e: (names[e], row) for own in squares for e, row in own.stored.items()}
+    parts = [*stored.values(), *(row for own in squares for row in own.first), *device_rows(model, y)]
+    parts += [row for own in squares for row in own.last]
     parts += [row for feature in model.features for row in feature.energy_rows(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(parts) for i, value in row.items()]
     row, column, value = (np.array(column_values) for column_values in zip(*entries, strict=True))
@@ -138,7 +130,7 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
         if at.size > MAX_GROUP:
             raise FvsolveError(
                 f"{at.size} positions are joined by springs; the energy norm is computed for at most {MAX_GROUP}; "
-                "expected fewer bodies or masses that springs join to each other"
+                "expected fewer parts that springs join to each other"
             )
         part = rows[:, at].toarray() * scale[at]
         part = np.vstack([part[np.any(part, axis=1)], np.zeros((1, at.size))])
@@ -195,24 +187,9 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
             weights[row["y"]] = stiffness(model, row) / (2.0 * rho)
     for row in tables.columns:
         weights[row["y"]] = row["length"] / (2.0 * rho * row["area"])
-    for row in tables.masses:
-        if row["y"] >= 0:
-            weights[int(row["y"]) + 1] = 0.5 / row["lightness"]
     for feature in model.features:
         feature.weigh(model, weights, y)
     return weights
-
-
-def spring_rows(model, y: np.ndarray, elongations: Elongations):
-    """Yield (name, state -> factor) of each row of L for springs, and for stops in contact."""
-    braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
-    for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
-        if row["stiffness"] > 0.0:
-            yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
-    for k, ((name, *_), row) in enumerate(zip(stops, model.tables.stops, strict=True), len(braces)):
-        x = elongations.travel(k)
-        if row["below"] + x < 0.0 or x > row["above"]:
-            yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
 
 
 def device_rows(model, y: np.ndarray):
@@ -223,97 +200,6 @@ def device_rows(model, y: np.ndarray):
     for (name, part, device), row in zip(model.devices, model.tables.devices, strict=True):
         for square in device.energy_rows(model, part, row, y, out):
             yield name, square
-
-
-def chamber_rows(model, y: np.ndarray, elongations: Elongations):
-    """Yield (index of the mass state, state -> factor) of the row of L for each chamber of cylinders at y.
-
-    The same excess mass e [kg] in less volume has more pressure. If the cylinder joins points of bodies, the mass state
-    is e plus the gained volume times the density at the start.
-    """
-    nodes, pistons = model.tables.nodes, model.tables.pistons
-    per_mass = elongations.out[int(model.layout["stiffness"]) :]
-    first = len(model.tables.braces) + len(model.tables.stops)
-    for k, row in enumerate(pistons, first):
-        x = elongations.travel(k)
-        for name, sign in (("a", 1.0), ("b", -1.0)):
-            node, area, sweep = nodes[row[name]], sign * float(row[f"area_{name}"]), float(row[f"sweep_{name}"])
-            at, volume = int(node["y"]), float(node["volume"] + area * x)
-            excess = float(y[at]) - (sweep * x if row["line"] >= 0 else 0.0)
-            excess_ratio = excess / volume  # excess density, relative to that of the start
-            root = float(np.sqrt(per_mass[node["row"]] / (2.0 * (sweep / area + excess_ratio))))
-            per_travel = excess_ratio * area + (sweep if row["line"] >= 0 else 0.0)
-            moved = elongations.by(k, row["case"], row["rod"], -root * per_travel) if per_travel else {}
-            yield at, {at: root} | moved
-
-
-class Elongations:
-    """Elongations of force elements (springs, stops, cylinders) at a state, and their derivatives by states.
-
-    out : values that the right-hand side writes in addition to dydt
-    """
-
-    def __init__(self, model, y: np.ndarray) -> None:
-        self.model, self.y = model, y
-        self.t = model.case.numerics.start
-        self.out = model.evaluate(self.t, y)[1]
-        self.first = int(model.layout["travel"])
-
-    def travel(self, k: int) -> float:
-        """Elongation of force element k [m]."""
-        return float(self.out[self.first + 2 * k])
-
-    def by(self, k: int, i: int, j: int, factor: float) -> dict[int, float]:
-        """Derivatives of `factor` times the elongation of force element k : state -> derivative.
-
-        i, j : masses that it joins; equal if it joins points of bodies
-        """
-        places = self.model.tables.masses["y"]
-        if i != j:
-            return {int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0}
-        return {at: factor * float(row[2 * k]) for at, row in self.slopes.items() if row[2 * k] != 0.0}
-
-    @cached_property
-    def slopes(self) -> dict[int, np.ndarray]:
-        """Derivatives of elongations by joint coordinates : state -> float64[2 k].
-
-        The values are those of the elongation and its rate for each of the k force elements.
-        """
-        tables, slopes = self.model.tables, {}
-        last = self.first + 2 * (len(tables.braces) + len(tables.stops) + len(tables.pistons))
-        for body in tables.bodies:
-            count = int(body["freedoms"]) + (body["freedoms"] >= 3)
-            for at in range(int(body["y"]), int(body["y"]) + count):
-                step = 1e-6 * (self.model.scale[at] + abs(self.y[at])) * 1e2
-                high, low = self.y.copy(), self.y.copy()
-                high[at], low[at] = high[at] + step, low[at] - step
-                ends = [self.model.evaluate(self.t, y)[1][self.first : last] for y in (high, low)]
-                slopes[at] = (ends[0] - ends[1]) / (high[at] - low[at])
-        return slopes
-
-
-def kinetic_rows(model, y: np.ndarray):
-    """Yield (name, state -> factor) of each row of L for the kinetic energy of bodies.
-
-    The energy is v' M v / 2 = |F v|^2 / 2: velocities v, mass matrix M = F' F with the factor F from the kernels.
-    """
-    bodies, freedoms, n = model.tables.bodies, model.tables.freedoms, len(model.tables.freedoms)
-    if not n:
-        return
-    factor = mass_factor(model, y)[8 * n :]
-    rate = [int(body["rate"]) + k for body in bodies for k in range(body["freedoms"])]
-    names = [name for name, body in zip(model.body_names, bodies, strict=True) for _ in range(body["freedoms"])]
-    for name, row in zip(names, freedoms, strict=True):
-        path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
-        entries = np.sqrt(0.5) * factor[row["row"] : row["row"] + row["depth"] + 1]
-        yield name, {rate[j]: float(entry) for j, entry in zip(path, entries, strict=True)}
-
-
-def joint_spring_rows(model):
-    """Yield (name, state -> factor) of the row of L for each spring of a joint."""
-    for name, body in zip(model.body_names, model.tables.bodies, strict=True):
-        if body["stiffness"] > 0.0:
-            yield name, {int(body["y"]): float(np.sqrt(0.5 * body["stiffness"]))}
 
 
 def stiffness(model, row) -> float:

@@ -2,8 +2,8 @@
 
 Cells of a pipe depend on their neighbours within the reach of the scheme. A node depends on the edge cells of all its
 pipes, and cells whose stencil crosses a pipe end depend on the same cells. Tanks, chambers and given pressures separate
-groups of nodes: their pressure follows from their own states, except that chambers of cylinders also depend on their
-masses. Features state the couplings of their own states, and of nodes whose pressure they set.
+groups of nodes: their pressure follows from their own states. Features state the couplings of their own states, and of
+nodes whose pressure they set or influence.
 """
 
 from collections.abc import Iterator
@@ -44,14 +44,6 @@ class Couplings:
         self.own_friction = settings["scheme"] == rec.UPWIND and not settings["from_arriving"]
         self.reach = reach_of(model.case.numerics.scheme, settings)
         self.inner = self.nodes["kind"] == rec.JUNCTION
-        self.masses, self.pistons = tables.masses["y"], tables.pistons
-        self.braces = [*tables.braces, *tables.stops]
-        self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
-        self.moving_segments = tables.moving_segments
-        self.bushings = tables.bushings
-        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
-        joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
-        self.ties = union(len(self.bodies), joined)
         self.devices, self.parts, self.floats = tables.devices, model.devices, tables.floats
         self.integers = tables.integers
         self.features = [feature.pattern(self) for feature in model.features]
@@ -71,9 +63,7 @@ class Couplings:
         yield from self.stored()
         for column in self.columns:
             yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
-        yield from self.moving()
         yield from self.device_pairs()
-        yield from self.moving_fluid_pairs()
         for own in self.features:
             yield from own.pairs()
 
@@ -99,15 +89,15 @@ class Couplings:
     def pressure_states(self, i: int) -> np.ndarray:
         """Indices of the states that set the pressure of a storing node, or of one whose pressure a feature sets.
 
-        For a storing node they are its mass, positions of pistons and states of its device.
+        For a storing node they are its mass, states of its device and of features.
         """
         for own in self.features:
             if (states := own.sets_pressure(i)) is not None:
                 return states
         given = self.schedule(self.nodes["schedule"][i])
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
-        of_pistons = (self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
-        return unique_states(self.own(i), given, *of_pistons, *of_devices)
+        of_features = (own.pressure(i) for own in self.features)
+        return unique_states(self.own(i), given, *of_features, *of_devices)
 
     def device_states(self, device) -> np.ndarray:
         """Indices of the states of a device."""
@@ -138,56 +128,6 @@ class Couplings:
         row = self.devices[link["device"]]
         at_once = row["second"] >= 0 and row["states"] == 0
         return [int(row[column]) for column in ("node", "second")] if at_once else []
-
-    def places(self, row, order: int) -> np.ndarray:
-        """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
-        if row["line"] >= 0:
-            return unique_states(*(self.chain_states(i, order) for i in self.bodies_at(self.ends_of_line(row))))
-        ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
-        return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
-
-    def ends_of_line(self, row) -> tuple[int, int]:
-        """Rows of the two points of a force element's line of action; -1 for the world instead of a first point."""
-        line = self.lines[row["line"]]
-        return int(line["from_point"]), int(line["to_point"])
-
-    def bodies_at(self, points) -> list[int]:
-        """Bodies to which points belong; points of the world, and -1 in place of a point, are left out."""
-        bodies = (int(self.points[k]["body"]) for k in points if k >= 0)
-        return [i for i in bodies if i >= 0]
-
-    def chain_states(self, i: int, order: int) -> np.ndarray:
-        """States of the coordinates (`order` 0) or velocities (1) of body i and of all bodies that carry it."""
-        parts = [unique_states()]
-        while i >= 0:
-            parts.append(self.joint_states(self.bodies[i], order))
-            i = self.bodies[i]["parent"]
-        return unique_states(*parts)
-
-    def joint_states(self, body, order: int) -> np.ndarray:
-        """States of the coordinates (`order` 0) or velocities (1) of a joint.
-
-        A joint with three or more freedoms has one coordinate more, because four Euler parameters describe its
-        rotation.
-        """
-        count = int(body["freedoms"])
-        if not count:
-            return unique_states()
-        return body["rate"] + np.arange(count) if order else body["y"] + np.arange(count + (count >= 3))
-
-    def tree_states(self, root: int, order: int) -> np.ndarray:
-        """States of the coordinates (`order` 0) or velocities (1) of a tree of bodies and trees that pins tie to it."""
-        bodies = [body for body in self.bodies if self.tree_root(body["root"]) == root]
-        return unique_states(*(self.joint_states(body, order) for body in bodies))
-
-    def tree_root(self, root: int) -> int:
-        """Root body that stands for all trees that pins tie to the tree of the body `root`."""
-        return self.ties[root]
-
-    def tree_velocities(self, points) -> np.ndarray:
-        """States of the velocities of all trees of bodies to which points belong."""
-        roots = {self.tree_root(self.bodies[i]["root"]) for i in self.bodies_at(points)}
-        return unique_states(*(self.tree_states(root, 1) for root in roots))
 
     def pressures(self) -> list[np.ndarray]:
         """For each node, the states that set its pressure.
@@ -229,35 +169,12 @@ class Couplings:
         for column in self.columns:
             for i in ends_of(column):
                 into[i].append(column["y"])
-        for row in self.pistons:
-            swept = unique_states() if row["line"] >= 0 else self.places(row, 1)
-            for i, other in ((row["a"], row["b"]), (row["b"], row["a"])):
-                into[i] += [swept, *([self.pressure_states(other)] if row["leakage"] > 0.0 else [])]
+        for own in self.features:
+            for i, states in own.inflows():
+                into[i].append(states)
         for i in np.flatnonzero(~self.inner):
             fed = (own.fed(i) for own in self.features)
             yield pairs_of(unique_states(self.own(i), *fed, self.size + i), unique_states(*into[i]))
-
-    def moving(self) -> Iterator[Pairs]:
-        """Yield couplings of positions of masses with their velocities, and of these with adjacent masses and chambers.
-
-        Bodies are coupled with all bodies of their tree, and with the trees and chambers that push them.
-        """
-        at = self.masses[self.masses >= 0]
-        yield at, at + 1
-        for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
-            own = unique_states(*(self.tree_states(root, order) for order in (0, 1)))
-            yield pairs_of(own, own)
-        for row in self.bushings:
-            points = row["from_point"], row["to_point"]
-            read = [self.chain_states(i, order) for i in self.bodies_at(points) for order in (0, 1)]
-            yield pairs_of(self.tree_velocities(points), unique_states(*read))
-        for row in [*self.braces, *self.pistons]:
-            read = [self.places(row, 0), self.places(row, 1)]
-            read += [self.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
-            if "rod" in row.dtype.names:
-                read += [self.own(row["a"]), self.own(row["b"])]
-            pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
-            yield pairs_of(pushed, unique_states(*read))
 
     def device_pairs(self) -> Iterator[Pairs]:
         """Yield couplings of the states of each device with each other, and with pressures.
@@ -275,49 +192,9 @@ class Couplings:
         ends = self.valves[device["valve"]] if device["valve"] >= 0 else None
         nodes = [device["node"], device["second"], *(() if ends is None else ends_of(ends))]
         opening = unique_states() if ends is None else self.opening_states(ends)
-        mass = self.masses[device["mass"]] if device["mass"] >= 0 else -1
-        masses = unique_states(*([mass, mass + 1] if mass >= 0 else []))
-        return unique_states(self.device_states(device), opening, masses, *(self.sets[n] for n in nodes if n >= 0))
-
-    def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
-        """Yield states of all force elements that act on a mass."""
-        for row in [*self.braces, *self.pistons]:
-            ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
-            if mass in (row[ends[0]], row[ends[1]]):
-                yield from (self.places(row, 0), self.places(row, 1))
-                if "schedule" in row.dtype.names:
-                    yield self.schedule(row["schedule"])
-                if "rod" in row.dtype.names:
-                    yield from (self.own(row["a"]), self.own(row["b"]))
-
-    def moving_fluid_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of fluid on bodies and of the bodies that it moves.
-
-        They depend on each other, and on chambers that push the bodies.
-        """
-        trees: dict[int, list] = {}
-        for body, states in (pair for own in self.features for pair in own.on_bodies()):
-            trees.setdefault(self.tree_root(self.bodies[body]["root"]), []).append(states)
-        for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
-            trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
-        for root, cells in trees.items():
-            own = [self.tree_states(root, order) for order in (0, 1)]
-            if own[0].size == 0:
-                continue
-            both = unique_states(*cells, own[1])
-            pushing = [self.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
-            yield pairs_of(both, unique_states(*cells, *own, *pushing))
-
-    def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield (row of `moving_segments`, its states and those that set its pressures) for the fluid on bodies."""
-        for i, node in enumerate(self.nodes):
-            if node["moving_segment"] >= 0:
-                yield node["moving_segment"], unique_states(self.own(i), self.sets[i])
-        for row in (*self.pipes, *self.columns):
-            if row["moving_segment"] >= 0:
-                own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
-                at_ends = (self.sets[row[end]] for end in ("from_node", "to_node"))
-                yield row["moving_segment"], unique_states(own, *at_ends)
+        read = [self.sets[n] for n in nodes if n >= 0]
+        read += [device["travel"] + np.arange(2)] if device["travel"] >= 0 else []
+        return unique_states(self.device_states(device), opening, *read)
 
     # pipes ------------------------------------------------------------------------------------------------------
 
@@ -429,7 +306,7 @@ def jacobian_pattern(model) -> csc_array:
 def lumped_states(model) -> np.ndarray:
     """Indices of all states except waves in cells of pipes, and states of meshes : int64[q].
 
-    Most are states of lumped parts such as tanks, chambers and masses. Their pressures are hundreds of bars, while the
+    Most are states of lumped parts such as tanks and chambers. Their pressures are hundreds of bars, while the
     flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
     iterations.
     """

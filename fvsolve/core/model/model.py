@@ -143,10 +143,6 @@ class Model(Displayable):
     link_names: list[str]
     valve_names: list[str]
     column_names: list[str]
-    piston_names: list[str]
-    mass_names: list[str]
-    body_names: list[str]
-    bushing_names: list[str]
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[Notice]
@@ -187,6 +183,10 @@ class Model(Displayable):
         from fvsolve.case.controls import decision_order
 
         return decision_order(self.case.controls)
+
+    def schedule_of(self, name: str) -> int:
+        """Number of the schedule of a link of a feature."""
+        return next(own for feature in self.features if (own := feature.link_schedules.get(name, -1)) >= 0)
 
     @property
     def y_size(self) -> int:
@@ -274,13 +274,12 @@ class Model(Displayable):
         from fvsolve.core.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
-        mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
-        mechanics.append(has.moving_segments)
-        alone = bool(self.meshed) and not (self.pipes or has.valves or has.devices or any(mechanics))
+        alone = bool(self.meshed) and not (self.pipes or has.valves or has.devices or has.clusters or has.columns)
+        alone = alone and not any(feature.reads_nodes for feature in self.features)
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
-                    tuple(self.laws), has.valves, (), (), has.couplings, alone,
+        cast = ModelFeatures(self.case.law.family, cells, has.clusters, has.columns, self.unsteady, self.creeps,
+                    has.devices, tuple(self.laws), has.valves, (), (), has.couplings, alone,
                     forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
                     device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
@@ -500,12 +499,6 @@ class Model(Displayable):
         for feature in self.features:
             for at_start, gained in feature.masses(self, y):
                 initial, change = initial + at_start, change + gained
-        for row in self.tables.pistons:  # mass of chambers on an axis: state plus swept mass
-            if row["line"] >= 0:
-                continue
-            places = self.tables.masses[[row["case"], row["rod"]]]["y"]
-            back, forth = (float(y[place]) if place >= 0 else 0.0 for place in places)
-            change += float(row["sweep_a"] + row["sweep_b"]) * (forth - back)
         return initial, change
 
     @functools.cached_property

@@ -37,11 +37,6 @@ def checks(model) -> dict[str, Any]:
         for name, row in zip(model.node_names, model.tables.nodes, strict=True)
         if row["kind"] != rec.PATCH or not name.endswith(".inside")  # behind patches; no part of the case
     }  # fmt: skip
-    masses = {
-        name: {"position": row["position"].item(), "velocity": row["velocity"].item(), "force": row["force"].item()}
-        for name, row in zip(model.mass_names, model.tables.masses, strict=False)
-    }
-    bodies = {name: pose_facts(pose) for name, pose in model.case.poses.items()}
     pipes, unsteady, creeps = {}, model.steady["unsteady"], model.steady["creep"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
         velocity = row["flow"] / (rho * row["area"])
@@ -76,7 +71,7 @@ def checks(model) -> dict[str, Any]:
     for feature in model.features:
         facts |= feature.facts(model)
     return {
-        "fluid": model.case.properties.plain(), "nodes": nodes, "masses": masses, "bodies": bodies,
+        "fluid": model.case.properties.plain(), "nodes": nodes, "masses": {}, "bodies": {},
         "pipes": pipes,
         "states": model.y_size, "cells": model.all_cells, "step": step, "step_set_by": set_by, "steps": steps,
         "steps_if_full": steps_if_full if steps_if_full > (steps or 0) else None,
@@ -100,15 +95,6 @@ def wall_facts(link) -> dict[str, Any]:
     if link.restraint is not None and isinstance(link.wall, Wall):
         facts["restraint_factor"] = restraint_factor(link.restraint, link.diameter, link.wall)
     return facts
-
-
-def pose_facts(pose) -> dict[str, float]:
-    """Position, attitude, speed and angular speed of a body at the start."""
-    place = dict(zip("xyz", pose.place.tolist(), strict=True))
-    from fvsolve.attitude import roll_pitch_yaw
-
-    angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
-    return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
 
 
 def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
@@ -228,5 +214,5 @@ def fastest_parts(model) -> str:
     moving = [name for name, row in zip(model.valve_names, model.tables.valves, strict=True)
               if row["device"] >= 0 and model.tables.devices[row["device"]]["y"] >= 0]  # fmt: skip
     names = [*(part.name for part in model.meshed), *stores, *moving]
-    names += [*model.column_names, *model.mass_names, *model.body_names]
+    names += [*model.column_names, *(name for feature in model.features for name in feature.fast_parts)]
     return names[0] if len(names) == 1 else f"one of {listing(names)}"

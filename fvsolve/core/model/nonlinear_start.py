@@ -90,7 +90,7 @@ class NonlinearStart(SteadyStart):
             density_ratio, drive_ratio = self.density_and_drive(i, j)
             self.density_ratios[k], self.ratio[k] = (density_ratio, drive_ratio), drive_ratio
             self.factor[k] = density_ratio * drive_ratio
-        for k, row in enumerate(self.pistons):
+        for k, row in enumerate(self.leaks):
             self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
     def dense(self, i: int, j: int) -> float:

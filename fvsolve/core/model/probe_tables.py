@@ -19,26 +19,14 @@ def fill_probes(draft, probes: list) -> np.ndarray:
         row["mark"] = -1
         if any(feature.probe(draft, probe, row) for feature in draft.features):
             continue
-        if probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
-            lower_body_point(draft, row, probe)
-        else:
-            part = parts[probe.part][probe.name]
-            lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
+        part = parts[probe.part][probe.name]
+        lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
     return table
 
 
 def all_probes(case) -> list:
     """All probes that are read after every step: those of the case, then quantities of which only extremes are kept."""
     return [*case.probes, *case.extreme_probes]
-
-
-def lower_body_point(draft, row, probe) -> None:
-    """Fill the row of a probe at a named point of a body or of the world."""
-    from fvsolve.core.assembly.mechanics import point_row
-    from fvsolve.core.kernels.mechanism.body_values import POINT_QUANTITIES
-
-    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
-    row["index"] = point_row(draft, probe.name)
 
 
 def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
@@ -53,9 +41,9 @@ def cells_at_point(draft, row, probe) -> tuple[np.ndarray, np.ndarray]:
 
 
 def probe_offsets(draft, start) -> None:
-    """Set scale and offset of the probes of nodes, links and masses from the initial steady state.
+    """Set scale and offset of the probes of nodes and links from the initial steady state.
 
-    Probes of meshes and bodies, and of forces on pipes, do not need them. Also sets the steady pressures of watched
+    Probes of meshes and features, and of forces on pipes, do not need them. Also sets the steady pressures of watched
     quantities along pipes.
     """
     count = len(draft.case.probes)

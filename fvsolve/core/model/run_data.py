@@ -40,8 +40,6 @@ class RunData:
 
     def __init__(self, model: Model) -> None:
         self.model, self.written, self.tables = model, zeros_for_run(model.shapes), model.tables
-        if len(model.tables.moving_segments):  # `loads_body` is set where joint forces are read
-            self.tables = self.tables._replace(moving_segments=model.tables.moving_segments.copy())
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes

@@ -53,7 +53,8 @@ def _name_of(start: Any, e: int) -> str:
     """Name of the link of edge e, with the reason why its device holds it shut."""
     draft, k = start.draft, e - len(start.pipes) - len(start.columns)
     if not 0 <= k < len(start.valves):
-        return [*draft.pipe_names, *draft.column_names][e] if k < 0 else draft.piston_names[k - len(start.valves)]
+        leaks = [name for feature in draft.features for name in feature.leak_names]
+        return [*draft.pipe_names, *draft.column_names][e] if k < 0 else leaks[k - len(start.valves)]
     name, row = draft.valve_names[k].removesuffix(".inside"), start.valves[k]
     reason = draft.devices[row["device"]][2].shut_reason(start, k) if row["device"] >= 0 else ""
     return f"{name} ({reason})" if reason else name

@@ -39,7 +39,8 @@ class SteadyStart:
     def __init__(self, draft) -> None:
         self.draft, self.case, self.law = draft, draft.case, draft.case.law
         self.nodes, self.pipes = draft.node_table, draft.pipe_table
-        self.columns, self.valves, self.pistons = draft.column_table, draft.valve_table, draft.piston_table
+        self.columns, self.valves = draft.column_table, draft.valve_table
+        self.leaks = [row for feature in draft.features for row in feature.leaks]
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         self.weight = draft.fluid.density * self.case.gravity
@@ -47,7 +48,7 @@ class SteadyStart:
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         # typical mass flows of pipes, columns and restrictions [kg/s]
-        self.flow_scales = np.array([*sizes[1:], *np.zeros(len(self.pistons))])
+        self.flow_scales = np.array([*sizes[1:], *np.zeros(len(self.leaks))])
         self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
         # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
         self.exit_losses: dict[str, tuple[float, float]] = {}
@@ -149,7 +150,7 @@ class SteadyStart:
         columns = [self.friction_edge(name, row, row["length"]) for name, row in
                    zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
-        leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
+        leaks = [self.leak_edge(k) for k in range(len(self.leaks)) if self.leaks[k]["leakage"] > 0.0]
         self.edges = [*pipes, *columns, *valves, *leaks]
         self.release_regulators(len(pipes) + len(columns))
         sizes = self.flow_scales[: len(self.edges)]
@@ -287,8 +288,8 @@ class SteadyStart:
         return conductance_of(self.draft.tables, k, opening)
 
     def leak_edge(self, k: int) -> Edge:
-        """Edge of the leakage past piston k in the steady problem: mass flow = density * leakage * pressure drop."""
-        row = self.pistons[k]
+        """Edge of leak k in the steady problem: mass flow = density * leakage * pressure drop."""
+        row = self.leaks[k]
         g = row["leakage"] * self.draft.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
         i, j = int(row["a"]), int(row["b"])
         if self.rest:
@@ -296,10 +297,7 @@ class SteadyStart:
         return Edge(i, j, law_of(LEAK, g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Leakage past a piston from chamber A to B [kg/s], as `kernels.mass_dynamics.leak_flow`.
-
-        p_a, p_b : pressures in the chambers [Pa]
-        """
+        """Flow of a leak from node a to node b [kg/s]; p_a, p_b : pressures there [Pa]"""
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
@@ -499,16 +497,13 @@ class SteadyStart:
 
     def report(self) -> dict[str, Any]:
         draft, moving = self.draft, []
-        if len(draft.mass_table) or len(draft.body_table):
-            from fvsolve.core.model.mechanics_tables import driven_at_start, start_masses
-            from fvsolve.core.model.static_forces import start_bodies
-
-            moving = start_masses(draft, self) + start_bodies(draft, self) + driven_at_start(draft, self)
+        for feature in draft.features:
+            moving += feature.begin_forces(draft, self)
         moving += self.moving
         for feature in draft.features:
             moving += feature.begin_motion(draft, self)
         fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
-        for row in self.pistons:
+        for row in self.leaks:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
         self.use_start_flows(net)
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):

@@ -11,6 +11,7 @@ from filelock import FileLock, Timeout
 
 from fvsolve.case.case import REPORT_KEYS, STEP_KEYS
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.output import csv_files
 from fvsolve.core.output.csv_files import read_envelope, read_table
 from fvsolve.core.output.fields import FieldSeries, ParallelBasinWriter
@@ -86,7 +87,7 @@ class RunDirectory:
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
         self.history = csv_files.HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.meshed) + len(model.body_names) > 0
+        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.meshed) + len(frames_of(model)) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():

@@ -1,8 +1,7 @@
 """Fields of a run: the index fields.pvd and its .vtu files with the values of all cells at the output times.
 
-Pipes are chains of line cells along their plan, with the elevation upwards. Bodies are lines from the origin to the
-centre of mass and to the points; force elements are lines, and a sloshing mass is a line from its rest position to its
-position. Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
+Pipes are chains of line cells along the network layout, with the elevation upwards. Features may add lines that move.
+Cell data are in SI, pressures are absolute, and every array carries its unit as the VTK key UNITS_LABEL.
 
 Under MPI each rank writes a .vtu file of its rows of a basin, rank 0 also the .pvtu index. Rank 0 has the values of all
 cells. The other ranks wait for a broadcast of a function to call and its arguments (`solve.parallel_bands`).
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.core.kernels.dtypes import BODY_OUT, PRISMATIC
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 
@@ -44,74 +43,6 @@ PVD_HEAD = """<?xml version="1.0"?>
 PVD_TAIL = "</Collection>\n</VTKFile>\n"
 
 
-class BodyLines:
-    """Points fixed to bodies or to the world, and lines between them.
-
-    owner : int[p]         body of each point, -1 for the world
-    place : float64[p, 3]  coordinates of each point in the axes of its owner [m]
-    lines : int[l, 2]      points at the ends of each line
-    line_body : int32[l]   body of each line, -1 for none
-    """
-
-    def __init__(self, model) -> None:
-        self.model, names = model, model.body_names
-        owner, place, lines, line_body = [], [], [], []
-        # for each body, points in its axes [m], without repetition: origin, centre of mass, named points
-        bodies = [model.case.nodes.get(name) for name in names]
-        drawn = [[] if body is None else
-                 list(dict.fromkeys([(0.0,) * 3, tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
-                 for body in bodies]  # fmt: skip
-        dots = max(map(len, drawn)) < 2  # if others have extent, a body with only an origin is just a joint of them
-        for i, ends in enumerate(drawn):
-            first = len(owner)
-            if not ends and (row := model.tables.bodies[i])["joint"] == PRISMATIC:  # a mode of water in a tank
-                owner += [int(row["parent"]), i]
-                place += [tuple(row["at"]), (0.0, 0.0, 0.0)]
-            elif len(ends) > 1 or (ends and dots):
-                owner += [i] * len(ends)
-                place += ends
-            if len(owner) > first:
-                lines += [(first, first + k) for k in range(1, len(owner) - first)] or [(first, first)]
-                line_body += [i] * max(len(owner) - first - 1, 1)
-        for row in model.tables.lines:
-            if min(row["from_point"], row["to_point"]) >= 0:
-                for key in ("from_point", "to_point"):
-                    point = model.tables.points[row[key]]
-                    owner.append(int(point["body"]))
-                    place.append(tuple(point["place"]))
-                lines.append((len(owner) - 2, len(owner) - 1))
-                line_body.append(-1)
-        self.owner, self.place = np.array(owner), np.array(place, dtype=float).reshape(-1, 3)
-        self.lines, self.line_body = np.array(lines).reshape(-1, 2), np.array(line_body, dtype=np.int32)
-
-    def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points in world axes [m], and speeds of the midpoints of lines [m/s] : float64[p, 3], float64[l].
-
-        out : output array of the right-hand side, which contains the motion of the bodies
-        """
-        points, speed = world_points(self.model, out, self.owner, self.place)
-        return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
-
-
-def world_points(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World coordinates [m] and velocities [m/s] of points fixed to bodies : float64[p, 3] each.
-
-    out : output array of the right-hand side, which contains the motion of the bodies
-    owner : int[p]         body of each point, -1 for the world
-    place : float64[p, 3]  coordinates in the axes of the body [m]
-    """
-    from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
-
-    first, n = int(model.layout["body"]), len(model.body_names)
-    points, speed = place.copy(), np.zeros_like(place)
-    for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
-        own = owner == i
-        arms = place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
-        points[own] = row[POSITION : POSITION + 3] + arms
-        speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
-    return points, speed
-
-
 class FieldSeries:
     """Series of .vtu files with their index fields.pvd, which is complete after each frame (output time).
 
@@ -130,7 +61,7 @@ class FieldSeries:
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.meshed if basin.part.on is not None}
-        self.places = places | moving  # a basin on a body is drawn in world axes, as bodies are
+        self.places = places | moving  # a basin on a body is drawn in world axes
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
                  for basin in model.meshed}  # fmt: skip
@@ -138,7 +69,7 @@ class FieldSeries:
             basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.meshed
         }
         self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
-        self.bodies = BodyLines(model) if model.body_names else None
+        self.drawn = next((own for feature in model.features if (own := feature.drawn(model)) is not None), None)
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = FIELD_UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
@@ -156,7 +87,7 @@ class FieldSeries:
         """
         index = self.folder / "fields.pvd"
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
-        n = frames * (len(self.meshes) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
+        n = frames * (len(self.meshes) + (1 if self.pipes else 0) + (1 if self.drawn else 0))
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
         matches = [FILE_ATTRIBUTE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
@@ -184,9 +115,9 @@ class FieldSeries:
         """Write the frame at time `t` [s]; frame : result of `RunData.fields`."""
         for part, basin in enumerate(self.model.meshed, 1):
             self._write_basin(t, part, basin, frame)
-        if self.bodies:
-            file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
-            blocks, grid = {"body": [self.bodies.line_body], "speed": [speed]}, [("line", self.bodies.lines)]
+        if self.drawn:
+            file, (points, speed) = f"fields/{self.drawn.name}-{self.frames:06d}.vtu", self.drawn.at(frame["out"])
+            blocks, grid = {**self.drawn.blocks, "speed": [speed]}, [("line", self.drawn.lines)]
             write_frame(self.folder / file, grid_xml(points, grid), blocks, {"speed": "m/s"})
             self._add_to_collection(t, len(self.meshes) + 1, file)
         if self.pipes:
@@ -225,9 +156,11 @@ class FieldSeries:
         return self.fixed_grids[part]
 
     def points_at(self, frame: dict) -> np.ndarray:
-        """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on bodies move."""
+        """Points of the pipes in world axes at the time of a frame : float64[n, 3] [m]; points on frames move."""
         if not (self.owner >= 0).any():
             return self.points
+        from fvsolve.core.model.frame_points import world_points
+
         return world_points(self.model, frame["out"], self.owner, self.points)[0]
 
     def _add_to_collection(self, t: float, part: int, file: str) -> None:
@@ -356,7 +289,7 @@ def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
 
     def body(name: str) -> int:
         on = getattr(places.get(name), "on", None)
-        return -1 if on is None else model.body_names.index(on)
+        return -1 if on is None else frames_of(model).index(on)
 
     for k, name in enumerate(ends):
         owner[k] = body(name)

@@ -20,7 +20,7 @@ from fvsolve.core.kernels.calls import POWER, compile_as
 from fvsolve.core.kernels.energy_supply import EXCESS, HEADER, INTERVAL, NEXT, PLACE, RATIO, TIME, T, WatchArrays
 from fvsolve.core.kernels.table_handle import boxed
 from fvsolve.core.model import RunData
-from fvsolve.core.model.energy_accounts import Accounts, available_energy, compute_all_loads, terms_of
+from fvsolve.core.model.energy_accounts import Accounts, available_energy, terms_of
 from fvsolve.core.model.model import Model, once_per_model
 from fvsolve.core.steppers.run_handle import WATCH
 from fvsolve.errors import FvsolveError, Notice
@@ -138,7 +138,8 @@ class EnergyWatch:
         if terms is None:
             return
         self.run_data = RunData(model)
-        compute_all_loads(self.run_data)
+        for own in self.run_data.features:
+            own.for_energy()
         count, masses, (powers, stores) = terms.nodes.size, len(model.tables.nodes), terms.rows
         self.restart_data = np.zeros(HEADER + 4 * count + 2 * masses + stores)
         parts = np.split(self.restart_data, np.cumsum([HEADER, count, count, count, count, masses, masses]))

@@ -10,6 +10,7 @@ errors remain.
 
 import numpy as np
 
+from fvsolve.core.assembly.features import coordinate_of, frames_of
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.solve.energy_watch import EnergyWatch
 from fvsolve.core.solve.run_loop import STATUS_FAILURES
@@ -74,8 +75,8 @@ class RunChecks:
         """Check state y at time t [s], and update the wave rates of meshes; returns the reason to stop, or ""."""
         for part in self.moving:
             self.rates[part.name] = max(self.rates.get(part.name, 0.0), part.max_rate(y)[0])
-        if stops := self.sloshing.check(t, y):
-            return stops
+        if reason := self.sloshing.check(t, y):
+            return reason
         ratio = np.abs(y) / self.largest
         if np.all(ratio <= NO_GROWTH / GROWTH_LIMIT):
             self.sound = t
@@ -143,7 +144,7 @@ RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
 class SloshingCheck:
-    """Record of the wave height of sloshing modes and of the change of the water's weight by moving bodies.
+    """Record of the wave height of sloshing modes and of the change of the water's weight by the motion of its frame.
 
     Sloshing modes are computed under gravity, sloshing in cells under gravity and the motion of driven joints. Neither
     includes the acceleration of a body that moves freely.
@@ -162,7 +163,7 @@ class SloshingCheck:
             free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
             if modal or (free and not basin.lumped):
                 place = np.array(basin.place) + basin.rotation[:, :2] @ mesh.centroid
-                about = model.body_names.index(basin.on), place, basin.rotation[:, 2]
+                about = frames_of(model).index(basin.on), place, basin.rotation[:, 2]
                 self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
         self.restart_data = np.zeros((len(self.tanks), 4))
 
@@ -189,16 +190,19 @@ class SloshingCheck:
         out : output array of the right-hand side; i : number of the body; place, normal : centre of the basin [m] and
         unit normal of its bed in the axes of the body; modal : True for sloshing modes
         """
+        from fvsolve.core.kernels import moving_frames as frame
         from fvsolve.core.kernels.dtypes import BODY_OUT
-        from fvsolve.core.kernels.mechanism import body_layout
 
         row = out[int(self.model.layout["body"]) + BODY_OUT * i :][:BODY_OUT]
-        turn, gravity = row[body_layout.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
-        spin, arm, up = row[body_layout.SPIN :][:3], turn @ place, turn @ normal
+        turn, gravity = row[frame.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
+        spin, arm, up = row[frame.SPIN :][:3], turn @ place, turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
         weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
-            for a, b in ((body_layout.ACCELERATION, body_layout.SPIN_RATE), (body_layout.BIAS, body_layout.SPIN_BIAS))
+            for a, b in (
+                (frame.ACCELERATION, frame.SPIN_RATE),
+                (frame.BIAS, frame.SPIN_BIAS),
+            )
         )
         return float(weight), gravity if modal else float(reference)
 
@@ -225,10 +229,10 @@ def rises(model, name: str) -> tuple:
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
     modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.tables.bodies[model.body_names.index(sloshing.mode_body_name(name, mode))] for mode in modes]
+    rows = [coordinate_of(model, sloshing.mode_body_name(name, mode)) for mode in modes]
     lifts = np.zeros((2, len(modes)))
     lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
-    at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
+    at, start = [row.y for row in rows], np.array([row.position for row in rows])
     return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
 
 
@@ -322,7 +326,7 @@ class StepDoubling:
         self.restart_data[1] = steps + (self.interval if divided else 1.0)
         end = loop.control["end"]
         full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])  # 0: any step is checked
-        # A step in which a jump in a delay line corrected masses of storing nodes or flows of columns is not checked,
+        # A step in which a jump in a delay line corrected contents of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
         # Neither is a step that ends at an event, because half steps would follow the equations after it.
         corrected = any(own.corrected_at(loop.t) for own in loop.run_data.features)

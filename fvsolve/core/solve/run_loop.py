@@ -331,8 +331,8 @@ class RunLoop:
             if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
                 text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
             if status == rec.NO_WEIGHT:
-                bodies = [*(part.name for part in model.meshed), *model.node_names]
-                names["name"] = bodies[index].removesuffix(".inside")
+                waters = [*(part.name for part in model.meshed), *model.node_names]
+                names["name"] = waters[index].removesuffix(".inside")
             elif status == rec.NO_COOLANT:
                 from fvsolve.core.kernels.scalar_transport import GREATEST_RISE
 
@@ -407,8 +407,8 @@ class RunLoop:
 
 
 def stored_states(model: Model) -> np.ndarray:
-    """Numbers of the states that are stored amounts, also travel of masses, whose sums are compensated."""
-    sums = [*model.tables.nodes["y"], *model.tables.masses["y"]]
+    """Numbers of the states that are stored amounts, or travel, whose sums are compensated."""
+    sums = [*model.tables.nodes["y"]]
     for feature in model.features:
         sums += feature.stored_states(model).tolist()
     return np.array([at for at in sums if at >= 0], dtype=np.int64)
@@ -477,7 +477,7 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     return bool(
         model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
+        and model.y_size == 2 * model.cells and model.shapes.armed == 0
         and not model.functions.cast.features
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip

@@ -12,7 +12,6 @@ from fvsolve.errors import Notice, listing
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
 UNRECORDED = np.array([[np.inf], [np.nan], [-np.inf], [np.nan]])  # extremes before the first record
-DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ def find_marks(run_data: RunData, of_features: list[Mark]) -> list[Mark]:
     kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
-    kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
+    kinds += [mark for feature in model.features for mark in feature.marks]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     texts = {
         "stopped dead": (
@@ -232,27 +231,9 @@ def _shut_by(name: str, time: float, events: list[Event]) -> str:
 def device_notices(run_data: RunData) -> list[Notice]:
     """Notices on devices that ran outside the given data, but within the model, such as pumps that ran down."""
     model, marks = run_data.model, run_data.marks
-    first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
-    times = marks[first + len(model.devices) :]
+    times = marks[int(model.layout["device_mark"]) + len(model.devices) :]
     return [device.passing_notice(model, name, part, float(time))
             for (name, part, device), time in zip(model.devices, times, strict=False) if np.isfinite(time)]  # fmt: skip
-
-
-def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
-    """Notices for bodies whose Euler parameters no longer have length 1; the difference measures the time error."""
-    notices = []
-    for name, row in zip(model.body_names, model.tables.bodies, strict=True):
-        if row["joint"] not in (rec.BALL, rec.FREE):
-            continue
-        first = 3 if row["joint"] == rec.FREE else 0
-        at = int(row["y"]) + first
-        length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
-        if abs(length - 1.0) > DRIFT:
-            text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
-                    "length; the error of its attitude is about as large as this drift; "
-                    'method = "gauss-4" conserves the length')  # fmt: skip
-            notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
-    return notices
 
 
 def find_cavities(run_data: RunData) -> list[Cavity]:

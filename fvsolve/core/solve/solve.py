@@ -430,7 +430,7 @@ class Run:
         watched = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.notices, *watched, *self.checks.warnings(ledgers)]
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
-        warnings += found.drift_notices(model, loop.now)
+        warnings += [notice for own in self.run_data.features for notice in own.end_notices(loop.now)]
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
         entered, events = (
             ledger[:, : len(model.node_names)].sum(axis=0),

@@ -1,4 +1,4 @@
-"""Greatest fixed step for modes other than plain waves: vessels, columns, bodies, devices, friction, features.
+"""Greatest fixed step for modes other than plain waves: vessels, columns, devices, friction, features.
 
 It is estimated at the start, from the eigenvalues s of the rates of all states outside cells, with the cells held
 constant, and from the modes of cells: friction, unsteady friction, wall creep, and those of features. In a
@@ -32,7 +32,7 @@ from fvsolve.core.steppers.analysis.stability_properties import imaginary_interv
 from fvsolve.core.steppers.tableau import Method, method_named
 from fvsolve.errors import Notice
 
-OTHER_STATES = 1e3  # further factor for states driven by more than waves: contents, bodies, amounts
+OTHER_STATES = 1e3  # further factor for states driven by more than waves: contents, amounts
 FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # scheduled keys of nodes
 
 
@@ -87,7 +87,7 @@ def pressure_and_flow_range(model) -> tuple[float, float]:
 
 @once_per_model
 def states_outside_cells(model) -> np.ndarray:
-    """Numbers of the states outside cells and delay lines: storing nodes, columns, bodies, devices : int64[k]."""
+    """Numbers of the states outside cells and delay lines: storing nodes, columns, devices, features : int64[k]."""
     pipes = model.tables.pipes
     lines = set(pipes["y"][pipes["cells"] == 0].tolist())
     names = model.state_names.single()

@@ -15,9 +15,9 @@ length.
 """
 
 from fvsolve.core.kernels.dtypes import GN, NO_WEIGHT, STATUS, WHERE
-from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row
-from fvsolve.core.kernels.mechanism.vectors import cross, rotate
+from fvsolve.core.kernels.moving_frames import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import cross, rotate
 from fvsolve.jit import inline, njit
 
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].

@@ -5,7 +5,7 @@ solved together with that of the water in its basins. Lagrange's equations ((70)
 that are point masses at mid depth and slide along the bed. The force along the bed depends on the state alone, so the
 rates of flow are first computed for zero joint accelerations. The load of the water on the body then follows from its
 rate of momentum (`mass_moments`). Along the normal it acts by its mass and moments, together with the inertia of bodies
-(`kernels.mechanism.body_layout`). After the accelerations are solved, the rates of flow are corrected for them
+(`kernels.moving_frames`). After the accelerations are solved, the rates of flow are corrected for them
 (`correct_for_bodies`). A liquid is a layer of this kind without height. The total momentum is conserved to the order of
 the method.
 
@@ -28,11 +28,11 @@ Arguments: y : states; rates, first : array of rates, and index of the first rat
 the deviation of depth from rest, 0 for the depth at rest; twice : 2 W_z [1/s]; euler, turn : Euler term dW_z/dt [1/s2].
 """
 
+from fvsolve.core.kernels import moving_frames as body
 from fvsolve.core.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
-from fvsolve.core.kernels.mechanism import body_layout as body
-from fvsolve.core.kernels.mechanism.body_layout import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, body_row
-from fvsolve.core.kernels.mechanism.vectors import cross, dot, rotate, rotate_back, write_vector
+from fvsolve.core.kernels.moving_frames import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, body_row
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import cross, dot, rotate, rotate_back, write_vector
 from fvsolve.features.basins import basin_frames as frame
 from fvsolve.features.basins.basin_frames import CELL_POSITIONS, FRAME_GRAVITY, bed_height, cell_position
 from fvsolve.features.basins.basin_output import basin_first_row
@@ -203,7 +203,7 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
 def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     """Add the force and torque of the water in basin b for zero joint accelerations to the forces on its body.
 
-    The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.mechanism.body_layout`.
+    The moments of mass, axes, origin and load of the basin are written to `out`, see `kernels.moving_frames`.
     """
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = mass_moments(
         tables, basin, y, rates, first, own, twice, euler

@@ -4,6 +4,7 @@ from importlib import import_module
 
 import numpy as np
 
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.kernels import dtypes as rec
 
 HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
@@ -36,7 +37,7 @@ def reserve_basins(draft) -> None:
     sizes, basins, walls = draft.sizes, len(draft.basin_table), len(draft.wall_table)
     sizes.ledger("source", draft.sources)
     sizes.out("wall", walls)
-    sizes.out("tank", rec.TANK_OUT * basins if len(draft.body_table) else 0)
+    sizes.out("tank", rec.TANK_OUT * basins if frames_of(draft) else 0)
     sizes.run_array("seen", draft.size if walls else 0)
     sizes.run_array("bands", 2 * basins)
     sizes.run_array("maxima", draft.maxima_size)

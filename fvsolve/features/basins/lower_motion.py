@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.case import moving_walls as case
 from fvsolve.case.bodies import carriers, free_joints, level_over
+from fvsolve.core.assembly.features import coordinate_of, frames_of
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import basin_frames as frame
 from fvsolve.features.basins import cell_sides, moving_meshes
@@ -174,7 +175,7 @@ def lower_frame(draft, basin, row) -> None:
         face_count = lines[0].size * grid.ny + grid.nx * lines[1].size if basin.is_grid else lines[0].size
         numbers[frame.POTENTIALS], places = draft.to_work(basin.n + face_count), [*places, *lines]
     numbers[frame.CELL_POSITIONS] = draft.to_plane(np.concatenate(places))
-    row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
+    row["body"], row["frame"] = frames_of(draft).index(part.on), draft.to_plane(numbers)
     numbered = enumerate(draft.case.probes)
     loads = [(k, p.name) for k, p in numbered if p.part == "nodes" and p.quantity.startswith("joint_")]
     row["loads_body"] = any(loads) or any(free_joints(part.on, draft.case.nodes))
@@ -228,7 +229,7 @@ def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarra
     out, layout : output array of the right-hand side, and the places of its parts
     """
     from fvsolve.core.kernels.dtypes import BODY_OUT
-    from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION
+    from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
     place, turn = out[first + POSITION :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)
@@ -244,11 +245,15 @@ def lower_walls(draft) -> None:
         row["basin"], row["outward"] = draft.meshed.index(basin), side
         row["node"] = draft.node_index[f"{basin.name}.{patch}"]
         row["y"] = draft.states([f"{basin.name}.{patch}.travel"], TRAVEL_SCALE)
-        row["mass"] = draft.mass_index.get(stated.body, -1) if stated.body is not None else -1
-        row["body"] = draft.body_names.index(stated.body) if stated.body in draft.body_names else -1
+        row["mass"] = row["body"] = row["rate"] = -1
+        row["toward"] = 1.0
+        row["schedule"] = draft.schedules.add(stated.travel) if stated.travel is not None else -1
+        if stated.body is not None:
+            moved = coordinate_of(draft, stated.body)
+            row["mass"], row["body"], row["rate"], row["speed"] = moved.net, moved.frame, moved.rate, moved.velocity
+            row["inertia"], row["lightness"], row["schedule"] = moved.inertia, moved.lightness, moved.schedule
         if row["body"] >= 0:
             row["toward"] = np.sign(case.slide_direction(draft.case.nodes[stated.body])[axis])
-        row["schedule"] = draft.schedules.add(stated.travel) if stated.travel is not None else -1
         corner_weights = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
         line_weights, stretch_per_travel = corner_weights, case.area_growth(basin.mesh, axis, corner_weights)
         per_cell = stretch_per_travel

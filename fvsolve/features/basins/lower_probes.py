@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.probe_tables import cells_at_point
 
@@ -47,5 +48,5 @@ def lower_surface(draft, row, probe) -> None:
     modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
     row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
     row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [draft.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
+    draft.integers += [frames_of(draft).index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
     draft.floats += shares

@@ -16,9 +16,8 @@ import numpy as np
 
 from fvsolve.core.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.core.kernels.energy_rows import WALL_ROWS, wall_power_row
-from fvsolve.core.kernels.mass_dynamics import motion
-from fvsolve.core.kernels.mechanism.body_layout import FORCE
-from fvsolve.core.kernels.mechanism.body_layout import body_row as row_of_body
+from fvsolve.core.kernels.moving_frames import FORCE
+from fvsolve.core.kernels.moving_frames import body_row as row_of_body
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import cell_sides as stretching
@@ -181,15 +180,10 @@ def first_length(tables, basin):
 
 @njit
 def speed_of(t, tables, wall, y):
-    """Speed of a wall [m/s], positive along its axis x or y: the speed of its mass, of its body or of its schedule."""
-    if wall["mass"] >= 0:
-        return motion(tables.masses[wall["mass"]], y)[1]
-    if wall["body"] >= 0:
-        body = tables.bodies[wall["body"]]
-        if body["schedule"] >= 0:
-            return wall["toward"] * schedule_slopes(tables, body["schedule"], t)[0]
-        return wall["toward"] * (body["speed"][0] + y[body["rate"]])
-    return schedule_slopes(tables, wall["schedule"], t)[0]
+    """Speed of a wall [m/s], positive along its axis x or y: that of what moves it, or of its schedule."""
+    if wall["rate"] >= 0:
+        return wall["toward"] * (wall["speed"] + y[wall["rate"]])
+    return wall["toward"] * schedule_slopes(tables, wall["schedule"], t)[0] if wall["schedule"] >= 0 else 0.0
 
 
 @njit
@@ -312,17 +306,15 @@ def add_wall_forces(t, y, dydt, out, handle):
         total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
         out[layout["wall"] + k] = total
         if wall["body"] >= 0:
-            body = tables.bodies[wall["body"]]
-            out[RATE] = max(out[RATE], waves / body["mass"])
+            out[RATE] = max(out[RATE], waves / wall["inertia"])
             push_body(out, tables, wall, wall["rest"] + total)
         if wall["mass"] < 0:
             continue
-        mass = tables.masses[wall["mass"]]
         force = wall["outward"] * total
         out[layout["net_force"] + wall["mass"]] += force
-        out[RATE] = max(out[RATE], waves * mass["lightness"])
-        if dydt.size > 0 and mass["y"] >= 0:
-            dydt[mass["y"] + 1] += force * mass["lightness"]
+        out[RATE] = max(out[RATE], waves * wall["lightness"])
+        if dydt.size > 0 and wall["rate"] >= 0:
+            dydt[wall["rate"]] += force * wall["lightness"]
 
 
 @njit

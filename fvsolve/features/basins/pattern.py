@@ -75,16 +75,13 @@ class BasinPattern(FeaturePattern):
         return self.behind(i) if i in self.patches else unique_states()
 
     def wall_pairs(self) -> Iterator[Pairs]:
-        """Yield couplings of cells with the travel of moving walls, and of this travel with masses and bodies.
+        """Yield couplings of cells with the travel of moving walls, and of this travel with what moves the walls.
 
-        The masses and bodies are those that move the walls; their couplings with the cells at the walls are included.
+        Couplings of what moves them with the cells at the walls are included.
         """
-        of = self.of
         for wall in self.walls:
-            basin, mass = self.basins[wall["basin"]], of.masses[wall["mass"]] if wall["mass"] >= 0 else -1
-            speed = unique_states(mass + 1) if mass >= 0 else unique_states()
-            if wall["body"] >= 0:
-                speed = of.joint_states(of.bodies[wall["body"]], 1)
+            basin = self.basins[wall["basin"]]
+            speed = unique_states(*([wall["rate"]] if wall["rate"] >= 0 else []))
             yield pairs_of(pattern.all_states(basin), unique_states(wall["y"], speed))
             yield pairs_of(unique_states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]

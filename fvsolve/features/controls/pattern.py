@@ -9,7 +9,6 @@ import numpy as np
 from fvsolve.core.assembly.features import FeaturePattern
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
-from fvsolve.parts.network_elements import network_of
 
 
 class BlockCouplings(FeaturePattern):
@@ -65,10 +64,9 @@ class BlockCouplings(FeaturePattern):
             return unique_states(model.pressure_states(i), self.schedule(model.nodes[i]["schedule"]))
         if kind == rec.PRESSURE:
             return model.sets[i]
-        if kind in (rec.POSITION, rec.VELOCITY):
-            return unique_states(model.masses[i] + (kind == rec.VELOCITY))
-        if kind in (rec.PISTON_POSITION, rec.PISTON_VELOCITY):
-            return model.places(model.pistons[i], int(kind == rec.PISTON_VELOCITY))
+        for own in model.features:
+            if (states := own.probe(row)) is not None:
+                return states
         if kind == rec.VALVE_FLOW:
             link = model.valves[i]
             ends = (model.sets[link[end]] for end in ("from_node", "to_node"))
@@ -94,9 +92,8 @@ class BlockCouplings(FeaturePattern):
             yield pairs_of(self.own(k), unique_states(*read))
         tables, network = self.tables, {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
         network |= {*tables.valves["command"]}
-        if (own := network_of(self.model.model)) is not None:
-            network |= {*own.schedules.values()}
-        network |= {*tables.devices["schedule"], *tables.braces["schedule"], *self.controls["setpoint"]}
+        network |= {*tables.devices["schedule"], *self.controls["setpoint"]}
+        network |= {index for own in self.model.features for index in own.schedules()}
         other = [index for index in self.follows if index not in network]  # shafts, scalars
         if other:
             yield pairs_of(np.arange(self.size), self.schedule(*other))

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.static_forces import rounding
 from fvsolve.features.networks.elimination import Elimination, NetworkError, dependent_stores, substituted
 from fvsolve.features.networks.faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
 from fvsolve.features.networks.kernels.tables import (
@@ -40,7 +40,7 @@ def lower_network(own, draft) -> Network | None:
     elements, switches = parts_of_network(draft.case)
     if not elements:
         return None
-    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=rounding(draft))
+    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=draft.rounding)
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:
@@ -118,7 +118,7 @@ def state_place(draft, item: Element, size: float) -> int:
     kind, name = item.state_of
     if kind == "device":
         return int(draft.device_table[draft.device_names.index(name)]["y"])
-    return int(draft.mass_table[draft.mass_index[name]]["y"]) + 1
+    return coordinate_of(draft, name).rate
 
 
 def probed_angles(case) -> list[str]:
@@ -143,7 +143,7 @@ def fill_tables(own, draft, network: Network) -> None:
             row["index"] = draft.device_names.index(name)
             row["side"] = draft.devices[row["index"]][2].quantities.index(quantity)
         elif row["kind"] == codes.FORCE_INPUT:
-            row["index"] = draft.mass_index[name]
+            row["index"] = coordinate_of(draft, name).net
         elif row["kind"] == codes.FLUID_HEAT:
             row["index"] = exchanger_names(draft.case).index(name)
         elif row["kind"] == codes.FRICTION_FLOW:

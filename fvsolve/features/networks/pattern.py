@@ -58,8 +58,6 @@ class NetworkCouplings(FeaturePattern):
             return model.schedule(i)
         if row["kind"] == codes.DEVICE_INPUT:
             return model.device_reading(model.devices[i])
-        if row["kind"] == codes.FORCE_INPUT:
-            return unique_states(*model.pushing_states(i))
         for own in model.features:
             if (states := own.source(row)) is not None:
                 return states

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.steady import union
 from fvsolve.errors import listing
 from fvsolve.features.networks.elimination import Elimination, NetworkError, Terms, substituted
@@ -82,7 +83,7 @@ class NetworkStart:
         kind, name = item.reads
         draft = self.draft
         if kind == codes.FORCE_INPUT:
-            return float(draft.mass_table[draft.mass_index[name]]["force"])
+            return coordinate_of(draft, name).force
         name, quantity, sign = name
         k = draft.device_names.index(name)
         _, part, device = draft.devices[k]
@@ -122,7 +123,7 @@ class NetworkStart:
         kind, name = item.state_of
         draft = self.draft
         if kind == "mass":
-            return float(draft.mass_table[draft.mass_index[name]]["velocity"])
+            return coordinate_of(draft, name).velocity
         k = draft.device_names.index(name)
         return item.unit * float(draft.devices[k][2].speed_at(self.start, int(draft.device_table[k]["valve"])))
 

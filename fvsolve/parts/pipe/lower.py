@@ -54,7 +54,7 @@ class PipeRows(Lowering, kind="pipe"):
         pipe = draft.pipe_table[row["index"]]
         if pipe["cells"] == 0:
             draft.fault(f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"')
-        elif pipe["moving_segment"] >= 0:
+        elif pipe["forcing"] >= 0:
             draft.fault(
                 f"links.{name}", "a pipe on a body has no force probe; use the forces of the joints of the body"
             )

@@ -2,6 +2,7 @@
 
 from math import asinh, pi, sinh, sqrt
 
+from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import Device
 from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import FLOW, Element, node_or_reference
@@ -36,23 +37,24 @@ class SolenoidRows(Device, kind="solenoid"):
     def numbers(self, draft, name, part) -> list[float]:
         saturation = 0.0 if part.saturation_flux is None else part.saturation_flux**-2
         per_gap = 1.0 / (MU_0 * part.pole_area)
-        return [part.turns, part.core_reluctance, saturation, per_gap, part.closed_position, 0.0]
+        return [part.turns, part.core_reluctance, saturation, per_gap, part.closed_position, 0.0, 0.0, 0.0]
 
     def scales(self, draft, name, part) -> list[float]:
         return [SMALL_FLUX_DENSITY * part.pole_area * part.turns]
 
     def begin(self, start, part, row) -> list[str]:
-        row["mass"] = start.draft.mass_index[part.ports["armature"]]
-        start.draft.start_flags[int(row["event"])] = self.distance(start, row) >= 0.0
+        armature, numbers = coordinate_of(start.draft, part.ports["armature"]), start.draft.tables.floats
+        row["travel"] = armature.y
+        numbers[row["data"] + law.POSITION], numbers[row["data"] + law.SPEED] = armature.position, armature.velocity
+        start.draft.start_flags[int(row["event"])] = self.distance(start, part) >= 0.0
         return []
 
-    def distance(self, start, row) -> float:
+    def distance(self, start, part) -> float:
         """Distance from the armature to its closed position at the start [m]."""
-        closed = start.draft.tables.floats[row["data"] + law.CLOSED]
-        return float(closed - start.draft.mass_table[row["mass"]]["position"])
+        return float(part.closed_position - coordinate_of(start.draft, part.ports["armature"]).position)
 
     def source_at_start(self, start, part, row, quantity: str, flow: float) -> float:
-        numbers, at, distance = start.draft.tables.floats, int(row["data"]), self.distance(start, row)
+        numbers, at, distance = start.draft.tables.floats, int(row["data"]), self.distance(start, part)
         side = 1.0 if distance >= 0.0 else -1.0
         flux = part.initial_flux
         if flux is None:  # from (slope + cubic Phi^2) Phi = turns times current
@@ -73,16 +75,15 @@ class SolenoidRows(Device, kind="solenoid"):
         """
         numbers, at = model.tables.floats, int(row["data"])
         flux = numbers[at + law.FLUX] + y[row["y"]] / part.turns
-        armature = model.tables.masses[row["mass"]]
-        moved = y[armature["y"]] if armature["y"] >= 0 else 0.0
-        gap = abs(part.closed_position - armature["position"] - moved)
+        moved = y[row["travel"]] if row["travel"] >= 0 else 0.0
+        gap = abs(part.closed_position - numbers[at + law.POSITION] - moved)
         slope = part.core_reluctance * (1.0 + 3.0 * numbers[at + law.SATURATION] * flux**2)
         slope += numbers[at + law.PER_GAP] * gap
         return [{int(row["y"]): float(sqrt(0.5 * slope) / part.turns)}]
 
     def above(self, model, part, row) -> float:
-        armature, numbers, at = model.tables.masses[row["mass"]], model.tables.floats, int(row["data"])
-        distance = part.closed_position - float(armature["position"])
+        numbers, at = model.tables.floats, int(row["data"])
+        distance = part.closed_position - float(numbers[at + law.POSITION])
         compute = getattr(law.quantity_of, "py_func", law.quantity_of)
         side = 1.0 if distance >= 0.0 else -1.0
         return float(compute(law.ENERGY, numbers, at, numbers[at + law.FLUX], distance, side))

@@ -14,8 +14,7 @@ from math import exp
 
 from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.devices import SET, VALUE
-from fvsolve.core.kernels.energy_rows import bushing_power_row, bushing_stored_row
-from fvsolve.core.kernels.mass_dynamics import forces
+from fvsolve.core.kernels.energy_rows import device_power_row, device_stored_row
 from fvsolve.core.kernels.scalar_transport import heated_scalar
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
@@ -186,13 +185,15 @@ def drive_shafts(t, y, dydt, out, handle):
 @njit(forceinline=True)
 def network_power_row(tables, power):
     """Index of the first entry of elements of networks in `power`."""
-    return bushing_power_row(tables, power) - tables.network_elements.size
+    first = device_power_row(tables, power) - tables.layout[0]["feature_power"]
+    return first - tables.network_elements.size
 
 
 @njit(forceinline=True)
 def network_stored_row(tables, stored):
     """Index of the first entry of elements of networks in `stored`."""
-    return bushing_stored_row(tables, stored) - tables.network_elements.size
+    first = device_stored_row(tables, stored) - tables.layout[0]["feature_stored"]
+    return first - tables.network_elements.size
 
 
 @njit
@@ -222,9 +223,6 @@ def observe_networks(t, y, out, handle, values):
 def sources_for_events(t, y, out, handle, g):
     """Write all sources to `out` before event functions are evaluated; g is not used."""
     tables = open_networks(handle)
-    # Forces on masses are sources, and no rates have been computed at this state.
-    if tables.masses.size > 0:
-        forces(t, y, out, open_tables(handle))
     write_sources(t, y, out, open_tables(handle), tables)
     write_temperatures(y, out, tables)
 

@@ -3,7 +3,7 @@
 A quantity is given by its index in `BODY_QUANTITIES` or `POINT_QUANTITIES`; vectors are in axes of the world. Equation
 numbers in brackets are those of docs/course.md.
 
-`power` has three entries for each body [W], see `energy_rows.py` for their place: rate of the stored energy, power
+`power` has three entries for each body [W], before those of devices: rate of the stored energy, power
 dissipated by the damping of the joint, power supplied by a driven joint. `stored` has one entry for each body [J], the
 change since the start of kinetic energy + m g z + k s^2 / 2. m : mass, z : height of the centre of mass, k : stiffness
 of the joint, s : its coordinate.
@@ -11,12 +11,11 @@ of the joint, s : its coordinate.
 
 from math import atan2, cos, hypot, sin, sqrt
 
-from fvsolve.core.kernels.dtypes import BODY_VALUE, FREE, POINT_VALUE, PRISMATIC, SURFACE_VALUE, TANK_OUT
-from fvsolve.core.kernels.energy_rows import BODY_ROWS, body_power_row, body_stored_row
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_kinematics import centre_of, joint_coordinate, joint_parameters, point_at
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels import moving_frames as layout
+from fvsolve.core.kernels.dtypes import BODY_VALUE, POINT_VALUE, SURFACE_VALUE, TANK_OUT
+from fvsolve.core.kernels.energy_rows import device_power_row, device_stored_row
+from fvsolve.core.kernels.moving_frames import body_row
+from fvsolve.core.kernels.vectors import (
     cross,
     dot,
     minus,
@@ -28,9 +27,11 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector,
     vector_product,
 )
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.body_kinematics import centre_of, joint_coordinate, joint_parameters, point_at
+from fvsolve.features.motion.kernels.tables import FREE, PRISMATIC, open_motion
 from fvsolve.jit import njit
 
+BODY_ROWS = 3  # rows of `power` for each body
 BODY_QUANTITIES = (
     "x", "y", "z", "roll", "pitch", "yaw", "eta", "eps_x", "eps_y", "eps_z", "vx", "vy", "vz", "wx", "wy", "wz",
     "ax", "ay", "az", "angle", "rate", "joint_fx", "joint_fy", "joint_fz", "joint_tx", "joint_ty", "joint_tz",
@@ -278,7 +279,7 @@ def surface_value(y, tables, probe):
 @njit
 def observe_bodies(t, y, out, handle, values):
     """Write the values of the probes of bodies, their points, and water surfaces of sloshing models to `values`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     probes = tables.probes
     for k in range(probes.size):
         if probes[k]["kind"] == BODY_VALUE:
@@ -339,9 +340,9 @@ def joint_damping_power(body, y):
 @njit
 def power_bodies(t, y, dydt, out, handle, power):
     """Write three powers of each body to `power` [W]: rate of stored energy, joint damping, joint drive."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
-    at = body_power_row(tables, power)
+    at = device_power_row(tables, power) - BODY_ROWS * tables.bodies.size
     for i in range(bodies.size):
         power[at] = body_energy_rate(bodies[i], out, body_row(tables, i), gravity)
         if bodies[i]["stiffness"] > 0.0:
@@ -354,9 +355,9 @@ def power_bodies(t, y, dydt, out, handle, power):
 @njit
 def stored_bodies(t, y, dydt, out, handle, stored):
     """Write the change of kinetic, potential and spring energy of each body since the start [J] to `stored`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
-    at = body_stored_row(tables, stored)
+    at = device_stored_row(tables, stored) - tables.bodies.size
     for i in range(bodies.size):
         body, here = bodies[i], body_row(tables, i)
         z = out[here + layout.POSITION + 2] + centre_of(body, out, here)[2]

@@ -7,7 +7,7 @@ e / (rho0 V) under the density law `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0
 0 marks initial values. For a piston between points of bodies the state is the mass itself, which a closed chamber
 conserves to the last bit. The force of a spring, stop or piston follows from its change of length (travel) in `out`: on
 the axis from the positions of two masses, between bodies from two points, written by
-`kernels.mechanism.body_kinematics`. Its two masses are then the same fixed frame, on which the net force is zero.
+`body_kinematics`. Its two masses are then the same fixed frame, on which the net force is zero.
 """
 
 from math import log, log1p, sqrt
@@ -15,7 +15,7 @@ from math import log, log1p, sqrt
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.density import density, log_density, pressure_of_log
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.tables import open_motion
 from fvsolve.jit import njit
 
 CONTACT_STEPS = (
@@ -53,7 +53,7 @@ def travel_of(out, tables, k):
 def write_travels(y, out, tables):
     """Write the change of length of all force elements between masses, and its rate, to `out`.
 
-    Elements between points of bodies are written by `kernels.mechanism.body_kinematics`.
+    Elements between points of bodies are written by `body_kinematics`.
     """
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     at = tables.layout[0]["travel"]
@@ -145,7 +145,7 @@ def piston_chambers(t, y, dydt, out, handle):
     contains only the change of the leak since the start. A piston between points of bodies takes no flow, because the
     state of its chambers is their mass. First, `write_travels` writes the travels of force elements between masses.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
     write_travels(y, out, tables)
     for k in range(pistons.size):
@@ -198,8 +198,8 @@ def forces(t, y, out, tables):
         if brace["schedule"] >= 0:
             change += schedule_value(tables, brace["schedule"], t) - brace["given"]
         add_push(out, tables, k, brace["from_mass"], brace["to_mass"], change, brace["force"])
-    # The flags of stops are the last ones, two for each stop.
-    first = armed.size - 2 * stops.size
+    # The flags of stops, two for each stop.
+    first = tables.motion_settings[0]["flag"]
     for k in range(stops.size):
         stop = stops[k]
         x, speed = stop_travel(out, tables, k)
@@ -240,7 +240,7 @@ def push_stiffness(out, tables, k):
         return braces[k]["stiffness"], braces[k]["damping"]
     k -= braces.size
     if k < stops.size:
-        first = armed.size - 2 * (stops.size - k)
+        first = tables.motion_settings[0]["flag"] + 2 * k
         if armed[first] + armed[first + 1] > 0.0:
             return stops[k]["stiffness"], stops[k]["damping"]
         return 0.0, 0.0
@@ -286,7 +286,7 @@ def contact_rate(out, tables):
     exceeds x_0. A load at rest on a stop does not limit the step.
     """
     masses, stops, armed = tables.masses, tables.stops, tables.armed
-    net, first, greatest = tables.layout[0]["net_force"], armed.size - 2 * stops.size, 0.0
+    net, first, greatest = tables.layout[0]["net_force"], tables.motion_settings[0]["flag"], 0.0
     for k in range(stops.size):
         stop = stops[k]
         i, j = stop["from_mass"], stop["to_mass"]
@@ -316,7 +316,7 @@ def mass_rates(t, y, dydt, out, handle):
     A given step is divided while a contact lasts, by out[CLOSING].
     STATUS is NO_VOLUME if a piston has used up its chamber.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
     if out[rec.RATE] != rec.RATE_UNWANTED:
@@ -341,7 +341,7 @@ def mass_rates(t, y, dydt, out, handle):
 @njit
 def observe_masses(t, y, out, handle, values):
     """Write the values of the probes of masses, force elements and pistons to `values`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
@@ -360,10 +360,9 @@ def observe_masses(t, y, out, handle, values):
 @njit
 def record_masses(t, y, out, handle, values):
     """Record the first time at which each piston leaves its stroke, in `marks`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     marks, pistons = tables.marks, tables.pistons
-    # Marks of pistons follow those of pipes, nodes and columns.
-    first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
+    first = tables.motion_settings[0]["mark"]
     for k in range(pistons.size):
         piston, at = pistons[k], first + k
         x = piston["position"] + piston_travel(out, tables, k)[0]
@@ -372,13 +371,19 @@ def record_masses(t, y, out, handle, values):
 
 
 @njit
+def forces_for_events(t, y, out, handle, g):
+    """Write all element forces and net forces to `out`, for sources of networks that read them; g is not used."""
+    forces(t, y, out, open_motion(handle))
+
+
+@njit
 def mass_events(t, y, out, handle, g):
     """Write the event functions of stops to g: remaining free travel to each of their two sides [m]."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     stops = tables.stops
     # No rates have been computed at the state of an event, so travels are written here.
     write_travels(y, out, tables)
-    first = g.size - 2 * stops.size
+    first = tables.motion_settings[0]["flag"]
     for k in range(stops.size):
         x, _ = stop_travel(out, tables, k)
         g[first + 2 * k], g[first + 2 * k + 1] = stops[k]["below"] + x, stops[k]["above"] - x

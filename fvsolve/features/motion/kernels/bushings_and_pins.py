@@ -27,14 +27,11 @@ lambda.
 
 from math import sqrt
 
-from fvsolve.core.kernels.dtypes import ABOUT, BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
-from fvsolve.core.kernels.energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import mass_matrix as mass
-from fvsolve.core.kernels.mechanism.body_kinematics import body_of_point, point_at, spin_of
-from fvsolve.core.kernels.mechanism.body_layout import add_force, add_torque, body_row
-from fvsolve.core.kernels.mechanism.body_values import acceleration_at
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels import moving_frames as layout
+from fvsolve.core.kernels.dtypes import BUSHING_VALUE, PIN_VALUE, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.energy_rows import device_power_row, device_stored_row
+from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
+from fvsolve.core.kernels.vectors import (
     cross,
     minus,
     plus,
@@ -44,8 +41,13 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector,
     vector_product,
 )
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels import mass_matrix as mass
+from fvsolve.features.motion.kernels.body_kinematics import body_of_point, point_at, spin_of
+from fvsolve.features.motion.kernels.body_values import BODY_ROWS, acceleration_at
+from fvsolve.features.motion.kernels.tables import ABOUT, open_motion
 from fvsolve.jit import njit
+
+BUSHING_ROWS = 2  # rows of `power` for each bushing
 
 
 @njit(forceinline=True)
@@ -63,7 +65,7 @@ def add_element_end_force(out, tables, k, acts, f):
 @njit
 def add_element_forces(t, y, dydt, out, handle):
     """Add the forces of all elements to their bodies: along their direction at `to`, opposite to it at `from`."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     offsets, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
         line = lines[k]
@@ -169,7 +171,7 @@ def bushing_loads(out, tables, bushing):
 @njit
 def add_bushing_loads(t, y, dydt, out, handle):
     """Add the forces and torques of all bushings to their bodies."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bushings = tables.bushings
     for k in range(bushings.size):
         force, torque = bushing_loads(out, tables, bushings[k])
@@ -186,7 +188,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
     """
     if out[RATE] == RATE_UNWANTED:
         return
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bushings, at = tables.bushings, 7 * tables.freedoms.size
     stiffness, damping, none = 0.0, 0.0, (0.0, 0.0, 0.0)
     for k in range(bushings.size):
@@ -211,7 +213,7 @@ def bushing_rate_limit(t, y, dydt, out, handle):
 @njit
 def observe_bushings(t, y, out, handle, values):
     """Write probe values of bushings: magnitude of gap [m], force [N] or torque [N m]."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     probes = tables.probes
     for k in range(probes.size):
         if probes[k]["kind"] == BUSHING_VALUE:
@@ -227,8 +229,9 @@ def observe_bushings(t, y, out, handle, values):
 @njit
 def power_bushings(t, y, dydt, out, handle, power):
     """Write two entries of `power` for each bushing [W]: rate of stored energy, dissipated power."""
-    tables = open_tables(handle)
-    at = bushing_power_row(tables, power)
+    tables = open_motion(handle)
+    # Bushings come before bodies, and these before devices.
+    at = device_power_row(tables, power) - BODY_ROWS * tables.bodies.size - BUSHING_ROWS * tables.bushings.size
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
         gap, rate, _ = bushing_motion(out, tables, bushing)
@@ -246,8 +249,8 @@ def stored_bushings(t, y, dydt, out, handle, stored):
 
     k [N/m], k_turn [N m/rad] : stiffnesses of the bushing; eps : vector of the Euler parameters of its rotation
     """
-    tables = open_tables(handle)
-    at = bushing_stored_row(tables, stored)
+    tables = open_motion(handle)
+    at = device_stored_row(tables, stored) - tables.bodies.size - tables.bushings.size
     for k in range(tables.bushings.size):
         bushing, gap = tables.bushings[k], bushing_motion(out, tables, tables.bushings[k])[0]
         eps = rotation_deviation(out, tables, bushing)[2]
@@ -359,7 +362,7 @@ def start_gaps(t, y, dydt, out, handle):
 
     It is the whole displacement, not its change since the start.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
         gap = relative_motion(out, tables, pins[k])[0]
@@ -370,7 +373,7 @@ def start_gaps(t, y, dydt, out, handle):
 @njit
 def add_start_pin_forces(t, y, dydt, out, handle):
     """Add the pin forces at the start to the forces on bodies, along the directions of the pins at the state y."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins = tables.pins
     for k in range(pins.size):
         for r in range(pins[k]["rows"]):
@@ -384,7 +387,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
 
     The pin forces [N] are also added to the loads of bodies. out[RATE] is raised by `body_rate_limit` and to `pull`.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     # lambda is then the change of the pin forces since the start, which is zero in an equilibrium.
     add_start_pin_forces(t, y, dydt, out, handle)
@@ -425,7 +428,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
 @njit
 def observe_pins(t, y, out, handle, values):
     """Write probe values of pins: magnitude of gap [m] or force [N], in the constrained directions."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     probes, pins = tables.probes, tables.pins
     for k in range(probes.size):
         if probes[k]["kind"] == PIN_VALUE:

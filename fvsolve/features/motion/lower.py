@@ -7,10 +7,15 @@ import numpy as np
 
 from fvsolve.case import bodies
 from fvsolve.case.bodies import free_joints
-from fvsolve.core.assembly.mechanics import PLAIN_LINE, are_points, distance_and_rate, push_ends
+from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.assembly.schedule_tables import break_times
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.static_forces import DRIVES, MOTION, StaticForces, pin_rows, rounding
+from fvsolve.features.motion.kernels import tables as records
+from fvsolve.features.motion.kernels.tables import motion_of
+from fvsolve.features.motion.ports import PLAIN_LINE, distance_and_rate
+from fvsolve.features.motion.static_forces import DRIVES, MOTION, StaticForces, pin_rows
+from fvsolve.parts import law_elements as codes
+from fvsolve.parts.network_elements import fill_network_probe
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.units import show
 
@@ -22,22 +27,25 @@ SMALL_ANGLE, SMALL_SPIN = 1e-3, 0.1
 
 def lower_masses(draft) -> None:
     """Fill the tables of masses, braces (springs, dampers, forces), stops and pistons."""
+    motion = motion_of(draft)
     case = draft.case
-    draft.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
-    draft.mass_index = {name: i for i, name in enumerate(draft.mass_names)}
+    motion.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
+    motion.mass_index = {name: i for i, name in enumerate(motion.mass_names)}
     pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in draft.links.get(table, ())]
-    outside = any(None in push_ends(link) or are_points(draft, *push_ends(link)) for link in pushes)
-    draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
-    draft.mass_index |= {None: len(draft.mass_names)}
-    for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
+    ports = [link.ports for link in pushes]
+    ends = [(own["case"], own["rod"]) if "rod" in own else (own.get("from"), own["to"]) for own in ports]
+    outside = any(place not in motion.mass_index for both in ends for place in both)  # points, or None
+    motion.mass_table = np.zeros(len(motion.mass_names) + outside, records.MASS)
+    motion.mass_index |= {None: len(motion.mass_names)}
+    for name, row in zip(motion.mass_names, motion.mass_table, strict=False):
         node = case.nodes_with_water[name]
         row["position"] = node.initial_position
         if (mass := getattr(node, "mass", None)) is not None:  # a frame is fixed
             row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / mass
-    braces, draft.brace_table = draft.fill("brace", rec.BRACE)
-    stops, draft.stop_table = draft.fill("stop", rec.STOP)
-    draft.piston_names, draft.piston_table = draft.fill("piston", rec.PISTON)
-    draft.push_names = [*braces, *stops, *draft.piston_names]
+    braces, motion.brace_table = draft.fill("brace", records.BRACE)
+    stops, motion.stop_table = draft.fill("stop", records.STOP)
+    motion.piston_names, motion.piston_table = draft.fill("piston", records.PISTON)
+    motion.push_names = [*braces, *stops, *motion.piston_names]
     add_states(draft)
 
 
@@ -47,18 +55,19 @@ def add_states(draft) -> None:
     A small travel changes the pressure of an adjacent chamber by 1 bar; a small velocity belongs to an oscillation with
     this travel as amplitude.
     """
-    nodes, masses = draft.node_table, draft.mass_table
+    motion = motion_of(draft)
+    nodes, masses = draft.node_table, motion.mass_table
     travel, stiffness = np.full(len(masses), SMALL_TRAVEL), np.zeros(len(masses))
-    for row in draft.brace_table:
+    for row in motion.brace_table:
         stiffness[[row["from_mass"], row["to_mass"]]] += row["stiffness"]
-    for row in draft.piston_table:
+    for row in motion.piston_table:
         for node, area in ((nodes[row["a"]], row["area_a"]), (nodes[row["b"]], row["area_b"])):
             per_travel = draft.fluid.bulk_modulus * area / node["volume"]
             for mass in (row["case"], row["rod"]):
                 travel[mass] = min(travel[mass], SMALL_PRESSURE / per_travel)
                 stiffness[mass] += area * per_travel
     masses["y"] = -1
-    for i, name in enumerate(draft.mass_names):
+    for i, name in enumerate(motion.mass_names):
         if masses[i]["lightness"] > 0.0:
             speed = travel[i] * math.sqrt(stiffness[i] * masses[i]["lightness"]) if stiffness[i] > 0.0 else SMALL_SPEED
             masses[i]["y"] = draft.states([f"{name}.position"], travel[i])
@@ -67,8 +76,9 @@ def add_states(draft) -> None:
 
 def pushed_masses(draft) -> np.ndarray:
     """Indices of the masses that each force element joins : int64[elements, 2], braces, stops, then pistons."""
-    ends = ((draft.brace_table, "from_mass", "to_mass"), (draft.stop_table, "from_mass", "to_mass"),
-            (draft.piston_table, "case", "rod"))  # fmt: skip
+    motion = motion_of(draft)
+    ends = ((motion.brace_table, "from_mass", "to_mass"), (motion.stop_table, "from_mass", "to_mass"),
+            (motion.piston_table, "case", "rod"))  # fmt: skip
     return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
 
 
@@ -77,7 +87,8 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
 
     pushes : force of each element on its second mass [N], opposite on its first, in the order of `pushed_masses`
     """
-    total = np.zeros(len(draft.mass_table))
+    motion = motion_of(draft)
+    total = np.zeros(len(motion.mass_table))
     for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):
         total[first] -= push
         total[second] += push
@@ -89,12 +100,13 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
 
 def start_masses(draft, start) -> list[str]:
     """Set forces of elements and the unbalanced force on each mass at the start; return texts of motions."""
-    nodes, masses, ambient = draft.node_table, draft.mass_table, draft.case.ambient_pressure
+    motion = motion_of(draft)
+    nodes, masses, ambient = draft.node_table, motion.mass_table, draft.case.ambient_pressure
     size = np.zeros(len(masses))
-    for row in draft.brace_table:
+    for row in motion.brace_table:
         if row["schedule"] >= 0:
             row["given"] = row["force"] = start.schedule_value(row["schedule"])
-    for row in draft.piston_table:
+    for row in motion.piston_table:
         a, b = nodes[row["a"]], nodes[row["b"]]
         row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]
         row["sweep_b"] = -b["mass"] / b["volume"] * row["area_b"]
@@ -102,16 +114,16 @@ def start_masses(draft, start) -> list[str]:
         pushed, back = row["area_a"] * (a["pressure"] - ambient), row["area_b"] * (b["pressure"] - ambient)
         row["force"] = pushed - back - row["damping"] * row["speed"]
         size[[row["case"], row["rod"]]] += abs(pushed) + abs(back)
-    pushes = np.concatenate([table["force"] for table in (draft.brace_table, draft.stop_table, draft.piston_table)])
+    pushes = np.concatenate([table["force"] for table in (motion.brace_table, motion.stop_table, motion.piston_table)])
     total = forces_on_masses(draft, pushes)
     for push, ends in zip(pushes, pushed_masses(draft), strict=True):
         size[ends] += abs(push)
     for row in draft.wall_table:
         if row["mass"] >= 0:
             size[row["mass"]] += abs(row["rest"])
-    masses["force"] = np.where(np.abs(total) > rounding(draft) * size, total, 0.0)
+    masses["force"] = np.where(np.abs(total) > draft.rounding * size, total, 0.0)
     moving = []
-    for name, row in zip(draft.mass_names, masses, strict=False):
+    for name, row in zip(motion.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
             moving.append(f"mass {name} moves at {draft.case.amount(row['velocity'], 'velocity')}")
         in_network = name in draft.case.network_places  # its acceleration is in the texts of the network
@@ -131,20 +143,21 @@ def supporting_pressures(draft, start) -> dict[int, float]:
     a cylinder are closed, the chamber that does not push keeps the pressure of its closed links, or ambient pressure
     without links. A chamber that would need at most the `cavity_pressure` of the density law is left out.
     """
-    pistons = draft.locked
+    motion = motion_of(draft)
+    pistons = motion.locked
     if not pistons:
         return {}
     ambient, balance = draft.case.ambient_pressure, UnbalancedForces(draft, start.t)
-    first = len(draft.brace_table) + len(draft.stop_table)
-    pushes = np.zeros(first + len(draft.piston_table))
-    for k, row in enumerate([*draft.brace_table, *draft.stop_table]):
+    first = len(motion.brace_table) + len(motion.stop_table)
+    pushes = np.zeros(first + len(motion.piston_table))
+    for k, row in enumerate([*motion.brace_table, *motion.stop_table]):
         scheduled = "schedule" in row.dtype.names and row["schedule"] >= 0
         pushes[k] = start.schedule_value(row["schedule"]) if scheduled else row["force"]
-    gauge = {side: [start.pressure(int(row[side])) - ambient for row in draft.piston_table] for side in "ab"}
-    for k, row in enumerate(draft.piston_table):
+    gauge = {side: [start.pressure(int(row[side])) - ambient for row in motion.piston_table] for side in "ab"}
+    for k, row in enumerate(motion.piston_table):
         if k not in pistons:
             pushes[first + k] = row["area_a"] * gauge["a"][k] - row["area_b"] * gauge["b"][k]
-    size = draft.case.ambient_pressure * float(max(draft.piston_table["area_a"]))
+    size = draft.case.ambient_pressure * float(max(motion.piston_table["area_a"]))
     unit_pushes, base = size * np.eye(pushes.size)[first:], balance.under(0.0 * pushes)
     influence = np.array([balance.under(unit_pushes[k]) - base for k in pistons]).T / size
     # forces of pins are unknowns too, so pistons take none of their share
@@ -155,7 +168,7 @@ def supporting_pressures(draft, start) -> dict[int, float]:
         forces = forces - np.linalg.lstsq(influence, balance.under(pushes), rcond=None)[0][: forces.size]
     pressures = {}
     for (k, closed), force in zip(pistons.items(), forces, strict=True):
-        row = draft.piston_table[k]
+        row = motion.piston_table[k]
         side = closed[0] if len(closed) == 1 else "a" if force > 0.0 else "b"
         opposite, sign = ("b", 1.0) if side == "a" else ("a", -1.0)
         push = sign * force + row[f"area_{opposite}"] * gauge[opposite][k]
@@ -168,8 +181,10 @@ class UnbalancedForces:
     """Computes unbalanced forces on joint freedoms and free masses, for given forces of springs, stops and pistons."""
 
     def __init__(self, draft, t: float) -> None:
-        self.draft, self.free = draft, np.flatnonzero(draft.mass_table["y"] >= 0)
-        self.joints = StaticForces(draft, t) if len(draft.body_table) else None
+        motion = motion_of(draft)
+        self.draft, self.motion = draft, motion
+        self.free = np.flatnonzero(motion.mass_table["y"] >= 0)
+        self.joints = StaticForces(draft, t) if len(motion.body_table) else None
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
         """Unbalanced forces for given pushes [N] : float64[freedoms + masses], joints first."""
@@ -185,13 +200,14 @@ class UnbalancedForces:
 def find_closed_chambers(draft, start) -> None:
     """Record, for each piston, the sides with a closed chamber that can carry a load, and those with trapped fluid.
 
-    They are written to `draft.locked` and `draft.shut`, see `ModelDraft`.
+    They are written to `locked` and `shut`, see `Motion`.
     """
-    for k, row in enumerate(draft.piston_table):
+    motion = motion_of(draft)
+    for k, row in enumerate(motion.piston_table):
         closed = [side for side in "ab" if is_closed(draft, start, int(row[side]))]
         isolated = [side for side in "ab" if start.connected_nodes(int(row[side])) == [row[side]]]
-        draft.locked |= {k: closed} if closed else {}
-        draft.shut |= {k: isolated} if isolated else {}
+        motion.locked |= {k: closed} if closed else {}
+        motion.shut |= {k: isolated} if isolated else {}
 
 
 def is_closed(draft, start, i: int) -> bool:
@@ -202,7 +218,13 @@ def is_closed(draft, start, i: int) -> bool:
     return all(j == i or np.isnan(start.fixed_potentials[j]) for j in start.connected_nodes(i))
 
 
-KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
+KINDS = {
+    "revolute": records.REVOLUTE,
+    "prismatic": records.PRISMATIC,
+    "ball": records.BALL,
+    "free": records.FREE,
+    "fixed": records.WELD,
+}
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
 STATES = {  # for each kind: coordinates, then velocities, each with its size of a small deviation
     "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
@@ -216,15 +238,16 @@ STATES = {  # for each kind: coordinates, then velocities, each with its size of
 
 def lower_bodies(draft) -> None:
     """Fill the tables of bodies and of their degrees of freedom, each body after its parent body."""
+    motion = motion_of(draft)
     nodes = draft.case.nodes_with_water
-    draft.body_names = list(draft.case.poses)
-    table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
+    motion.body_names = list(draft.case.poses)
+    table = motion.body_table = np.zeros(len(motion.body_names), records.BODY)
     paths: list[list[int]] = []
     chains: list[list[int]] = []  # for each body, the freedoms from its root to it
-    for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
+    for i, (name, row) in enumerate(zip(motion.body_names, table, strict=True)):
         body = nodes[name]
         parent_name = bodies.carrier_of(body)[0]
-        row["parent"] = draft.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
+        row["parent"] = motion.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
         row["freedom"] = len(paths)
@@ -233,29 +256,13 @@ def lower_bodies(draft) -> None:
             path = [*path, len(paths)]
             paths.append(path)
         chains.append(path)
-    freedoms = draft.freedom_table = np.zeros(len(paths), rec.FREEDOM)
+    freedoms = motion.freedom_table = np.zeros(len(paths), records.FREEDOM)
     at = 0
     for row, path in zip(freedoms, paths, strict=True):
         row["depth"], row["path"], row["row"] = len(path) - 1, len(draft.integers), at
         draft.integers += path
         at += len(path)
-    draft.factor_size = at
-
-
-def reserve_mechanics(draft) -> None:
-    """Reserve the arrays of masses and bodies, of force elements and pins, and of pipes on bodies."""
-    pushes, masses, bodies = len(draft.push_names), len(draft.mass_table), len(draft.body_table)
-    for name, size in (
-        ("net_force", masses), ("push", pushes), ("moving_segment", len(draft.moving_segment_table)),
-        ("travel", 2 * pushes), ("along", 3 * len(draft.line_table)), ("pin", 3 * len(draft.pin_table)),
-        ("body", rec.BODY_OUT * bodies),
-    ):  # fmt: skip
-        draft.sizes.out(name, size)
-    constraints, freedoms = int(sum(draft.pin_table["rows"])), len(draft.freedom_table)
-    spatial = 8 * freedoms + draft.factor_size + 16 * bodies
-    spatial += constraints * (2 * freedoms + constraints + 1)
-    draft.sizes.need_scratch(max(spatial, 18 if bodies else 0))
-    draft.sizes.need_scratch(2 * masses)
+    motion.factor_size = at
 
 
 def fill_body(draft, name: str, body: Any, row) -> None:
@@ -294,7 +301,7 @@ def drive_joint(draft, name: str, schedule, row) -> None:
     Adds a fault if the value or the rate of the schedule jumps during the run, because this needs an infinite force.
     """
     row["schedule"] = draft.schedules.add(schedule)
-    key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
+    key = "travel" if row["joint"] == records.PRISMATIC else "angle"
     start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
     if schedule.kind == "formula" and schedule.program.kinks:
         text = f"{show(schedule.program.text)} drives the joint, and has kinks, which need an infinite force"
@@ -324,18 +331,19 @@ def rate_jumps(schedule) -> list[tuple[float, bool]]:
 
 def lower_lines(draft) -> None:
     """Fill the tables of pins and bushings; write the number of its force element to each line of action."""
-    draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
-    draft.bushing_names, draft.bushing_table = draft.fill("bushing", rec.BUSHING)
-    for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
+    motion = motion_of(draft)
+    motion.pin_names, motion.pin_table = draft.fill("pin", records.PIN)
+    motion.bushing_names, motion.bushing_table = draft.fill("bushing", records.BUSHING)
+    for name, row in zip(motion.bushing_names, motion.bushing_table, strict=True):
         link = draft.case.links[name]
         row["energy"] = 0.5 * row["stiffness"] * distance_and_rate(draft, (link.from_, link.to), PLAIN_LINE)[0] ** 2
         if draft.case.equilibrium_nodes:
             row["energy"] += 2.0 * row["turn_stiffness"] * relative_turn(draft, (link.from_, link.to))
-    draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
-    rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
+    motion.line_table = np.array(motion.lines, records.LINE) if motion.lines else np.zeros(0, records.LINE)
+    rows = [row for table in (motion.brace_table, motion.stop_table, motion.piston_table) for row in table]
     for k, row in enumerate(rows):
         if row["line"] >= 0:
-            draft.line_table[row["line"]]["push"] = k
+            motion.line_table[row["line"]]["push"] = k
 
 
 def relative_turn(draft, places: tuple[str, str]) -> float:
@@ -355,6 +363,7 @@ def lower_moving_segments(draft) -> None:
 
     Adds faults if a probe reads forces of joints, but the force of a part on its body is not modelled.
     """
+    motion = motion_of(draft)
     rows: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
     for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),
@@ -363,7 +372,7 @@ def lower_moving_segments(draft) -> None:
         first, last = places[link.from_], places[link.to]
         if getattr(first, "on", None) is None:
             continue
-        row["moving_segment"] = len(rows)
+        row["forcing"] = len(rows)
         ends = np.array(first.place), np.array(last.place)
         if "cells" in row.dtype.names:
             shares = np.linspace(0.0, 1.0, int(row["cells"]) + 1)[:, None]
@@ -371,17 +380,19 @@ def lower_moving_segments(draft) -> None:
             rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
         else:
             points = np.array([ends[0], *link.route, ends[1]])
-            row["moving_segments"] = len(points) - 1
+            row["forcings"] = len(points) - 1
             rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
         if getattr(node, "on", None) is None or row["kind"] == rec.PATCH:
             continue
-        row["moving_segment"] = len(rows)
+        row["forcing"] = len(rows)
         foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
         points = np.array([foot, foot + [0.0, 0.0, high]])
         body, start, end, swept, rise, heavy = moving_segment_row(draft, node.on, points)
         rows.append((body, start, end, swept, -rise, heavy))
-    draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
+    motion.moving_segment_table = (
+        np.array(rows, records.MOVING_SEGMENT) if rows else np.zeros(0, records.MOVING_SEGMENT)
+    )
     if reads_joint_forces(draft):
         for place, text in bodies.missing_reactions(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"a probe reads forces of joints, but {text}")
@@ -394,28 +405,63 @@ def reads_joint_forces(draft) -> bool:
 
 def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
     """Row of the table `moving_segments` for a straight line between two points, given in axes of the body `on` [m]."""
+    motion = motion_of(draft)
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
-    heavy = rec.MOVED_BY_FORCES if any(free_joints(on, draft.case.nodes)) else 0
-    heavy = rec.JOINT_LOAD_READ if reads_joint_forces(draft) else heavy
-    return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
+    heavy = records.MOVED_BY_FORCES if any(free_joints(on, draft.case.nodes)) else 0
+    heavy = records.JOINT_LOAD_READ if reads_joint_forces(draft) else heavy
+    return motion.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
 
 
 def driven_at_start(draft, start) -> list[str]:
     """Texts of pipes and rigid columns whose flow is driven by the motion of their body at the start."""
-    if not len(draft.moving_segment_table):
+    motion = motion_of(draft)
+    if not len(motion.moving_segment_table):
         return []
     at = StaticForces(draft, start.t)
     at.run(MOTION, DRIVES)
-    first, rho = int(at.layout["moving_segment"]), draft.fluid.density
-    drives = at.out[first : first + len(draft.moving_segment_table)]
+    first, rho = int(at.layout["forcing"]), draft.fluid.density
+    drives = at.out[first : first + len(motion.moving_segment_table)]
     texts = []
     for kind, names, table in (("pipe", draft.pipe_names, draft.pipe_table),
                                ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
         for name, row in zip(names, table, strict=True):
-            if row["moving_segment"] >= 0:
-                count = int(row["cells" if "cells" in row.dtype.names else "moving_segments"])
-                push = float(drives[row["moving_segment"] : row["moving_segment"] + count].sum())
+            if row["forcing"] >= 0:
+                count = int(row["cells" if "cells" in row.dtype.names else "forcings"])
+                push = float(drives[row["forcing"] : row["forcing"] + count].sum())
                 if abs(push) > ROUNDING:
                     texts.append(f"{kind} {name}: the motion of its body drives its flow with "
                                  f"{draft.case.amount(rho * push, 'pressure', span=True)}")  # fmt: skip
     return texts
+
+
+LINK_PROBES = {"pin": (rec.PIN_VALUE, ("gap", "force")), "bushing": (rec.BUSHING_VALUE, ("gap", "force", "torque"))}
+
+
+def lower_link_probe(draft, row, probe) -> bool:
+    """Fill the row of a probe of a force element, a pin or a bushing; False for other links."""
+    motion, link = motion_of(draft), draft.case.links[probe.name]
+    table = lowering_of(type(link)).of(link).table
+    if table in LINK_PROBES:
+        row["kind"], quantities = LINK_PROBES[table]
+        row["side"] = quantities.index(probe.quantity)
+        row["index"] = (motion.pin_names if table == "pin" else motion.bushing_names).index(probe.name)
+    elif table == "piston" and probe.quantity != "force":
+        row["index"] = motion.piston_names.index(probe.name)
+        row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY
+    elif table == "piston" and link.has_dry_friction:
+        fill_network_probe(draft, row, f"links.{probe.name}", "all flows")
+        row["side"], row["cell"] = codes.NET_PUSH, motion.push_names.index(probe.name)
+    elif table in ("brace", "stop", "piston"):
+        row["kind"], row["index"] = rec.FORCE, motion.push_names.index(probe.name)
+    else:
+        return False
+    return True
+
+
+def pose_facts(pose) -> dict[str, float]:
+    """Position, attitude, speed and angular speed of a body at the start."""
+    place = dict(zip("xyz", pose.place.tolist(), strict=True))
+    from fvsolve.attitude import roll_pitch_yaw
+
+    angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
+    return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}

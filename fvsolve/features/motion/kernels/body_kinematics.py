@@ -11,12 +11,12 @@ q'' = 0. The axes of a joint are in scratch[9:18], see `set_joint_frame`.
 
 from math import cos, sin, sqrt
 
-from fvsolve.core.kernels.dtypes import ABOUT, ALONG, BALL, BODY_OUT, FREE, PRISMATIC, REVOLUTE
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.vectors import add_vector, cross, minus, plus, rotate, scaled, vector, write_vector
+from fvsolve.core.kernels import moving_frames as layout
+from fvsolve.core.kernels.dtypes import BODY_OUT
+from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes, schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import add_vector, cross, minus, plus, rotate, scaled, vector, write_vector
+from fvsolve.features.motion.kernels.tables import ABOUT, ALONG, BALL, FREE, PRISMATIC, REVOLUTE, open_motion
 from fvsolve.jit import njit
 
 
@@ -288,7 +288,7 @@ def kinematics(t, y, dydt, out, handle):
 
     The sums FORCE and TORQUE of each body are set to its weight. See `body_layout` and `update_elements`.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     # Parents come before the bodies that they carry.
     for i in range(bodies.size):

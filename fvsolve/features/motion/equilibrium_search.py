@@ -22,24 +22,26 @@ import numpy as np
 from fvsolve import attitude, units
 from fvsolve.case import checks
 from fvsolve.case.bodies import joint_coordinate
+from fvsolve.core.assembly.model_draft import EQUILIBRIUM_SHARE, ROUNDING_SHARE
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.mechanics_tables import pushed_masses
-from fvsolve.core.model.static_forces import (
-    EQUILIBRIUM_SHARE,
+from fvsolve.errors import Notice
+from fvsolve.features.motion.kernels import tables as records
+from fvsolve.features.motion.kernels.tables import motion_of
+from fvsolve.features.motion.lower import pushed_masses
+from fvsolve.features.motion.static_forces import (
+    FOLDER,
     GAPS,
     HOLD,
     LINES,
     MOTION,
     RANK_TOLERANCE,
-    ROUNDING_SHARE,
     StaticForces,
 )
-from fvsolve.errors import Notice
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
-CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
+CHAMBERS, PUSHES = f"{FOLDER}.mass_dynamics: piston_chambers", f"{FOLDER}.mass_dynamics: mass_rates"
 
 
 class Configuration(StaticForces):
@@ -51,16 +53,17 @@ class Configuration(StaticForces):
     """
 
     def __init__(self, draft) -> None:
+        motion = motion_of(draft)
         super().__init__(draft, draft.case.numerics.start)
-        self.bodies, self.masses = draft.body_table, draft.mass_table
-        self.freedoms = len(draft.freedom_table)
+        self.bodies, self.masses = motion.body_table, motion.mass_table
+        self.freedoms = len(motion.freedom_table)
         self.free = np.flatnonzero(self.masses["y"] >= 0)
         self.size = self.freedoms + len(self.free)
-        draft.freedom_table["balance"] = 0.0
+        motion.freedom_table["balance"] = 0.0
         self.written.armed[:] = 1.0  # with flags set, a stop without contact exerts no force
-        self.locked, self.pins = list(draft.locked), int(draft.pin_table["rows"].sum())
-        self.starting_forces = [draft.piston_table[k]["force"].item() for k in self.locked]
-        self.first = len(draft.brace_table) + len(draft.stop_table)
+        self.locked, self.pins = list(motion.locked), int(motion.pin_table["rows"].sum())
+        self.starting_forces = [motion.piston_table[k]["force"].item() for k in self.locked]
+        self.first = len(motion.brace_table) + len(motion.stop_table)
         self.count = self.pins + len(self.locked)
         self.by_features = np.zeros(len(self.masses))
         self.hold(np.zeros(self.count))
@@ -71,18 +74,18 @@ class Configuration(StaticForces):
         They are the forces of pins, then the forces of supporting pistons in addition to those at the start.
         """
         at = 0
-        for row in self.draft.pin_table:
+        for row in self.motion.pin_table:
             row["force"][: row["rows"]] = sizes[at : at + row["rows"]]
             at += int(row["rows"])
         for k, own, size in zip(self.locked, self.starting_forces, sizes[at:], strict=True):
-            self.draft.piston_table[k]["force"] = own + size
+            self.motion.piston_table[k]["force"] = own + size
 
     def move_to(self, y: np.ndarray) -> None:
         """Move bodies and lines of action to a configuration, with level water and the pressures of the start."""
         self.y[:] = y
         self.run(*(MOTION,) * (self.freedoms > 0), *(CHAMBERS,) * (len(self.masses) > 0))
         first = int(self.layout["pressure"])
-        for row in self.draft.piston_table:
+        for row in self.motion.piston_table:
             self.out[[first + row["a"], first + row["b"]]] = 0.0
         for feature in self.draft.features:
             feature.level(self.draft, self.y, self.attitudes)
@@ -94,7 +97,7 @@ class Configuration(StaticForces):
             self.run(PUSHES)
         own = np.zeros(0)
         if self.freedoms:
-            self.run(*self.pushes[1:], *(HOLD,) * (len(self.draft.pin_table) > 0))
+            self.run(*self.pushes[1:], *(HOLD,) * (len(self.motion.pin_table) > 0))
             own = self.forces()
         net = self.out[int(self.layout["net_force"]) :][: len(self.masses)].copy()
         self.by_features[:] = self.forces_of_features(net)
@@ -111,7 +114,7 @@ class Configuration(StaticForces):
         masses["force"] = net
         for feature in self.draft.features:
             for name, acceleration in feature.accelerations(self.draft).items():
-                i = self.draft.mass_index[name]
+                i = self.motion.mass_index[name]
                 forces[i] = acceleration / masses["lightness"][i] - net[i]
         masses["position"], masses["force"] = before
         return forces
@@ -122,13 +125,13 @@ class Configuration(StaticForces):
         It is that in the configuration of the last call of `move_to` or `force`.
         """
         sizes, first = np.zeros(self.size), int(self.layout["push"])
-        pushes = self.out[first : first + len(self.draft.push_names)].copy()
+        pushes = self.out[first : first + len(self.motion.push_names)].copy()
         if self.freedoms:
             sizes[: self.freedoms] = self.sizes(pushes)
         net = sizes[self.freedoms :]
         for push, ends in zip(pushes, pushed_masses(self.draft), strict=True):
             net += abs(push) * np.isin(self.free, ends)
-        for row in self.draft.piston_table:
+        for row in self.motion.piston_table:
             parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
             net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
         net += np.abs(self.by_features[self.free])
@@ -158,14 +161,14 @@ class Configuration(StaticForces):
 
     def lever(self, k: int) -> np.ndarray:
         """Generalised forces that a push of 1 N of piston k causes in the current configuration : float64[size]."""
-        effects, piston = np.zeros(self.size), self.draft.piston_table[k]
+        effects, piston = np.zeros(self.size), self.motion.piston_table[k]
         if piston["line"] < 0:
             for mass, sign in ((piston["case"], -1.0), (piston["rod"], 1.0)):
                 effects[self.freedoms :] += sign * (self.free == mass)
             return effects
         base, first = self.by(np.zeros_like(self.loads())), int(self.layout["push"])
         self.loads()[:] = 0.0
-        self.out[first : first + len(self.draft.push_names)] = 0.0
+        self.out[first : first + len(self.motion.push_names)] = 0.0
         self.out[first + self.first + k] = 1.0
         self.run(LINES)
         effects[: self.freedoms] = self.forces() - base
@@ -179,8 +182,8 @@ class Configuration(StaticForces):
         matrix, nodes, first = np.zeros((self.size, self.size)), self.draft.node_table, int(self.layout["stiffness"])
         self.move_to(np.zeros_like(y))
         per_mass = self.out[first : first + self.draft.moving].copy()  # with chambers at their starting mass
-        for k, sides in self.draft.shut.items():
-            row = self.draft.piston_table[k]
+        for k, sides in self.motion.shut.items():
+            row = self.motion.piston_table[k]
             self.move_to(y)
             travel = self.out[int(self.layout["travel"]) + 2 * (self.first + k)]
             lever, stiffness = self.lever(k), 0.0
@@ -195,10 +198,10 @@ class Configuration(StaticForces):
         """Gaps of pins, then travel of supporting pistons, in a configuration : float64[constraints] [m]."""
         self.move_to(y)
         pin_gaps, travel = [], int(self.layout["travel"])
-        if len(self.draft.pin_table):
+        if len(self.motion.pin_table):
             self.run(GAPS)
             at = int(self.layout["pin"])
-            rows = enumerate(self.draft.pin_table)
+            rows = enumerate(self.motion.pin_table)
             pin_gaps = [self.out[at + 3 * k + r] for k, row in rows for r in range(row["rows"])]
         return np.array([*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)])
 
@@ -207,7 +210,7 @@ class Configuration(StaticForces):
         matrix, n = np.zeros((self.size, self.size)), self.freedoms
         if n:
             self.force(y)
-        for j, row in enumerate(self.draft.freedom_table):
+        for j, row in enumerate(self.motion.freedom_table):
             path = self.draft.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
             matrix[j, path] = matrix[path, j] = self.written.scratch[8 * n + row["row"] :][: row["depth"] + 1]
         matrix[range(n, self.size), range(n, self.size)] = 1.0 / self.masses["lightness"][self.free]
@@ -236,8 +239,8 @@ class Configuration(StaticForces):
         new = y.copy()
         for row in self.bodies:
             own, at = step[row["freedom"] : row["freedom"] + row["freedoms"]], int(row["y"])
-            if row["joint"] in (rec.BALL, rec.FREE):
-                slides = 3 if row["joint"] == rec.FREE else 0
+            if row["joint"] in (records.BALL, records.FREE):
+                slides = 3 if row["joint"] == records.FREE else 0
                 new[at : at + slides] += own[:slides]
                 at += slides
                 start = row["start"][slides : slides + 4]
@@ -251,21 +254,21 @@ class Configuration(StaticForces):
         """True for each unknown that is an angle : bool[size]."""
         angular = np.zeros(self.size, bool)
         for row in self.bodies:
-            slides = {rec.FREE: 3, rec.PRISMATIC: 1}.get(int(row["joint"]), 0)
+            slides = {records.FREE: 3, records.PRISMATIC: 1}.get(int(row["joint"]), 0)
             angular[row["freedom"] + slides : row["freedom"] + row["freedoms"]] = True
         return angular
 
     def shortest(self) -> float:
         """Length of the shortest line of action between two points at the start [m]; infinite without lines."""
-        lengths = self.draft.line_table["length"][self.draft.line_table["acts"] == rec.ALONG]
+        lengths = self.motion.line_table["length"][self.motion.line_table["acts"] == records.ALONG]
         return float(min(lengths, default=np.inf))
 
     def attitudes(self) -> dict[str, np.ndarray]:
         """Rotation matrix of every body in the current configuration : name -> float64[3, 3]."""
-        from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE
+        from fvsolve.core.kernels.moving_frames import ATTITUDE
 
         return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
-                for i, name in enumerate(self.draft.body_names)}  # fmt: skip
+                for i, name in enumerate(self.motion.body_names)}  # fmt: skip
 
 
 def rotated(e: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -282,26 +285,26 @@ MOVE_TOLERANCE = 1e-15  # smaller changes of a length or an angle count as none,
 def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
     """Bodies and masses that moved in the search, with their new positions : name -> part; y : state vector found."""
     draft, nodes = at.draft, {}
-    for name, row in zip(draft.body_names, at.bodies, strict=True):
+    for name, row in zip(at.motion.body_names, at.bodies, strict=True):
         body, first = draft.case.nodes.get(name), int(row["y"])
-        count = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
+        count = {records.BALL: 4, records.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
         moves = np.abs(y[first : first + count]) > MOVE_TOLERANCE * (1.0 + np.abs(row["start"][:count]))
         if body is not None and np.any(moves):
             change = joint_keys(body.joint, row, row["start"][:count] + y[first : first + count])
             nodes[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
     distance = np.abs(y[at.masses["y"][at.free]])
     for i in at.free[distance > MOVE_TOLERANCE * (1.0 + np.abs(at.masses["position"][at.free]))]:
-        name, place = draft.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
+        name, place = at.motion.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
         nodes[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
     return nodes
 
 
 def joint_keys(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
     """Keys of a joint with the values that follow from its coordinates q : key -> value."""
-    if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
-        return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
+    if row["joint"] in (records.REVOLUTE, records.PRISMATIC):
+        return {"angle" if row["joint"] == records.REVOLUTE else "travel": constant(float(q[0]))}
     turn = attitude.of_euler_parameters(q[-4:])
-    if row["joint"] == rec.FREE:
+    if row["joint"] == records.FREE:
         place = q[:3] - turn @ row["centre"]
         return {"at": tuple(place.tolist()), "attitude": attitude_from(turn)}
     return {"attitude": attitude_from(joint.attitude.rotation @ turn)}
@@ -355,9 +358,9 @@ def coordinate_notice(case, name: str, key: str, before: float, now: float, dime
 def owner_name(at: Configuration, unknown: int) -> str:
     """Name of the body or mass to which an unknown belongs; for a sloshing mode the name of its basin."""
     if unknown >= at.freedoms:
-        return at.draft.mass_names[at.free[unknown - at.freedoms]]
+        return at.motion.mass_names[at.free[unknown - at.freedoms]]
     ends = at.bodies["freedom"] + at.bodies["freedoms"]
-    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
+    return at.motion.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
 
 
 def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -> None:

@@ -1,9 +1,10 @@
-"""Layout of the data of bodies, and of basins on bodies, in the array `out`.
+"""Frames that move: position, attitude and motion of bodies in the array `out`, and the loads on them.
 
-The data of body i begin at layout["body"] + BODY_OUT i. All vectors are in axes of the world. Jointed bodies form
-trees. The reference point o of a tree is the centre of mass of its root if the root is a free body, else the position
-of the joint of the root. So sums over a tree do not suffer from cancellation. q'' are the accelerations of the degrees
-of freedom, which forces determine; R is the rotation matrix from axes of the body to axes of the world.
+Fluid on a body reads its motion here, and adds its force. A feature computes the motion. The data of body i begin at
+layout["body"] + BODY_OUT i. All vectors are in axes of the world. Jointed bodies form trees. The reference point o of a
+tree is the centre of mass of its root if the root is a free body, else the position of the joint of the root. So sums
+over a tree do not suffer from cancellation. q'' are the accelerations of the degrees of freedom, which forces
+determine; R is the rotation matrix from axes of the body to axes of the world.
 
 The data of basin b begin at layout["tank"] + TANK_OUT b; all are 0 for a basin that is not on a body.
 
@@ -11,7 +12,7 @@ Arguments of the kernels here: here, row : offset in `out` of the data of a body
 """
 
 from fvsolve.core.kernels.dtypes import BODY_OUT
-from fvsolve.core.kernels.mechanism.vectors import add_vector
+from fvsolve.core.kernels.vectors import add_vector
 from fvsolve.jit import njit
 
 ATTITUDE = 0  # R, by rows
@@ -39,24 +40,6 @@ BASIN_LOAD = 18  # force [N] and torque about its origin [N m] of the water for 
 def body_row(tables, i):
     """Index in `out` of the first number of body i."""
     return tables.layout[0]["body"] + BODY_OUT * i
-
-
-@njit
-def nearest_free_body(tables, i):
-    """First body with degrees of freedom on the way from body i, itself included, to the root of its tree; else -1."""
-    while i >= 0 and tables.bodies[i]["freedoms"] == 0:
-        i = tables.bodies[i]["parent"]
-    return i
-
-
-@njit(forceinline=True)
-def freedom_path(tables, i):
-    """List of the degrees of freedom that move body i, from the root on: (its offset in `integers`, its length).
-
-    Body i must have degrees of freedom.
-    """
-    last = tables.freedoms[tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"] - 1]
-    return last["path"], last["depth"] + 1
 
 
 @njit(forceinline=True)

@@ -1,9 +1,26 @@
 """Power and stored energy of masses, springs, dampers, forces, stops and pistons; the rest : `network_energy.py`.
 
-The entries of `power` and `stored` follow those of columns, in the order listed there.
+The entries of `power` [W] follow those of columns. For every part of a kind in turn they are:
+MASS : rate of stored energy
+BRACE : power absorbed by a spring or damper, or supplied by a force
+STOP : rate of stored energy, loss
+PISTON : loss of the leak, friction, residual of the density law where a volume changes
+
+Entries of `stored` [J] follow those of columns: each mass, brace, stop.
 """
 
-from fvsolve.core.kernels.mass_dynamics import (
+from fvsolve.core.kernels.network_energy import (
+    COLUMN,
+    NODE,
+    PIPE,
+    VALVE,
+    gauge_pressure,
+    total_head,
+    total_pressure,
+    vessel_energy,
+)
+from fvsolve.core.kernels.pipe_energy import height_pressure
+from fvsolve.features.motion.kernels.mass_dynamics import (
     contact_force,
     excess_of,
     leak_flow,
@@ -12,30 +29,17 @@ from fvsolve.core.kernels.mass_dynamics import (
     stop_travel,
     travel_of,
 )
-from fvsolve.core.kernels.network_energy import (
-    BRACE,
-    COLUMN,
-    MASS,
-    NODE,
-    PIPE,
-    PISTON,
-    STOP,
-    VALVE,
-    gauge_pressure,
-    total_head,
-    total_pressure,
-    vessel_energy,
-)
-from fvsolve.core.kernels.pipe_energy import height_pressure
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels.tables import open_motion
 from fvsolve.jit import njit, specialise
+
+MASS, BRACE, STOP, PISTON = 1, 1, 2, 3  # rows of `power` for each part
 
 
 @njit
 def power_masses(t, y, dydt, out, tables, power, at):
     """Write the power entries [W] of masses, then of springs, dampers and forces, then of stops, from power[at] on.
 
-    Returns the index after them. The entries of each part are listed in `network_energy.py`.
+    Returns the index after them.
     """
     layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
     armed = tables.armed
@@ -53,7 +57,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
         if brace["schedule"] < 0:
             power[at] = -power[at]
         at += BRACE
-    first = armed.size - 2 * stops.size
+    first = tables.motion_settings[0]["flag"]
     for k in range(stops.size):
         stop = stops[k]
         x, speed = stop_travel(out, tables, k)
@@ -196,7 +200,7 @@ PISTON_POWER = MOVING_CHAMBER_ENERGY = None  # constants of the templates
 
 def _add_power(t, y, dydt, out, handle, power):
     """Write the power [W] of masses, braces, stops and pistons, and of the chambers of pistons."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     at = NODE * tables.nodes.size + PIPE * tables.pipes.size + VALVE * tables.valves.size
     at = power_masses(t, y, dydt, out, tables, power, at + COLUMN * tables.columns.size)
     PISTON_POWER(y, dydt, out, tables, power, at)
@@ -204,7 +208,7 @@ def _add_power(t, y, dydt, out, handle, power):
 
 def _add_stored(t, y, dydt, out, handle, stored):
     """Write the energy changes since the start [J] of masses, braces and stops, and of the chambers of pistons."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     for k in range(tables.pistons.size):
         piston, x = tables.pistons[k], piston_travel(out, tables, k)[0]
         for side in range(2):

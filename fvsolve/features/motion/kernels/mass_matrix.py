@@ -13,13 +13,10 @@ torque and force, later of acceleration.
 
 from math import sqrt
 
-from fvsolve.core.kernels.dtypes import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, RATE_UNWANTED, REVOLUTE
-from fvsolve.core.kernels.mass_dynamics import push_stiffness
-from fvsolve.core.kernels.mechanism import body_kinematics as kinematics
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_layout import body_row, freedom_path, nearest_free_body
-from fvsolve.core.kernels.mechanism.fluid_loads import add_basin_inertia, add_fluid_inertia
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels import moving_frames as layout
+from fvsolve.core.kernels.dtypes import BODY_OUT, RATE, RATE_UNWANTED
+from fvsolve.core.kernels.moving_frames import body_row
+from fvsolve.core.kernels.vectors import (
     cross,
     dot,
     minus,
@@ -30,7 +27,11 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector_product,
     write_vector,
 )
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.motion.kernels import body_kinematics as kinematics
+from fvsolve.features.motion.kernels.body_trees import freedom_path, nearest_free_body
+from fvsolve.features.motion.kernels.fluid_loads import add_basin_inertia, add_fluid_inertia
+from fvsolve.features.motion.kernels.mass_dynamics import push_stiffness
+from fvsolve.features.motion.kernels.tables import ABOUT, FREE, PRISMATIC, REVOLUTE, open_motion
 from fvsolve.jit import inline, njit
 
 INERTIA_SIZE, LOAD_SIZE = 10, 6  # numbers per body
@@ -423,7 +424,7 @@ def body_rate_limit(out, tables):
 @njit
 def start_mass_matrix(t, y, dydt, out, handle):
     """Write the forces of the degrees of freedom and the mass matrix to `scratch`, for the equilibrium at the start."""
-    fill_mass_matrix(y, out, open_tables(handle))
+    fill_mass_matrix(y, out, open_motion(handle))
 
 
 @njit
@@ -446,7 +447,7 @@ def solve_accelerations(t, y, dydt, out, handle):
 
     out[RATE] is raised by `body_rate_limit`. The factored mass matrix stays in `scratch`.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     fill_mass_matrix(y, out, tables)
     factor_mass_matrix(tables)
     solve_mass_matrix(tables, 6 * tables.freedoms.size)

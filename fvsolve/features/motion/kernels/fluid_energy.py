@@ -11,12 +11,12 @@ Arguments are those of `fluid_loads`. z : elevation of the start of a segment in
 increase per distance along the segment.
 """
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import CHAMBER, FIXED, JUNCTION, TANK
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import fluid_loads as fluid
-from fvsolve.core.kernels.mechanism.vectors import cross, dot, plus, scalar_product, scaled, vector
 from fvsolve.core.kernels.network_energy import COLUMN, NODE, PIPE, VALVE, energy_head
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.vectors import cross, dot, plus, scalar_product, scaled, vector
+from fvsolve.features.motion.kernels import fluid_loads as fluid
+from fvsolve.features.motion.kernels.tables import open_motion
 from fvsolve.jit import njit
 
 
@@ -88,7 +88,7 @@ def extra_head(y, out, tables, here, i):
     For a tank, the energy at its surface, above datum, also replaces the energy at the pressure of its bottom.
     """
     st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
-    r = vector(tables.moving_segments[node["moving_segment"]]["start"], 0)
+    r = vector(tables.moving_segments[node["forcing"]]["start"], 0)
     z, more, v = node["elevation"], 0.0, vector(motion, fluid.BODY_VELOCITY)
     if node["kind"] == TANK:
         r = r[0], r[1], r[2] + fluid.level_at(y, tables, i)
@@ -194,7 +194,7 @@ def column_energy_rate(y, dydt, out, tables, k, here):
     Heights are those above the datum.
     """
     column, z, total = tables.columns[k], tables.settings[0]["datum"], 0.0
-    for m in range(column["moving_segments"]):
+    for m in range(column["forcings"]):
         total += segment_energy_rate(
             tables, out, here, fluid.column_segment(tables, column, m), fluid.ZERO_VECTOR, z, 0.0
         )
@@ -212,7 +212,7 @@ def column_extra_energy(y, out, tables, k, here):
     """
     column, z, motion = tables.columns[k], tables.settings[0]["datum"], tables.scratch
     total = (column["flow"] + y[column["y"]]) * path_velocity(motion, fluid.column_path(y, tables, column))
-    for m in range(column["moving_segments"]):
+    for m in range(column["forcings"]):
         total += segment_energy(tables, out, here, fluid.column_segment(tables, column, m), z, 0.0)
     return total
 
@@ -226,16 +226,16 @@ def carrier(tables, out, row):
 @njit
 def add_power(t, y, dydt, out, handle, power):
     """Add the power due to the motion of bodies to the entries of nodes, pipes and rigid columns in `power` [W]."""
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     nodes, pipes, columns, motion = tables.nodes, tables.pipes, tables.columns, tables.scratch
     for i in range(nodes.size):
-        here = carrier(tables, out, nodes[i]["moving_segment"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
+        here = carrier(tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
         if here >= 0:
             add_node_power(y, dydt, out, tables, here, i, power)
     at = NODE * nodes.size
     for k in range(pipes.size):
         pipe, end = pipes[k], tables.layout[0]["ends"] + 4 * k
-        here = carrier(tables, out, pipe["moving_segment"])
+        here = carrier(tables, out, pipe["forcing"])
         if here >= 0:
             # Fluid brings the energy of the motion at both ends with the flow there.
             into = extra_head(y, out, tables, here, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
@@ -246,7 +246,7 @@ def add_power(t, y, dydt, out, handle, power):
     at += VALVE * tables.valves.size
     for k in range(columns.size):
         column = columns[k]
-        here = carrier(tables, out, column["moving_segment"])
+        here = carrier(tables, out, column["forcing"])
         if here >= 0:
             drop = extra_head(y, out, tables, here, column["from_node"])
             drop -= extra_head(y, out, tables, here, column["to_node"])
@@ -263,20 +263,20 @@ def add_stored(t, y, dydt, out, handle, stored):
     It is the difference from the energy with the body at rest in its position at the start. For tanks and columns,
     heights are those above the datum instead.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
     for i in range(nodes.size):
-        here = carrier(tables, out, nodes[i]["moving_segment"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
+        here = carrier(tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
         if here >= 0:
             add_node_stored(y, out, tables, here, i, stored)
     at = nodes.size
     for k in range(pipes.size):
-        here = carrier(tables, out, pipes[k]["moving_segment"])
+        here = carrier(tables, out, pipes[k]["forcing"])
         if here >= 0:
             stored[at + 1] += pipe_extra_energy(y, out, tables, k, here)
         at += 2
     for k in range(columns.size):
-        here = carrier(tables, out, columns[k]["moving_segment"])
+        here = carrier(tables, out, columns[k]["forcing"])
         if here >= 0:
             stored[at] += column_extra_energy(y, out, tables, k, here)
         at += 1

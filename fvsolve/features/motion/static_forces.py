@@ -3,10 +3,12 @@
 import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.kernels.table_handle import make_handle
+from fvsolve.core.kernels.table_handle import make_handle, with_features
 from fvsolve.core.model.run_data import zeros_for_run
+from fvsolve.features.motion.kernels import tables as records
+from fvsolve.features.motion.kernels.tables import SLOT, motion_of
 
-FOLDER = "fvsolve.core.kernels.mechanism"
+FOLDER = "fvsolve.features.motion.kernels"
 MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
 WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
@@ -21,10 +23,10 @@ NETWORKS = (DRIVES, *DRIVEN, LOADS)
 NONE = np.zeros(0)
 
 
-def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
+def call_pieces(all_tables, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
     """Call the named kernel functions in turn, in the way of the right-hand side; they write to `out` and run arrays.
 
-    tables : tables of a model, then arrays of a run; pieces : names "MODULE: FUNCTION"
+    all_tables : tables of a model, arrays of a run, tables of motion; pieces : names "MODULE: FUNCTION"
     """
     from fvsolve.core.kernels import calls  # not loaded for cases without bodies
     from fvsolve.core.kernels.rhs_assembly import load_function
@@ -33,7 +35,10 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
     for k, piece in enumerate(pieces):
         addresses[calls.RHS, k] = calls.function_address(load_function(*piece.rsplit(".", 1)), calls.RATES)
     run = calls.compile_as(calls.rhs_in_turn, calls.RATES)
-    handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
+    tables, written, own = all_tables
+    kept: list = []  # arrays behind the handle
+    written = with_features(written, [*[None] * SLOT, own], kept)
+    handle = make_handle((*tables, *written, addresses, calls.empty_calls(0, len(calls.HOOKS))))
     run(t, y, rates, out, handle)
 
 
@@ -53,8 +58,10 @@ def mass_factor(model, y: np.ndarray) -> np.ndarray:
     """
     written, t = arrays_without_seen(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
-    call_pieces((*model.tables, *written), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
-    diagonal = 8 * len(model.tables.freedoms) + model.tables.freedoms["row"] + model.tables.freedoms["depth"]
+    motion = motion_of(model)
+    call_pieces((model.tables, written, motion.tables()), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
+    freedoms = motion.freedom_table
+    diagonal = 8 * len(freedoms) + freedoms["row"] + freedoms["depth"]
     written.scratch[diagonal] = 1.0 / written.scratch[diagonal]
     return written.scratch
 
@@ -66,16 +73,17 @@ class StaticForces:
     """
 
     def __init__(self, draft, t: float) -> None:
-        self.draft, self.t = draft, t
+        motion = motion_of(draft)
+        self.draft, self.motion, self.t = draft, motion, t
         self.written = arrays_without_seen(draft.shapes)
         self.written.clock["limit"] = t
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
         self.y, self.tables = np.zeros(draft.size), draft.tables
-        rubber = (BUSHINGS,) if len(draft.bushing_table) else ()
+        rubber = (BUSHINGS,) if len(motion.bushing_table) else ()
         loads = [name for feature in draft.features for name in feature.level(draft, self.y)]
         self.pushes = (MOTION, LINES, *rubber, *loads)
-        if len(draft.moving_segment_table):
+        if len(motion.moving_segment_table):
             self.pushes += NETWORKS
         if loads:  # these functions write to `plane`
             self.tables = draft.tables._replace(plane=draft.tables.plane.copy())
@@ -84,31 +92,31 @@ class StaticForces:
     def run(self, *pieces: str) -> None:
         """Call the named kernel functions of bodies and joints."""
         rates = np.zeros(self.draft.size) if LOADS in pieces else NONE
-        call_pieces((*self.tables, *self.written), pieces, self.t, self.y, self.out, rates)
+        call_pieces((self.tables, self.written, self.motion.tables()), pieces, self.t, self.y, self.out, rates)
 
     def rates(self) -> np.ndarray:
         """Velocities of all freedoms at the start : float64[freedoms] [m/s], [rad/s]."""
-        return np.concatenate([row["speed"][: row["freedoms"]] for row in self.draft.body_table])
+        return np.concatenate([row["speed"][: row["freedoms"]] for row in self.motion.body_table])
 
     def forces(self) -> np.ndarray:
         """Generalised forces on all freedoms from loads in `out`, minus inertial forces : float64[freedoms] [N], [N m].
 
         Springs and dampers of joints are included.
         """
-        n = len(self.draft.freedom_table)
+        n = len(self.motion.freedom_table)
         self.run(WEIGH)
         return self.written.scratch[6 * n : 7 * n].copy()
 
     def accelerations(self) -> np.ndarray:
         """Accelerations of all freedoms after a call of `solve_accelerations` : float64[freedoms] [m/s2], [rad/s2]."""
-        n = len(self.draft.freedom_table)
+        n = len(self.motion.freedom_table)
         return self.written.scratch[6 * n : 7 * n].copy()
 
     def loads(self) -> np.ndarray:
         """Force [N] and torque [N m] on every body : float64[bodies, 6], a view of `out`."""
-        from fvsolve.core.kernels.mechanism.body_layout import FORCE
+        from fvsolve.core.kernels.moving_frames import FORCE
 
-        first, count = int(self.layout["body"]), len(self.draft.body_table)
+        first, count = int(self.layout["body"]), len(self.motion.body_table)
         return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
@@ -128,41 +136,41 @@ class StaticForces:
         A load counts as its magnitude times its distance from the joint, whatever its direction, because a load
         perpendicular to the motion of a freedom acts on it by rounding errors.
         """
-        draft, first = self.draft, int(self.layout["push"])
+        first = int(self.layout["push"])
         self.run(MOTION)
         loads = [(i, row["centre"], np.linalg.norm(load[:3]), 0.0)
-                for i, (row, load) in enumerate(zip(draft.body_table, self.loads(), strict=True))]  # fmt: skip
+                for i, (row, load) in enumerate(zip(self.motion.body_table, self.loads(), strict=True))]  # fmt: skip
         self.out[first : first + pushes.size] = pushes
         self.run(LINES)
         before = self.loads().copy()
         self.run(*self.pushes[2:])
         added = enumerate(self.loads() - before)
         loads += [(i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1)) for i, load in added]
-        for row in draft.line_table:
-            size, is_torque = abs(pushes[row["push"]]), row["acts"] == rec.ABOUT
+        for row in self.motion.line_table:
+            size, is_torque = abs(pushes[row["push"]]), row["acts"] == records.ABOUT
             loads += self.at_ends(row, 0.0 if is_torque else size, size if is_torque else 0.0)
-        for row in draft.bushing_table:
+        for row in self.motion.bushing_table:
             first_place, second_place = (self.position_of(row[end]) for end in ("from_point", "to_point"))
             loads += self.at_ends(row, float(row["stiffness"] * np.linalg.norm(second_place - first_place)), 0.0)
-        for row in draft.pin_table:
+        for row in self.motion.pin_table:
             loads += self.at_ends(row, float(np.linalg.norm(row["force"][: row["rows"]])), 0.0)
         self.forces()  # leaves S in scratch
-        return sum((self.reach(*arguments) for arguments in loads), np.zeros(len(draft.freedom_table)))
+        return sum((self.reach(*arguments) for arguments in loads), np.zeros(len(self.motion.freedom_table)))
 
     def at_ends(self, row, force: float, torque: float) -> list[tuple]:
         """Loads on the two points of a line of action, as arguments of `reach`."""
-        ends = [self.tables.points[row[end]] for end in ("from_point", "to_point") if row[end] >= 0]
+        ends = [self.motion.point_table[row[end]] for end in ("from_point", "to_point") if row[end] >= 0]
         return [(int(point["body"]), point["place"], force, torque) for point in ends if point["body"] >= 0]
 
     def row_of(self, i: int) -> np.ndarray:
-        """Values of body i in `out` (`kernels.mechanism.body_layout`)."""
+        """Values of body i in `out` (`kernels.moving_frames`)."""
         return self.out[int(self.layout["body"]) + rec.BODY_OUT * i :][: rec.BODY_OUT]
 
     def position_of(self, point: int) -> np.ndarray:
         """Position of a point in the current configuration [m]."""
-        from fvsolve.core.kernels.mechanism.body_layout import ATTITUDE, POSITION
+        from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION
 
-        i, place = int(self.tables.points[point]["body"]), self.tables.points[point]["place"]
+        i, place = int(self.motion.point_table[point]["body"]), self.motion.point_table[point]["place"]
         if i < 0:
             return place
         body_row = self.row_of(i)
@@ -173,9 +181,9 @@ class StaticForces:
 
         i, place : body and point in its axes at which they act. `forces` must have written the joint axes to `scratch`.
         """
-        from fvsolve.core.kernels.mechanism.body_layout import ARM, ATTITUDE
+        from fvsolve.core.kernels.moving_frames import ARM, ATTITUDE
 
-        bodies, effects = self.draft.body_table, np.zeros(len(self.draft.freedom_table))
+        bodies, effects = self.motion.body_table, np.zeros(len(self.motion.freedom_table))
         columns = self.written.scratch[: 6 * len(effects)].reshape(-1, 6)
         at = self.row_of(i)[ARM : ARM + 3] + self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
         while i >= 0:
@@ -198,9 +206,6 @@ class StaticForces:
 
 RANK_TOLERANCE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
 PIN_RATE_TOLERANCE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
-ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
-# likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
-EQUILIBRIUM_SHARE = 1e-9
 
 
 def refuse_massless(draft, at: StaticForces) -> None:
@@ -208,14 +213,15 @@ def refuse_massless(draft, at: StaticForces) -> None:
 
     A body that the fluid in its tanks outweighs gets a fault too. Only the last such body in the table gets one.
     """
+    motion = motion_of(draft)
     at.run(MOTION, ACCELERATE)
-    n = len(draft.freedom_table)
-    for name, row in reversed(list(zip(draft.body_names, draft.body_table, strict=True))):
+    n = len(motion.freedom_table)
+    for name, row in reversed(list(zip(motion.body_names, motion.body_table, strict=True))):
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
-        least = RANK_TOLERANCE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
-        for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
+        least = RANK_TOLERANCE**2 * (own if row["joint"] in (records.REVOLUTE, records.BALL) else 0.0)
+        for freedom in motion.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
             left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
-            if np.isnan(left) and len(draft.moving_segment_table):
+            if np.isnan(left) and len(motion.moving_segment_table):
                 text = "fluid in tall tanks, whose own flow has no inertia in the model, outweighs its carrying body"
                 remedy = "expected wider tanks, a heavier body, or a driven joint"
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
@@ -231,15 +237,16 @@ def start_bodies(draft, start) -> list[str]:
     Returns texts of motions at the start. Raises CaseError for motions without inertia and for pins that are redundant
     or open.
     """
-    if not len(draft.body_table):
+    motion = motion_of(draft)
+    if not len(motion.body_table):
         return []
     at = StaticForces(draft, start.t)
-    tables = (draft.brace_table, draft.stop_table, draft.piston_table)
+    tables = (motion.brace_table, motion.stop_table, motion.piston_table)
     pushes = np.array([row["force"] for table in tables for row in table])
     travel, first = int(at.layout["travel"]), int(at.layout["push"])
     rows = [row for table in tables for row in table]
-    for line in draft.line_table:
-        line["length"] = at.out[travel + 2 * line["push"]] if line["acts"] == rec.ALONG else 0.0
+    for line in motion.line_table:
+        line["length"] = at.out[travel + 2 * line["push"]] if line["acts"] == records.ALONG else 0.0
         if "speed" in rows[line["push"]].dtype.names:
             rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
     refuse_massless(draft, at)
@@ -247,17 +254,12 @@ def start_bodies(draft, start) -> list[str]:
     at.out[first : first + pushes.size] = pushes
     at.run(*at.pushes)
     left, accelerate = at.forces(), ACCELERATE
-    if len(draft.pin_table):
+    if len(motion.pin_table):
         left, accelerate = start_pins(draft, at), PINNED
     size = at.sizes(pushes)
-    draft.freedom_table["balance"] = np.where(np.abs(left) <= rounding(draft) * size, left, 0.0)
+    motion.freedom_table["balance"] = np.where(np.abs(left) <= draft.rounding * size, left, 0.0)
     at.run(*at.pushes, accelerate)
     return motion_at_start(draft, at.accelerations())
-
-
-def rounding(draft) -> float:
-    """Fraction of the sum of force magnitudes below which the sum of these forces counts as rounding error."""
-    return EQUILIBRIUM_SHARE if draft.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
 
 
 def pin_rows(draft, at: StaticForces) -> np.ndarray:
@@ -265,10 +267,11 @@ def pin_rows(draft, at: StaticForces) -> np.ndarray:
 
     The matrix times the joint velocities gives the velocities at which the pins open, one per constrained direction.
     """
-    n, count = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
+    motion = motion_of(draft)
+    n, count = len(motion.freedom_table), int(motion.pin_table["rows"].sum())
     if count:
         at.run(*at.pushes, PINNED)
-    first = 8 * n + draft.factor_size + 16 * len(draft.body_table)
+    first = 8 * n + motion.factor_size + 16 * len(motion.body_table)
     return at.written.scratch[first : first + count * n].reshape(count, n).copy()
 
 
@@ -277,12 +280,13 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
 
     Returns the remaining generalised force on each joint freedom : float64[freedoms] [N] or [N m].
     """
+    motion = motion_of(draft)
     at.run(*at.pushes, GAPS)
     first = int(at.layout["pin"])
-    for k, row in enumerate(draft.pin_table):
+    for k, row in enumerate(motion.pin_table):
         row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
     rows = pin_rows(draft, at)
-    names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
+    names = [name for name, row in zip(motion.pin_names, motion.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "this pin is redundant: in some direction joints or other pins already hold its two points together"
         draft.fault(f"links.{name}", f"{text}; give the key `axis` for a loop in a plane, else remove one pin")
@@ -294,8 +298,8 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
             text = f"separate the two points of this pin at {draft.case.amount(slip, 'velocity')}"
             draft.fault(f"links.{name}", f"velocities at the start {text}; expected equal velocities")
     draft.check()
-    forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
-    for row, force in zip(draft.pin_table, forces, strict=True):
+    forces = at.out[int(at.layout["pin"]) :][: 3 * len(motion.pin_table)].reshape(-1, 3)
+    for row, force in zip(motion.pin_table, forces, strict=True):
         row["force"][: row["rows"]] = force[: row["rows"]]
     at.run(*at.pushes, HOLD)
     return at.forces()
@@ -323,8 +327,9 @@ def motion_at_start(draft, accelerations: np.ndarray) -> list[str]:
 
     accelerations : float64[freedoms]  [m/s2] or [rad/s2]
     """
+    motion = motion_of(draft)
     texts, amount = [], draft.case.amount
-    for name, row in zip(draft.body_names, draft.body_table, strict=True):
+    for name, row in zip(motion.body_names, motion.body_table, strict=True):
         pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
         # water in sloshing modes is not among the nodes: only its accelerations are listed
         stated = name in draft.case.nodes
@@ -332,7 +337,7 @@ def motion_at_start(draft, accelerations: np.ndarray) -> list[str]:
             texts.append(f"body {name} turns at {amount(size, 'angular_velocity')}")
         if stated and (size := np.linalg.norm(pose.velocity)) > 0.0:
             texts.append(f"body {name} moves at {amount(size, 'velocity')}")
-        slides = 0 if row["joint"] in (rec.REVOLUTE, rec.BALL) else 3 if row["joint"] == rec.FREE else 1
+        slides = 0 if row["joint"] in (records.REVOLUTE, records.BALL) else 3 if row["joint"] == records.FREE else 1
         for part, unit in ((own[:slides], "m/s2"), (own[slides:], "rad/s2")):
             if np.any(part):
                 texts.append(f"body {name} accelerates at {np.linalg.norm(part):.4g} {unit}")

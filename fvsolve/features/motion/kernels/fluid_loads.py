@@ -28,10 +28,11 @@ s : offset in `work`, or `scratch`, of the angular velocity and the velocity at 
 degree of freedom
 """
 
-from fvsolve.core.kernels.dtypes import CHAMBER, FIXED, JUNCTION, LAW_LINEAR, MOVED_BY_FORCES, TANK, TANK_OUT
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism.body_layout import add_force, add_torque, body_row, freedom_path, nearest_free_body
-from fvsolve.core.kernels.mechanism.vectors import (
+from fvsolve.core.kernels import moving_frames as layout
+from fvsolve.core.kernels.dtypes import CHAMBER, FIXED, JUNCTION, LAW_LINEAR, TANK, TANK_OUT
+from fvsolve.core.kernels.moving_frames import add_force, add_torque, body_row
+from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.core.kernels.vectors import (
     cross,
     dot,
     minus,
@@ -44,8 +45,8 @@ from fvsolve.core.kernels.mechanism.vectors import (
     vector_product,
     write_vector,
 )
-from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.features.motion.kernels.body_trees import freedom_path, nearest_free_body
+from fvsolve.features.motion.kernels.tables import MOVED_BY_FORCES, open_motion
 from fvsolve.jit import njit
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
@@ -130,7 +131,7 @@ def tank_path(tables, i, high):
 
     A negative `high` gives the opposite path, down from the height -high to the bottom.
     """
-    r = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
+    r = tables.moving_segments[tables.nodes[i]["forcing"]]["start"]
     return 0.0, 0.0, high, r[1] * high, -r[0] * high, 0.0
 
 
@@ -153,7 +154,7 @@ def vertical_moments(mass, high):
 def node_segment(y, tables, i):
     """Segment of the fluid stored at node i: (start r, unit vector t, mass moments m); no mass without storage."""
     node = tables.nodes[i]
-    r = vector(tables.moving_segments[node["moving_segment"]]["start"], 0)
+    r = vector(tables.moving_segments[node["forcing"]]["start"], 0)
     if node["kind"] == TANK:
         return r, (0.0, 0.0, 1.0), vertical_moments(node["mass"] + y[node["y"]], level_at(y, tables, i))
     return r, ZERO_VECTOR, (node["mass"] + y[node["y"]] if node["kind"] == CHAMBER else 0.0, 0.0, 0.0)
@@ -194,8 +195,8 @@ def pipe_segment(tables, k):
     t is zero if both ends are at the same point.
     """
     pipe, segments = tables.pipes[k], tables.moving_segments
-    r = vector(segments[pipe["moving_segment"]]["start"], 0)
-    span = minus(vector(segments[pipe["moving_segment"] + pipe["cells"] - 1]["end"], 0), r)
+    r = vector(segments[pipe["forcing"]]["start"], 0)
+    span = minus(vector(segments[pipe["forcing"] + pipe["cells"] - 1]["end"], 0), r)
     length = scalar_product(span, span) ** 0.5
     return r, scaled(1.0 / length if length > 0.0 else 0.0, span), length
 
@@ -267,7 +268,7 @@ def column_path(y, tables, column):
 
     The paths in tanks at the ends of the column are included.
     """
-    segments, first, count = tables.moving_segments, column["moving_segment"], column["moving_segments"]
+    segments, first, count = tables.moving_segments, column["forcing"], column["forcings"]
     span = minus(vector(segments[first + count - 1]["end"], 0), vector(segments[first]["start"], 0))
     swept = ZERO_VECTOR
     for k in range(count):
@@ -283,9 +284,9 @@ def column_segment(tables, column, k):
     The mass of the column is distributed by length.
     """
     total = 0.0
-    for m in range(column["moving_segments"]):
-        total += segment_length(tables.moving_segments[column["moving_segment"] + m])
-    segment = tables.moving_segments[column["moving_segment"] + k]
+    for m in range(column["forcings"]):
+        total += segment_length(tables.moving_segments[column["forcing"] + m])
+    segment = tables.moving_segments[column["forcing"] + k]
     long, mass = segment_length(segment), tables.settings[0]["rho"] * column["area"] * column["length"]
     r = vector(segment["start"], 0)
     # A column whose segments all have length zero has its mass at a point.
@@ -311,7 +312,7 @@ def column_load(y, dydt, tables, k):
     flow, rate = column["flow"] + y[column["y"]], dydt[column["y"]]
     load = flow_load(motion, column_path(y, tables, column), faster, flow, rate)
     # Segments of a column are always full: their moments have no rates.
-    for m in range(column["moving_segments"]):
+    for m in range(column["forcings"]):
         r, t, mass = column_segment(tables, column, m)
         load = add_six(load, segment_load(motion, r, t, mass, ZERO_VECTOR))
     return load
@@ -362,18 +363,18 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
     """
     nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
     for i in range(nodes.size):
-        row = nodes[i]["moving_segment"] if is_fluid_node(nodes[i]["kind"]) else -1
+        row = nodes[i]["forcing"] if is_fluid_node(nodes[i]["kind"]) else -1
         here = set_carrier_motion(tables, out, row, least, wide, spin)
         if here >= 0:
             r, t, m = node_segment(y, tables, i)
             load = segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
             add_load(out, here, load, sign)
     for k in range(pipes.size):
-        here = set_carrier_motion(tables, out, pipes[k]["moving_segment"], least, wide, spin)
+        here = set_carrier_motion(tables, out, pipes[k]["forcing"], least, wide, spin)
         if here >= 0:
             add_load(out, here, pipe_load(y, dydt, tables, k), sign)
     for k in range(columns.size):
-        here = set_carrier_motion(tables, out, columns[k]["moving_segment"], least, wide, spin)
+        here = set_carrier_motion(tables, out, columns[k]["forcing"], least, wide, spin)
         if here >= 0:
             add_load(out, here, column_load(y, dydt, tables, k), sign)
 
@@ -385,7 +386,7 @@ def add_fluid_loads(t, y, dydt, out, handle):
     The loads of moving segments with `loads_body` 0 are left out.
     """
     if dydt.size > 0:
-        add_all_fluid_loads(y, dydt, out, open_tables(handle), MOVED_BY_FORCES, 1.0, layout.BIAS, layout.SPIN_BIAS)
+        add_all_fluid_loads(y, dydt, out, open_motion(handle), MOVED_BY_FORCES, 1.0, layout.BIAS, layout.SPIN_BIAS)
 
 
 @njit(forceinline=True)
@@ -453,7 +454,7 @@ def add_pipe_inertia(y, out, tables, k):
     Under the linear density law, the mass that pressure waves add does not slide.
     """
     pipe, (r, t, span) = tables.pipes[k], pipe_segment(tables, k)
-    i, m = tables.moving_segments[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
+    i, m = tables.moving_segments[pipe["forcing"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
     # First as if fixed to the body, then without what slides along the axis.
     add_segment_inertia(out, tables, i, (r, t, m))
     length, slides = pipe["cells"] * pipe["dx"], m[0]
@@ -469,16 +470,16 @@ def add_fluid_inertia(y, out, tables):
     if tables.moving_segments.size == 0:
         return
     for i in range(nodes.size):
-        kind, body = nodes[i]["kind"], free_carrier(tables, nodes[i]["moving_segment"])
+        kind, body = nodes[i]["kind"], free_carrier(tables, nodes[i]["forcing"])
         if body >= 0 and (kind == TANK or kind == CHAMBER):
             add_segment_inertia(out, tables, body, node_segment(y, tables, i))
     for k in range(pipes.size):
-        if free_carrier(tables, pipes[k]["moving_segment"]) >= 0:
+        if free_carrier(tables, pipes[k]["forcing"]) >= 0:
             add_pipe_inertia(y, out, tables, k)
     for k in range(columns.size):
-        column, body = columns[k], free_carrier(tables, columns[k]["moving_segment"])
+        column, body = columns[k], free_carrier(tables, columns[k]["forcing"])
         if body >= 0:
-            for m in range(column["moving_segments"]):
+            for m in range(column["forcings"]):
                 add_segment_inertia(out, tables, body, column_segment(tables, column, m))
             slides = tables.settings[0]["rho"] * column["area"] / column["length"]
             subtract_sliding_inertia(out, tables, body, column_path(y, tables, column), slides)

@@ -14,15 +14,15 @@ q'' is solved with the fluid loads (`fluid_loads`) and with the inertia of the f
 of flow are corrected for q''.
 """
 
+from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.core.kernels.dtypes import JOINT_LOAD_READ, LAW_LINEAR, NO_WEIGHT, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
-from fvsolve.core.kernels.mechanism import body_layout as layout
-from fvsolve.core.kernels.mechanism import fluid_loads as fluid
-from fvsolve.core.kernels.mechanism.body_layout import body_row
-from fvsolve.core.kernels.mechanism.mass_matrix import add_body_force, clear_column, mobility
-from fvsolve.core.kernels.mechanism.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.dtypes import LAW_LINEAR, NO_WEIGHT, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
+from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.tanks import tank_level
+from fvsolve.core.kernels.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
+from fvsolve.features.motion.kernels import fluid_loads as fluid
+from fvsolve.features.motion.kernels.mass_matrix import add_body_force, clear_column, mobility
+from fvsolve.features.motion.kernels.tables import JOINT_LOAD_READ, open_motion
 from fvsolve.jit import njit
 
 THIN_LAYER = 1e-6  # thickness of a layer added at the surface to test if fluid has weight there [m]
@@ -51,8 +51,8 @@ def set_segment_drives(t, y, dydt, out, handle):
 
     The values are for q'' = 0 (zero joint accelerations), minus those of gravity at the start.
     """
-    tables = open_tables(handle)
-    segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
+    tables = open_motion(handle)
+    segments, at, last = tables.moving_segments, tables.layout[0]["forcing"], -1
     for k in range(segments.size):
         segment = segments[k]
         # Segments of a body follow each other, so that its motion is set once for them.
@@ -85,7 +85,7 @@ def tank_drives(tables, out, i, level):
     A tank whose fluid has no weight at its surface would lose the fluid: it ends the run, by the status NO_WEIGHT.
     out[WHERE] is then i plus the number of basins, because lower numbers denote basins.
     """
-    segment = tables.moving_segments[tables.nodes[i]["moving_segment"]]
+    segment = tables.moving_segments[tables.nodes[i]["forcing"]]
     drive = bottom_pressure_per_density(tables, out, segment, level)
     # The pressure must rise with depth at the surface, or the fluid would leave it.
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > drive:
@@ -99,10 +99,10 @@ def moving_tank_pressures(t, y, dydt, out, handle):
 
     For the density law `linear`: p' = rho (bottom pressure over density - its value under gravity at the start).
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     nodes, rho, pressure = tables.nodes, tables.settings[0]["rho"], tables.layout[0]["pressure"]
     for i in range(nodes.size):
-        if nodes[i]["kind"] == TANK and nodes[i]["moving_segment"] >= 0:
+        if nodes[i]["kind"] == TANK and nodes[i]["forcing"] >= 0:
             level = tank_level(nodes[i], tables.floats, rho, y[nodes[i]["y"]])
             drive, rest = tank_drives(tables, out, i, level)
             out[pressure + i] = rho * (drive - rest)
@@ -115,10 +115,10 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
     Under barotropic laws the pressure p follows from the enthalpy, h(p) = h(ambient pressure) +
     `bottom_pressure_per_density`.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     st, nodes, pressure = tables.settings[0], tables.nodes, tables.layout[0]["pressure"]
     for i in range(nodes.size):
-        if nodes[i]["kind"] == TANK and nodes[i]["moving_segment"] >= 0:
+        if nodes[i]["kind"] == TANK and nodes[i]["forcing"] >= 0:
             drive, rest = tank_drives(tables, out, i, fluid.level_at(y, tables, i))
             # Hydrostatics at variable density: the integral of dp / density is a change of enthalpy.
             h = enthalpy(st, tables.floats, st["ambient"])
@@ -131,15 +131,15 @@ def moving_column_rates(t, y, dydt, out, handle):
     """Write the rates of the mass flow in all rigid columns [kg/s2], on bodies or not, without friction, to `dydt`.
 
     The rate is area / length times the driving pressure: deviation of the pressure difference of the ends, plus density
-    times the drive in out[moving_segment], plus the constant `offset` of the column.
+    times the drive in out[forcing], plus the constant `offset` of the column.
     """
-    tables = open_tables(handle)
-    columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["moving_segment"]
+    tables = open_motion(handle)
+    columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["forcing"]
     for k in range(columns.size):
         column, drive = columns[k], 0.0
         # A column that is not on a body has no drive.
-        for m in range(column["moving_segments"] if column["moving_segment"] >= 0 else 0):
-            drive += out[at + column["moving_segment"] + m]
+        for m in range(column["forcings"] if column["forcing"] >= 0 else 0):
+            drive += out[at + column["forcing"] + m]
         drop = out[p + column["from_node"]] - out[p + column["to_node"]] + tables.settings[0]["rho"] * drive
         dydt[column["y"]] = column["area"] / column["length"] * (drop + column["offset"])
 
@@ -148,15 +148,15 @@ def moving_column_rates(t, y, dydt, out, handle):
 def add_cell_drives(t, y, dydt, out, handle):
     """Add the drive of the cells of pipes on bodies to the rates of their waves, under the density law `linear`.
 
-    Nothing is done if `dydt` is empty. The drive, in out[moving_segment], is the work of gravity and inertial forces
+    Nothing is done if `dydt` is empty. The drive, in out[forcing], is the work of gravity and inertial forces
     along a cell per mass [J/kg], see `set_segment_drives`. It changes dM/dt by A rho / dx times the drive.
     M : mass flow, A : area, rho : density, dx : length of a cell
     """
-    tables = open_tables(handle)
-    pipes, rho, at = tables.pipes, tables.settings[0]["rho"], tables.layout[0]["moving_segment"]
+    tables = open_motion(handle)
+    pipes, rho, at = tables.pipes, tables.settings[0]["rho"], tables.layout[0]["forcing"]
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
-        n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
+        n, o, first = pipe["cells"], pipe["y"], pipe["forcing"]
         # Half for each wave, with opposite signs: the drive changes M = r - l and not m.
         half = 0.5 * pipe["area"] * rho / pipe["dx"]
         for k in range(n if first >= 0 else 0):
@@ -172,11 +172,11 @@ def add_cell_drives_barotropic(t, y, dydt, out, handle):
     The drive is that of `add_cell_drives`. It changes dM/dt by m / dx times the drive. M : mass flow, m : mass per
     length, dx : length of a cell
     """
-    tables = open_tables(handle)
-    pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["moving_segment"]
+    tables = open_motion(handle)
+    pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["forcing"]
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
-        n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
+        n, o, first = pipe["cells"], pipe["y"], pipe["forcing"]
         for k in range(n if first >= 0 else 0):
             # Mass that waves add is driven too, unlike under the density law `linear`.
             m = profile[pipe["center"] + k] + (y[o + k] + y[o + n + k]) / pipe["speed"]
@@ -210,7 +210,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
     """
     pipe, (r, t, length) = tables.pipes[k], fluid.pipe_segment(tables, k)
     n, o = pipe["cells"], pipe["y"]
-    acceleration = path_acceleration(out, tables, pipe["moving_segment"], fluid.straight_path(r, t))
+    acceleration = path_acceleration(out, tables, pipe["forcing"], fluid.straight_path(r, t))
     # Half for each wave; the ends may be closer together than the pipe is long.
     push = 0.5 * length / n / pipe["dx"] * acceleration
     linear = tables.settings[0]["law"] == LAW_LINEAR
@@ -229,17 +229,17 @@ def accelerate_network_flow(t, y, dydt, out, handle):
     output (`loads_body` = 2), the fluid loads on bodies in `out` are replaced by those with the new rates and with the
     accelerations of bodies. Nothing is done if `dydt` is empty or there are no degrees of freedom.
     """
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     pipes, columns = tables.pipes, tables.columns
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
     # Before the rates of flow change, with which these loads were added.
     fluid.add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, -1.0, layout.BIAS, layout.SPIN_BIAS)
     for k in range(pipes.size):
-        if fluid.free_carrier(tables, pipes[k]["moving_segment"]) >= 0:
+        if fluid.free_carrier(tables, pipes[k]["forcing"]) >= 0:
             accelerate_pipe_flow(y, dydt, out, tables, k)
     for k in range(columns.size):
-        column, segment = columns[k], columns[k]["moving_segment"]
+        column, segment = columns[k], columns[k]["forcing"]
         if fluid.free_carrier(tables, segment) >= 0:
             acceleration = path_acceleration(out, tables, segment, fluid.column_path(y, tables, column))
             dydt[column["y"]] -= tables.settings[0]["rho"] * column["area"] / column["length"] * acceleration
@@ -255,11 +255,11 @@ def pipe_rate_limit(t, y, dydt, out, handle):
     """
     if out[RATE] == RATE_UNWANTED:
         return
-    tables = open_tables(handle)
+    tables = open_motion(handle)
     damping, at = 0.0, 7 * tables.freedoms.size
     for k in range(tables.pipes.size):
         pipe = tables.pipes[k]
-        i = fluid.free_carrier(tables, pipe["moving_segment"])
+        i = fluid.free_carrier(tables, pipe["forcing"])
         if i < 0:
             continue
         r, direction, _ = fluid.pipe_segment(tables, k)

@@ -1,1 +1,0 @@
-"""Multibody system: joints, forces at points, mass matrix; imported and compiled only for cases that contain bodies."""

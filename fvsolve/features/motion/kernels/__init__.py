@@ -1,0 +1,1 @@
+"""Compiled functions of masses, bodies and the fluid that bodies carry."""
