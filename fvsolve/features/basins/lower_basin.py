@@ -18,7 +18,7 @@ from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
 from fvsolve.core.schemes import LIMITERS, SCHEMES
 from fvsolve.core.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.core.steppers.tableau import METHODS
-from fvsolve.errors import Notice, listing
+from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.features.basins import advection_faces
 from fvsolve.features.basins.advection import DRY, advection_work, diffusion_work
 from fvsolve.features.basins.basin_output import SPEED, U, V
@@ -343,7 +343,11 @@ class BasinRows(BandedRows):
         row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
         row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
-        row["limiter"] = code_of_limiter(numerics.limiter, basins=self.is_grid)
+        own = LIMITERS[numerics.limiter].own
+        if self.is_grid and own is not None and not own.symmetric:  # flows through walls would not be zero
+            text = f"numerics.limiter: {numerics.limiter} is not symmetric: {own.costs[-1]}"
+            raise FvsolveError(f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids")
+        row["limiter"] = code_of_limiter(numerics.limiter, __name__ if self.is_grid else "")
         row["steepest"] = self.steepest
         row["wide"] = LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
