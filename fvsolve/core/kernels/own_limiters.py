@@ -27,7 +27,7 @@ LOOPS = {
     "slope": (RECONSTRUCTION, "tt", "t"),
     "muscl_forward": (RECONSTRUCTION, "VV", ""),
     "muscl_backward": (RECONSTRUCTION, "VV", ""),
-    "inner_slopes": ("fvsolve.core.kernels.scalar_transport", "VV", ""),
+    "inner_slopes": (RECONSTRUCTION, "VV", ""),
 }
 FEATURE = re.compile(r"fvsolve\.features\.\w+")  # package of a feature; its own loops follow in its tables
 PLAIN: list[Callable] = []  # limiter functions without JIT; code FIRST_ADDRESS + k is entry k

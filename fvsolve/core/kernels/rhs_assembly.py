@@ -196,7 +196,6 @@ COMPONENTS = {
 }
 COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
-MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 

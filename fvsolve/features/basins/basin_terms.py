@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from fvsolve.core.kernels.rhs_assembly import MIXED, RhsTerms
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
+from fvsolve.features.scalars.terms import MIXED
 
 PACKAGE = "fvsolve.features.basins"
 COMMON = RhsTerms(
