@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.basins import boundary_cells
+from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.core.assembly.scheme_codes import code_of_limiter, family
 from fvsolve.core.assembly.state_names import Numbered
@@ -299,6 +299,10 @@ class BasinRows(BandedRows):
     def area_ratios(self, y: np.ndarray) -> np.ndarray:
         """Present over undeformed area of each cell at the states y of the model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
+
+    def node_points(self) -> dict[str, np.ndarray]:
+        middle, faces = self.mesh.middle, self.mesh.faces
+        return {f"{self.name}.{patch}": middle[faces(patch).index].mean(axis=0) for patch in patch_names(self.mesh)}
 
     def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
         """Vectors in cells of a basin on a body, in axes of the world: "velocity" and "normal" -> float64[n, 3].
