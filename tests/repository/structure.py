@@ -40,7 +40,7 @@ class Limit(NamedTuple):
 
 # A commit may only move a limit towards its goal. A move away from the goal needs a line in docs/decisions.md.
 # Goals are those of issue 61. Its values are those of 07b0f210: 215 files, 48 811 lines, 223 cells, 96 functions,
-# 53 characters, 1 circle.
+# 53 characters, 1 circle. The issue's goal of 4 comment lines was reached, then raised.
 LIMITS = {
     "files imported by run valve-closure": Limit(limit=184, goal=130, slack=7),
     "lines of these files": Limit(limit=40_500, goal=35_000, slack=1500),
@@ -49,7 +49,7 @@ LIMITS = {
     "cells of the hub matrix, code alone": Limit(limit=149, goal=70, slack=6),
     "functions per 1000 code lines": Limit(limit=97, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
-    "comment lines per 100 code lines of kernels and steppers": Limit(limit=3.9, goal=4, slack=0.2),
+    "comment lines per 100 code lines of kernels and steppers": Limit(limit=5.4, goal=5.5, slack=0.2),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
 }
 

@@ -17,12 +17,12 @@ A = np.array([
 ])  # fmt: skip
 
 
-def windows_in(rates, start, lengths, size=1e-6):
+def windows_in(rates, start, lengths, size=1e-6, scale=1.0):
     """Ends of windows at which steps of Dormand and Prince have returned; rates : function (t, y) -> float64[n]"""
     y, t, found = np.array(start, dtype=float), 0.0, []
     run = SimpleNamespace(
         returns=np.zeros((2, y.size)), state=np.zeros(1, loop_records.STATE), control=np.zeros(1, loop_records.CONTROL),
-        scale=np.ones(y.size), k=np.zeros((7, y.size)), y=np.zeros((2, y.size)),
+        scale=np.full(y.size, scale), k=np.zeros((7, y.size)), y=np.zeros((2, y.size)),
     )  # fmt: skip
     run.control["size"] = size
     nodes = A.sum(axis=1)
@@ -47,6 +47,11 @@ def test_a_cycle_that_repeats_itself_is_detected(length):
     """The difference of levels stays where stages cancel each other, though its rate is not zero."""
     linear = windows_in(lambda t, y: np.array([-y[0]]), [1e-3], [0.1] * 100)
     assert windows_in(steep_tanks, [0.01, 0.0, 0.0], [length] * 200) and not linear
+
+
+def test_a_state_of_fixed_error_scale_that_rests_has_not_returned():
+    """A negative scale is the size of its error, whatever its value: here the value is as great."""
+    assert not windows_in(lambda t, y: np.array([1e-17]), [1.0], [0.1] * 40, scale=-1.0)
 
 
 SMOOTH = {

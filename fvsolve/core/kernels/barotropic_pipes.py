@@ -65,6 +65,7 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             friction += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
             # The profile balances the weight of its own mass.
             force = -weight * dm_cell - (0.5 * friction - pipe["drag"] * (reference / m0))
+            # Conservation: dm'/dt = -dM/dx, dM'/dt = -d(flux)/dx + force, for r and l = (c m' +- M') / 2.
             mass_rate = -(dflow - left_flow) / dx
             flow_rate = -(flux - left_flux) / dx + force
             dr[k] = 0.5 * (c * mass_rate + flow_rate)
@@ -156,6 +157,7 @@ def observe_barotropic(t, y, out, handle, values):
             if kind == rec.PIPE_PRESSURE:
                 value = pressure_or_head(st, floats, probe, p)
             else:
+                # Velocity M / m, or volume flow at the local density.
                 value = flow / m if probe["head"] == 2 else flow / law.density(st, floats, p)
         elif kind == rec.VALVE_FLOW:
             value = valve_volume_flow(st, floats, tables, out, i)

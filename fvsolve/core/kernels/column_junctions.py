@@ -99,6 +99,7 @@ def has_pressure_reference(tables, out, i, k, seen):
     Columns that valves control are left out. seen : receives 1 for the nodes that these columns join
     """
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
+    # Junctions reached so far are marked; each turn adds those behind a further column.
     seen[:] = 0.0
     seen[i], changed = 1.0, True
     while changed:
@@ -123,6 +124,7 @@ def is_pinned(tables, out, i, seen):
     """
     if has_pressure_reference(tables, out, i, -1, seen):
         return False
+    # A junction with a lower number in this group is held instead.
     for j in range(i):
         if seen[j] > 0.0:
             return False
@@ -171,6 +173,7 @@ def assemble_junctions(tables, out, n, k):
     for j in range(columns.size):
         if j == k or out[controlled + j] != 0.0:
             continue
+        # A column between two junctions couples them by (A / L) (P_a - P_b).
         a, b = int(rows[columns[j]["from_node"]]), int(rows[columns[j]["to_node"]])
         mobility = columns[j]["area"] / columns[j]["length"]
         if a >= 0:
@@ -230,6 +233,7 @@ def balance_junction_flows(tables, out):
     assemble_junctions(tables, out, n, -1)
     rows, _, _, right, pinned, _ = junction_work(tables, n)
     layout, columns = tables.layout[0], tables.columns
+    # Impulses must remove the flow that does not add up, which is the right-hand side.
     add_flow_sums(tables, out, rows, right)
     for r in range(n):
         # Only differences of impulses act, so the impulse of one held junction may be 0.
@@ -238,6 +242,7 @@ def balance_junction_flows(tables, out):
     for k in range(columns.size):
         a, b = columns[k]["from_node"], columns[k]["to_node"]
         if out[layout["valve_controlled"] + k] == 0.0:
+            # dM = (A / L) times the difference of the impulses at both ends
             impulse = value_at(rows, right, b) - value_at(rows, right, a)
             change = columns[k]["area"] / columns[k]["length"] * impulse
             out[layout["column"] + k] -= change
@@ -313,6 +318,7 @@ def far_end_pressure(y, tables, out, k, end, solved):
     i = column["from_node"] if end == 1 else column["to_node"]
     if not is_column_junction(tables, out, i):
         return pressure_at(tables, out, i, end * column["flow"], solved), 0.0
+    # The far end has no given pressure: it follows from the other columns there.
     n = number_junctions(tables, out)
     assemble_junctions(tables, out, n, k)
     rows, _, _, right, _, _ = junction_work(tables, n)

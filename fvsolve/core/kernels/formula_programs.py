@@ -75,6 +75,7 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
             stack[k] = 1.0 if time > number or (time == number and limit > number) else 0.0
             k += 1
         elif code == WHERE:
+            # On the stack: condition, value where it holds, value elsewhere.
             k -= 2
             if stack[k - 1] == stack[k - 1]:  # else NaN, which stays
                 stack[k - 1] = stack[k] if stack[k - 1] != 0.0 else stack[k + 1]
@@ -144,6 +145,7 @@ def program_slopes(pieces, first, t, limit, stack):
     for i in range(first + 1, first + 1 + int(pieces[first, STEPS])):
         code, number = int(pieces[i, 1]), pieces[i, 2]
         if code in (CONSTANT, TIME, BEFORE, AFTER):
+            # Between switching times all of them but the time are constants without slopes.
             after = time > number or (time == number and limit > number)
             stack[k], stack[k + 1], stack[k + 2] = number, 0.0, 0.0
             if code == TIME:
@@ -152,6 +154,7 @@ def program_slopes(pieces, first, t, limit, stack):
                 stack[k] = 1.0 if after == (code == AFTER) else 0.0
             k += 3
         elif code == WHERE:
+            # The chosen value keeps its slopes: a condition is constant between switching times.
             k -= 6
             source = k if stack[k - 3] != 0.0 else k + 3
             for j in range(3):
@@ -187,6 +190,7 @@ def slope_of_function(code, k, stack):
     else:
         f = tanh(x)
         df, ddf = 1.0 - f * f, -2.0 * f * (1.0 - f * f)
+    # Chain rule: f(x)'' = f''(x) x'^2 + f'(x) x''.
     stack[k - 3], stack[k - 2], stack[k - 1] = f, df * dx, ddf * dx * dx + df * ddx
 
 
@@ -200,6 +204,7 @@ def slope_of_pair(code, k, stack):
     elif code == MULTIPLY:
         f, df, ddf = x * y, dx * y + x * dy, ddx * y + 2.0 * dx * dy + x * ddy
     elif code == DIVIDE:
+        # Quotient rule by derivatives of x = f y: x' = f' y + f y', x'' = f'' y + 2 f' y' + f y''.
         f = x / y
         df = (dx - f * dy) / y
         ddf = (ddx - 2.0 * df * dy - f * ddy) / y
@@ -207,18 +212,22 @@ def slope_of_pair(code, k, stack):
         # A constant power also has slopes for a negative base, whose logarithm does not exist.
         f, slope = x**y, y * x ** (y - 1.0) if y != 0.0 else 0.0
         df, ddf = slope * dx, slope * ddx
+        # For these powers the coefficient is zero, while x^(y - 2) may be infinite.
         if y != 0.0 and y != 1.0:
             ddf += y * (y - 1.0) * x ** (y - 2.0) * dx * dx
     elif code == POWER_OF:
+        # Logarithmic derivative: f' = f (y ln x)'.
         f, log_x = x**y, log(x)
         rate = dy * log_x + y * dx / x
         df = f * rate
         ddf = df * rate + f * (ddy * log_x + 2.0 * dy * dx / x + y * (ddx / x - dx * dx / (x * x)))
     elif code == HYPOTENUSE:
+        # Derivatives of f^2 = x^2 + y^2.
         f = hypot(x, y)
         df = (x * dx + y * dy) / f
         ddf = (dx * dx + dy * dy + x * ddx + y * ddy - df * df) / f
     else:
+        # Derivative of the angle: (x' y - x y') / (x^2 + y^2).
         f, square = atan2(x, y), x * x + y * y
         df = (dx * y - x * dy) / square
         ddf = (ddx * y - x * ddy) / square - df * 2.0 * (x * dx + y * dy) / square

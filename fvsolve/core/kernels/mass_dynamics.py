@@ -114,6 +114,7 @@ def chamber_state(tables, node, volume, excess):
     """
     st, floats = tables.settings[0], tables.floats
     if st["law"] == rec.LAW_LINEAR:
+        # dp/dm = beta / (rho_0 V): it grows as the chamber shrinks.
         stiffness = node["stiffness"] * node["volume"] / volume
         return stiffness * excess, stiffness
     # log1p keeps the digits of a small excess, which the quotient of two masses would lose.
@@ -151,6 +152,7 @@ def piston_chambers(t, y, dydt, out, handle):
         piston = pistons[k]
         x, speed = piston_travel(out, tables, k)
         for side in range(2):
+            # With travel, side A grows and side B shrinks.
             i = piston["b"] if side == 1 else piston["a"]
             area = -piston["area_b"] if side == 1 else piston["area_a"]
             sweep = piston["sweep_b"] if side == 1 else piston["sweep_a"]
@@ -196,11 +198,13 @@ def forces(t, y, out, tables):
         if brace["schedule"] >= 0:
             change += schedule_value(tables, brace["schedule"], t) - brace["given"]
         add_push(out, tables, k, brace["from_mass"], brace["to_mass"], change, brace["force"])
+    # The flags of stops are the last ones, two for each stop.
     first = armed.size - 2 * stops.size
     for k in range(stops.size):
         stop = stops[k]
         x, speed = stop_travel(out, tables, k)
         total = 0.0
+        # Flags hold during a step, so that no contact begins or ends within it.
         if armed[first + 2 * k] > 0.0:
             total += contact_force(stop["stiffness"], stop["damping"], -(stop["below"] + x), -speed)
         if armed[first + 2 * k + 1] > 0.0:
@@ -210,6 +214,7 @@ def forces(t, y, out, tables):
     for k in range(pistons.size):
         piston = pistons[k]
         _, speed = piston_travel(out, tables, k)
+        # Only changes of pressure act: the forces at the start are in balance.
         change = piston["area_a"] * out[layout["pressure"] + piston["a"]]
         change -= piston["area_b"] * out[layout["pressure"] + piston["b"]]
         change -= piston["damping"] * (speed - piston["speed"])
@@ -291,6 +296,7 @@ def contact_rate(out, tables):
         if not stiffness > 0.0 or stop["line"] >= 0:
             continue
         travel, speed = stop_travel(out, tables, k)
+        # Acceleration x'' of the distance between both masses.
         change = out[net + j] * masses[j]["lightness"] - out[net + i] * masses[i]["lightness"]
         for side in range(2):
             if armed[first + 2 * k + side] > 0.0:
@@ -356,6 +362,7 @@ def record_masses(t, y, out, handle, values):
     """Record the first time at which each piston leaves its stroke, in `marks`."""
     tables = open_tables(handle)
     marks, pistons = tables.marks, tables.pistons
+    # Marks of pistons follow those of pipes, nodes and columns.
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
     for k in range(pistons.size):
         piston, at = pistons[k], first + k
@@ -369,6 +376,7 @@ def mass_events(t, y, out, handle, g):
     """Write the event functions of stops to g: remaining free travel to each of their two sides [m]."""
     tables = open_tables(handle)
     stops = tables.stops
+    # No rates have been computed at the state of an event, so travels are written here.
     write_travels(y, out, tables)
     first = g.size - 2 * stops.size
     for k in range(stops.size):

@@ -41,6 +41,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
     armed = tables.armed
     for i in range(masses.size):
         power[at] = 0.0
+        # A mass without states is fixed.
         if masses[i]["y"] >= 0:
             power[at] = motion(masses[i], y)[1] * dydt[masses[i]["y"] + 1] / masses[i]["lightness"]
         at += MASS
@@ -61,6 +62,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
             if armed[first + 2 * k + side] > 0.0:
                 deep = x - stop["above"] if side == 1 else -(stop["below"] + x)
                 faster = speed if side == 1 else -speed
+                # `into` is the power of the contact force, `rate` the part that its spring stores.
                 into += contact_force(stop["stiffness"], stop["damping"], deep, faster) * faster
                 rate += stop["stiffness"] * deep * faster
         power[at], power[at + 1] = rate, into - rate
@@ -80,6 +82,7 @@ def stored_masses(y, out, tables, stored, at):
         at += 1
     for k in range(braces.size):
         x = travel_of(out, tables, k)[0]
+        # Work against a spring force that is `force` at the start and falls by k x.
         stored[at] = x * (0.5 * braces[k]["stiffness"] * x - braces[k]["force"])
         # A damper or a given force stores nothing, whatever its travel.
         if braces[k]["stiffness"] == 0.0:
@@ -127,10 +130,13 @@ def power_pistons(y, dydt, out, tables, power, at):
             change = out[layout["pressure"] + i]
             p = (nodes[i]["pressure"] - st["ambient"]) + change
             excess, swept = dydt[nodes[i]["y"]], area * speed
+            # Between bodies the state is the mass, which contains the swept mass.
             if piston["line"] >= 0:
                 excess -= sweep * speed
+            # Part of d/dt (V p^2 / (2 beta)) due to the change of volume at constant excess.
             own = p * swept * (0.5 * p / st["beta"] - change / st["beta"])
             power[NODE * i + 1] = per * (p * excess + height_pressure(st, nodes[i]) * (excess + sweep * speed)) + own
+            # Power that the swept flow carries minus work of the piston: unequal at constant density.
             law += (per * p * sweep * speed - p * swept) - own
         power[at] = drop * piston["leakage"] * (gauge_pressure(tables, out, a) - gauge_pressure(tables, out, b))
         power[at + 1], power[at + 2] = piston["damping"] * speed * speed, law
@@ -152,6 +158,7 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
         a, b = piston["a"], piston["b"]
         for side in range(2):
             i, area, sweep = piston_side(tables, piston, side)
+            # The excess does not contain the mass that the piston sweeps.
             gained = dydt[nodes[i]["y"]] + (sweep * speed if piston["line"] < 0 else 0.0)
             power[NODE * i + 1] = total_head(tables, out, i) * gained - gauge_pressure(tables, out, i) * area * speed
         p_a, p_b = nodes[a]["pressure"] + out[pressure + a], nodes[b]["pressure"] + out[pressure + b]
@@ -169,6 +176,7 @@ def moving_chamber_energy(out, tables, i, growth, gained):
     """
     st, node = tables.settings[0], tables.nodes[i]
     change, p0 = out[tables.layout[0]["pressure"] + i], node["pressure"] - st["ambient"]
+    # V p^2 - V_0 p_0^2, expanded in the changes of pressure and volume.
     squeezed = node["volume"] * change * (2.0 * p0 + change) + growth * (p0 + change) * (p0 + change)
     height = 1.0 / st["rho"] * height_pressure(st, node) * gained
     return 0.5 * squeezed / st["beta"] + height

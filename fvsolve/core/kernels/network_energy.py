@@ -117,6 +117,7 @@ def tank_energy(st, floats, node, rho, change):
     z : elevation of its bottom above datum; rho : density [kg/m3]
     """
     level, z = node["level"], node["elevation"] - st["datum"]
+    # Constant area: the level rises by change / (rho A), by half of it on average.
     if node["shape"] < 0:
         return st["gravity"] * change * (z + level + 0.5 * change / (rho * node["area"]))
     new = level_moment(floats, node["shape"], node["shapes"], tank_level(node, floats, rho, change))
@@ -142,6 +143,7 @@ def level_moment(floats, shape, rows, level):
         if not last and z1 >= z0:  # a tank is a prism below its first level
             growth = (floats[shape + rows + k + 1] - a0) / (floats[shape + k + 1] - z0)
         d = z1 - z0
+        # Integral of z (a0 + growth (z - z0)) from z0 to z1.
         total += d * (a0 * (z0 + 0.5 * d) + growth * d * (0.5 * z0 + d / 3.0))
     return total
 
@@ -151,6 +153,7 @@ def chamber_energy(y, out, tables, i):
     """Change since the start of the energy of chamber i under the density law `linear` [J]."""
     st, node = tables.settings[0], tables.nodes[i]
     change, p0 = out[tables.layout[0]["pressure"] + i], node["pressure"] - st["ambient"]
+    # Pressure is linear in mass: the mean pressure over the change gives the energy.
     return 1.0 / st["rho"] * y[node["y"]] * (p0 + 0.5 * change + height_pressure(st, node))
 
 
@@ -174,13 +177,16 @@ def _fill_power(t, y, dydt, out, handle, power):
     valves, columns, at = tables.valves, tables.columns, 0
     per = 1.0 if BAROTROPIC else 1.0 / st["rho"]
     for i in range(nodes.size):
+        # Power from outside is the energy per mass at the node times the supplied flow.
         head = POTENTIAL(tables, out, i) * per
         power[at], power[at + 1] = head * out[layout["supply"] + i], 0.0
+        # Chambers of pistons are written by `mass_energy`, vessels by their devices.
         if nodes[i]["kind"] == TANK or nodes[i]["kind"] == CHAMBER:
             power[at + 1] = head * dydt[nodes[i]["y"]]
         at += NODE
     for k in range(pipes.size):
         pipe, end = pipes[k], layout["ends"] + 4 * k
+        # Mass flows at both ends, from the four waves there.
         into = POTENTIAL(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         into -= POTENTIAL(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
         # Creep adds to its entries later.
@@ -222,6 +228,7 @@ def _fill_stored(t, y, dydt, out, handle, stored):
         at += 2
     for k in range(columns.size):
         change = y[columns[k]["y"]]
+        # L / (rho A) (M^2 - M_0^2) / 2, from the change of the flow M.
         stored[at] = column_inertia(st, columns[k]) * change * (columns[k]["flow"] + 0.5 * change)
         at += 1
 

@@ -259,6 +259,7 @@ def tank_events(t, y, out, handle, g):
             node, k = nodes[i], EVENTS * nodes[i]["row"]
             stored = node["mass"] + y[node["y"]]
             space = node["full"] - stored
+            # Only a tank at a limit needs its net flow, which costs a solution of all nodes.
             if not solved and (is_near(node, stored) or is_near(node, space)):
                 run_job(CLOSE, t, y, y[:0], out, handle)
                 solved = True

@@ -46,11 +46,13 @@ def symmetric_limiter(a, b):
     It is phi(r) times the larger difference, r the ratio of the smaller to it, so that it is symmetric to the last bit.
     """
     larger, smaller = (a, b) if abs(a) > abs(b) else (b, a)
+    # Two zero differences have no ratio; with any ratio their slope is zero.
     return RATIO(smaller / (larger if larger != 0.0 else 1.0)) * larger, 1.0
 
 
 def ordered_limiter(a, b):
     """Limiter of a user as (numerator, denominator): phi(r) b with r = a / b, for differences a behind and b ahead."""
+    # Bounds the ratio a / b where the difference ahead nearly vanishes.
     least = CLOSEST * abs(a) + LEAST
     base = b if abs(b) > least else copysign(least, a)
     return RATIO(a / base) * base if a != 0.0 or b != 0.0 else 0.0, 1.0
@@ -96,6 +98,7 @@ def loop_address(name: str, module: str, letters: str, limiter, folder: str) -> 
     head = "value, " if letters.startswith("F") else ""
     known = {"loop": uncached(getattr(home, name)), "limiter": limiter}
     known |= {"value": uncached(home.limited_value)} if head else {}
+    # A function of its own for each limiter, which numba compiles as a whole, with the limiter inside.
     plain = eval(f"lambda {names}: loop(limiter, {head}{names})", known)
     plain.__name__ = plain.__qualname__ = name
     compiled = calls.law_njit(plain)

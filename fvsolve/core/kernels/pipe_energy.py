@@ -37,6 +37,7 @@ def point_weights():
     weights = np.zeros((MAX_WIDTH + 1, MAX_WIDTH, 3, MAX_WIDTH))
     for w in range(1, MAX_WIDTH + 1):
         for i in range(w):
+            # Averages of powers of x over the cells: the weights give the value of each power at the points.
             edges = np.arange(w + 1) - i - 0.5
             powers = np.arange(w)
             means = (edges[1:, None] ** (powers + 1) - edges[:-1, None] ** (powers + 1)) / (powers + 1)

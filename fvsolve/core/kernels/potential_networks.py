@@ -30,6 +30,7 @@ def row_change(y, out, tables, r):
     """Change of row r since the start."""
     places, factors, inputs = tables.network_places, tables.network_factors, tables.layout[0]["network"]
     first, middle, last, rows = places[3 * r], places[3 * r + 1], places[3 * r + 2], places[0] // 3
+    # Entries follow three offsets for each row in `places`, and one value for each row in `factors`.
     change, shift = 0.0, rows - places[0]
     for k in range(first, middle):
         change += factors[k + shift] * y[places[k]]
@@ -54,6 +55,7 @@ def known_potential(t, y, tables, r):
         value += factors[k + shift] * y[places[k]]
     for k in range(middle, last):
         source = tables.network_inputs[places[k]]
+        # Other sources are not known yet and count as unchanged.
         if source["kind"] == rec.SCHEDULE_INPUT:
             given = source["sign"] * schedule_value(tables, source["index"], t)
             value += factors[k + shift] * (given - source["start"])
@@ -76,6 +78,7 @@ def slipping_torque(t, y, out, tables, switch):
     if switch["schedule"] >= 0:
         return direction * schedule_value(tables, switch["schedule"], t)
     torque = switch["kinetic"]
+    # Stribeck curve: from static to kinetic friction as the slip grows.
     if switch["stribeck"] > 0.0:
         share = row_value(y, out, tables, switch["drop"]) / switch["stribeck"]
         torque += (switch["static"] - switch["kinetic"]) * exp(-share * share)
@@ -94,6 +97,7 @@ def torque_at_rest(t, tables, switch):
 def element_power(y, out, tables, element):
     """Power into an element [W]; of a thermal element the heat that it takes up."""
     flow = row_value(y, out, tables, element["flow"])
+    # The flow of a thermal element is a power itself, which no drop multiplies.
     if element["thermal"] == 1:
         return element["weight"] * flow
     return row_value(y, out, tables, element["drop"]) * flow
@@ -151,12 +155,14 @@ def observe_networks(t, y, out, handle, values):
         if probes[k]["kind"] == rec.NETWORK_VALUE:
             i, side = probes[k]["index"], probes[k]["side"]
             if side == rec.LOCKED:
+                # Dry friction is locked while neither direction of slip is active.
                 value = 0.0 if tables.armed[i] + tables.armed[i + 2] > 0.0 else 1.0
             else:
                 value = row_value(y, out, tables, i)
             if side == rec.POWER:
                 value *= row_value(y, out, tables, probes[k]["cell"])
             elif side == rec.ENTROPY:
+                # Flow of entropy: flow of heat over temperature.
                 value = row_value(y, out, tables, probes[k]["cell"]) / value
             elif side == rec.NET_PUSH:
                 value = out[tables.layout[0]["push"] + probes[k]["cell"]] - value
@@ -167,6 +173,7 @@ def observe_networks(t, y, out, handle, values):
 def sources_for_events(t, y, out, handle, g):
     """Write all sources to `out` before event functions are evaluated; g is not used."""
     tables = open_tables(handle)
+    # Forces on masses are sources, and no rates have been computed at this state.
     if tables.masses.size > 0:
         forces(t, y, out, tables)
     write_sources(t, y, out, tables)
@@ -220,8 +227,10 @@ def switch_events(t, y, out, handle, g):
         if switch["kind"] == rec.SWITCH:
             left = CLOSED - schedule_value(tables, switch["schedule"], t)
         elif tables.armed[switch["flag"]] > 0.0:
+            # A diode that conducts blocks when its flow changes sign.
             left = -row_value(y, out, tables, switch["flow"]) - switch["rounding"]
         else:
+            # A diode that blocks conducts when the drop exceeds its forward drop.
             left = switch["forward"] - row_value(y, out, tables, switch["drop"])
         write_pair(g, switch["flag"], left if left != 0.0 else TINY)
 
@@ -249,6 +258,7 @@ def stored_networks(t, y, dydt, out, handle, stored):
             level = 1.0 if element["thermal"] == 1 else element["start"] + 0.5 * change
             energy = element["capacity"] * change * level
         elif element["inertance"] > 0.0:
+            # Inertance: I (q^2 - q_0^2) / 2 of its flow q, in the same form.
             change = row_change(y, out, tables, element["flow"])
             energy = element["inertance"] * change * (element["start"] + 0.5 * change)
         stored[first + k] = energy

@@ -41,6 +41,7 @@ def monotonized_central(a, b):
     """
     s = a if abs(a) < abs(b) else b
     c = 0.5 * (a + b)
+    # Up to twice the smaller difference, face values create no new extreme.
     m = 2.0 * s if 2.0 * abs(s) < abs(c) else c
     return m if a * b > 0.0 else 0.0, 1.0
 
@@ -111,9 +112,11 @@ def value_weno5(a, b, c, d, e, small):
 
     small : square of a negligible value, which prevents a division by zero
     """
+    # Face values of three parabolas, each through three of the five cells.
     p0 = (2.0 * a - 7.0 * b + 11.0 * c) / 6.0
     p1 = (-b + 5.0 * c + 2.0 * d) / 6.0
     p2 = (2.0 * c + 5.0 * d - e) / 6.0
+    # Smoothness indicators of Jiang and Shu (1996): a parabola across a front has a great one.
     s0 = 13.0 / 12.0 * (a - 2.0 * b + c) ** 2 + 0.25 * (a - 4.0 * b + 3.0 * c) ** 2
     s1 = 13.0 / 12.0 * (b - 2.0 * c + d) ** 2 + 0.25 * (b - d) ** 2
     s2 = 13.0 / 12.0 * (c - 2.0 * d + e) ** 2 + 0.25 * (3.0 * c - 4.0 * d + e) ** 2
@@ -163,6 +166,7 @@ def faces_weno5(small, backward, p, f):
     backward : 1 for a backward wave; small : square of a negligible value, which prevents a division by zero
     """
     if backward == 1:
+        # The mirror image: cells are read in the opposite order.
         for j in range(f.size):
             f[j] = value_weno5(p[j + 5], p[j + 4], p[j + 3], p[j + 2], p[j + 1], small)
     else:
@@ -218,6 +222,7 @@ def rhs_periodic(t, y, dydt, out, handle):
     p, f = scratch[: n + 6], scratch[n + 6 :]
     for j in range(n):
         p[j + 3] = y[j]
+    # The ring goes on with the cells of its opposite end.
     for g in range(3):
         p[g], p[n + 3 + g] = y[n - 3 + g], y[g]
     faces(settings, settings["scheme"], tables.pipes[0]["noise"], 0, p, f)

@@ -85,11 +85,13 @@ def velocity_change(st, floats, profile, pipe, r, l, w):
     """
     n, c, flow, reference = r.size, pipe["speed"], pipe["flow"], st["rho"] * pipe["area"]
     for i in range(n):
+        # Central slopes, one-sided in the end cells.
         low, high = max(i - 1, 0), min(i + 1, n - 1)
         gauss = GAUSS / max(high - low, 1)
         m0, dm, dflow = profile[pipe["center"] + i], (r[i] + l[i]) / c, r[i] - l[i]
         a = gauss * ((r[high] - l[high]) - (r[low] - l[low]))
         b = gauss * ((r[high] + l[high]) - (r[low] + l[low])) / c
+        # M / m at both Gauss points: a quotient of averages would be of second order only.
         u = (flow + (dflow + a)) / (m0 + (dm + b)) + (flow + (dflow - a)) / (m0 + (dm - b))
         # Minus the value of the profile, so that the variables start at zero.
         w[i] = reference * (0.5 * u - flow / m0)
@@ -372,6 +374,7 @@ def _add_power(t, y, dydt, out, handle, power):
             INPUT(st, floats, profile, pipe, y[o : o + n], y[o + n : o + 2 * n], w)
             taken, rate = POWER(st, floats, profile, pipe, w, y, dydt)
             power[at + ROW] += taken
+            # The row after creep is the residual of the density law.
             power[at + CREEP + 1] += RESIDUAL(st, floats, profile, pipe, node, w, y, dydt)
             power[at + STORAGE] += rate + WORK(st, floats, profile, pipe, node, dydt)
         at += PIPE

@@ -244,8 +244,10 @@ class ModelFeatures(NamedTuple):
         if self.bands:
             yield BANDS
         linear = self.family == "linear"
+        # Only pipes have cavities: without pipes the barotropic functions serve a cavitating law too.
         family = self.family if linear or self.pipes else "barotropic"
         yield from self.terms_at("first")
+        # Without pipes and delay lines no waves reach the nodes, which then have simpler functions.
         lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
@@ -278,14 +280,17 @@ class ModelFeatures(NamedTuple):
         if self.bodies:
             yield COMPONENTS["bodies"]
             yield COMPONENTS["pins" if self.pins else "no pins"]
+        # After the accelerations, whose factored mass matrix the rate limits of bushings and pipes use.
         if self.bushings:
             yield COMPONENTS["bushings"]
         if self.moving_segments:
             yield COMPONENTS["moving segments" if linear else "moving segments, barotropic"]
+        # Before the masses: their event functions read the lengths of elements between bodies.
         if self.lines:
             yield COMPONENTS["stretches"]
         if self.masses:
             yield COMPONENTS["masses"]
+        # After the masses, whose functions compute the forces of all elements.
         if self.lines:
             yield COMPONENTS["lines"]
         if self.devices:
@@ -296,6 +301,7 @@ class ModelFeatures(NamedTuple):
     def last_components(self, family: str) -> Iterator[RhsTerms]:
         """Yield the last terms: memory of pipes, flows, what they carry; family : kernels of the density law."""
         linear = self.family == "linear"
+        # After the pipes: these functions subtract from the rates of waves.
         if self.unsteady_friction:
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:

@@ -173,6 +173,7 @@ def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
     """
     valve, column = tables.valves[index], tables.columns[k]
     device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
+    # True if the column lies at the `from` end of the valve.
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
     before, behind = (stationary, other) if ahead else (other, stationary)
     still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
@@ -207,11 +208,13 @@ def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
 def seating_flow(t, y, tables, out, k, end, index, solved):
     """Results of `controlled_flow` for column k, which valve `index` controls near its seat."""
     valve, column = tables.valves[index], tables.columns[k]
+    # 1 if the column lies at the `from` end of the valve, so that outflow is positive.
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
     other = junctions.pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
     still = valve["drop"] + side * (stationary - other)
     drop, speed = seating_drop(t, y, tables, out, k, index, stationary, inertia, other, still)
+    # Orifice law: flow = sqrt(G) x sign(dP) sqrt(|dP|), and its rate by dx/dt.
     root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
     rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
     return sqrt(conductance(tables, out, index)) * root, rate, stationary + side * (drop - still)
@@ -234,6 +237,7 @@ def gate_flow(t, tables, out, x, p, solved):
         widening = (later - sqrt(conductance_at(t, tables, out, k))) / RATE_INTERVAL
         flow += sqrt(conductance(tables, out, k)) * root
         rate += widening * root
+        # Bounded, because sqrt(dP) has an infinite slope without a drop.
         rise += 0.5 * widening / max(abs(root), 1e-300)
     return flow, rate, rise
 
@@ -311,11 +315,13 @@ def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
     Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
     """
     flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
+    # No flow and no moving valve: nothing decelerates the column.
     if flow == 0.0 and rate == 0.0:
         return stationary
     # Opening valves: the residual rises with the pressure and has a single root.
     if rate * flow >= 0.0:
         return opening_pressure(t, tables, out, x, stationary, inertia, solved)
+    # With r = sqrt(dP), all roots satisfy r^2 <= brake r + the greatest stationary drop.
     brake = -inertia * rate / flow * junctions.gate_area(tables, out, x)[0]
     way = 1.0 if own > 0.0 or (own == 0.0 and flow > 0.0) else -1.0
     least, most = zero_flow_range(tables, out, x, solved)
@@ -339,6 +345,7 @@ def controlled_rate(t, y, tables, out, k, end):
     """
     flow, rate, _ = controlled_flow(t, y, tables, out, k, end, True)
     column = tables.columns[k]
+    # A flow that grows does not change its sign.
     if rate * flow >= 0.0:
         return rate
     area, full = junctions.gate_area(tables, out, column["to_node"] if end == 1 else column["from_node"])
@@ -605,8 +612,10 @@ def column_rate_limit(t, y, dydt, out, handle):
             slope = 0.0
             for e in range(nodes[i]["gate_count"]):
                 valve = tables.integers[nodes[i]["gates"] + e]
+                # Drop at the start plus the changes of the pressures at both ends.
                 drop = valves[valve]["drop"] + out[layout["pressure"] + valves[valve]["from_node"]]
                 drop -= out[layout["pressure"] + valves[valve]["to_node"]]
+                # Valves in parallel: their slopes dM / dp add up.
                 slope += restriction_slope(tables, out, valve, drop)
             if slope > 0.0 and control_end(tables, out, k) == 0:
                 out[RATE] = max(out[RATE], column["area"] / column["length"] / slope)

@@ -22,6 +22,7 @@ def piece_at(pieces, first, count, t, limit):
     while high - low > 1:
         middle = (low + high) // 2
         start = pieces[middle, 0]
+        # A piece that begins at the end of the segment applies only from there on.
         if start < limit and start <= t:
             low = middle
         else:
@@ -60,6 +61,7 @@ def piece_slopes(pieces, row, t):
     if pieces[row, 1] == POWER:
         span, n, rest = pieces[row, 5], pieces[row, 6], 1.0 - s / pieces[row, 5]
         fall = (pieces[row, 4] - pieces[row, 3]) * n / span
+        # At its end only a linear piece still has a slope.
         if rest <= 0.0:
             return fall if n == 1.0 else 0.0, 0.0
         return fall * rest ** (n - 1.0), -fall * (n - 1.0) / span * rest ** (n - 2.0)

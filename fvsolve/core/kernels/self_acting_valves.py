@@ -39,6 +39,7 @@ def loop_rate(out, tables, k, i, speed):
     """
     layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]
+    # Fall of the drop per flow, by the pressures of both nodes.
     soft = node_impedance(tables, valve["from_node"]) + node_impedance(tables, valve["to_node"])
     gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
     # A stored mass adds an integration to the loop, which then oscillates: its rate is a square root.
@@ -83,6 +84,7 @@ def control_limit(out, tables, device, speed):
     for k in range(columns.size):
         for i in (columns[k]["from_node"], columns[k]["to_node"]):
             at_end, node = i == valve["from_node"] or i == valve["to_node"], tables.nodes[i]
+            # Only the sole valve at the end of a single column can control it.
             if at_end and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
                 limit = max(
                     limit, column_control_limit(out, tables, device, columns[k]["area"] / columns[k]["length"], speed)

@@ -40,6 +40,7 @@ def weir_flow(size, h, fall):
     free = size * h * sqrt(h)
     if fall >= h:
         return free, FREE
+    # Villemonte's factor of a drowned weir, (1 - ((h - fall) / h)^1.5)^0.385.
     return free * exp(0.385 * log(-expm1(1.5 * log1p(-fall / h)))), DROWNED
 
 
@@ -115,12 +116,14 @@ def line_template(floats, at, setting, z, fall, present, firm):
     flow = FLOW(floats, at, setting, ahead, high, size)[0]
     by_fall, by_level = SLOPES(floats, at, setting, ahead, high, size)
     by_level = max(by_level, 0.0)
+    # Near the present flow the chord is the tangent, but a quotient of rounding errors.
     if abs(flow - m) > NEAR * (abs(flow) + abs(m)):
         by_fall = CHORD(floats, at, setting, ahead, high, size, flow, m, False)
         by_fall += max(CHORD(floats, at, setting, ahead, high, size, flow, m, True) - by_level, 0.0)
     by_fall = max(by_fall, least_slope(flow, m, firm))
     if ahead:
         return flow, by_fall, by_level
+    # The higher level is z - fall, so its slope enters the slope over the fall.
     return -flow, by_fall + by_level, -by_level
 
 

@@ -119,6 +119,7 @@ def linked_handles(shared: tuple, views: list[View], written: tuple, called: tup
     """
     for view in views:
         within = handle_of((*view.tables, *addresses_of((*with_features(written, view.features, kept), *called))))
+        # In place, because tables of the model refer to this array.
         view.array[:] = within if COMPILING else boxed(within)
     return handle_of((*shared, *addresses_of((*with_features(written, features, kept), *called))))
 
@@ -141,6 +142,7 @@ def with_features(written: tuple, features: list, kept: list) -> tuple:
         if tables is not None and COMPILING:
             handle = handle_of(addresses_of(tables))
             slots[k] = handle.ctypes.data
+            # An address keeps no array alive.
             kept += [handle, tables]
         elif tables is not None:
             slots[k] = tables

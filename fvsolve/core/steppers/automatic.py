@@ -32,6 +32,7 @@ def step_cost_ratio(structure: Structure, work: float = 1.0) -> float:
     """
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
     algebra = DENSE_COST * structure.n**2 if structure.kind == "dense" else SPARSE_COST
+    # An explicit step takes its first rate from the step before, so that one stage costs nothing.
     return (structure.color_count + implicit.stages + 1 + algebra / work) / (explicit.stages - 1)
 
 

@@ -29,6 +29,7 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
         return method.coefficients
     a, b, c, dense = method.a, method.b, method.c, method.dense
     error = method.error if method.adaptive else np.zeros(len(b))
+    # Steps begin with f at their start: other methods receive it as a further stage of weight 0.
     if a[0].any() or c[0] != 0.0 or damped:
         a = np.block([[0.0, np.zeros(len(b))], [np.zeros((len(b), 1)), a]])
         b, c, error = (np.concatenate(([x], part)) for x, part in ((0.0, b), (0.0, c), (method.start_error, error)))
@@ -119,6 +120,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
             t[:, at], t[:, at + 1] = v.real, -v.imag
             blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
             at += 2
+    # A basis that is nearly singular would amplify rounding.
     if at < q or np.linalg.cond(t) > 1e8:
         raise ValueError("no basis of eigenvectors")
     back, ahead = np.linalg.inv(t), np.zeros((q, q))

@@ -23,7 +23,7 @@ from fvsolve.core.kernels.stage_sums import (
 from fvsolve.core.steppers import loop_records as rec
 from fvsolve.core.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.core.steppers.run_handle import evaluate, note_stage, open_run, stage_rates, store_ledger_rates
-from fvsolve.core.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands
+from fvsolve.core.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands, error_scale
 from fvsolve.jit import njit
 
 CHUNK = 512  # number of states of a vector loop whose operands stay in the cache
@@ -34,11 +34,11 @@ def quotient(f_new, f, y_new, y, scale):
     """Estimate of the spectral radius of the Jacobian from two stages at the end of a step (Hairer and Wanner IV.2).
 
     It is |f_new - f| / |y_new - y|, with the rates f_new, f and states y_new, y of the two stages. The weight of each
-    state in the norms is 1 / (scale + |y|).
+    state in the norms is 1 / `error_scale`.
     """
     above, below = 0.0, 0.0
     for i in range(y.size):
-        w = 1.0 / (scale[i] + abs(y[i]))
+        w = 1.0 / error_scale(scale[i], y[i])
         above += ((f_new[i] - f[i]) * w) * ((f_new[i] - f[i]) * w)
         below += ((y_new[i] - y[i]) * w) * ((y_new[i] - y[i]) * w)
     return sqrt(above / below) if below > 0.0 else 0.0

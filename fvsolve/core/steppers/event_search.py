@@ -135,6 +135,7 @@ def is_excluded(r, h, middle, far):
     for i in range(g.size):
         if is_function_near(r, i, h, far):
             moved = abs(middle[i] - g[i]) + abs(g_new[i] - middle[i])
+            # The line through one end and the middle, extended to the other end, bounds the function there.
             least = min(middle[i], 2.0 * middle[i] - g[i], 2.0 * middle[i] - g_new[i])
             ends_there = g_new[i] <= 0.0 and abs(middle[i] - 0.5 * (g[i] + g_new[i])) <= STRAIGHT * g[i]
             if not (least > MARGIN * moved or ends_there):
@@ -155,6 +156,7 @@ def lower_bound(a, at_a, fall, b, at_b, rise):
         return a, at_a
     if rise <= 0.0:
         return b, at_b
+    # Both lines meet at the least value that a convex function can have.
     x = (at_b - at_a + fall * a - rise * b) / (fall - rise)
     return (x, at_a + fall * (x - a)) if a < x < b else (a, min(at_a, at_b))
 
@@ -180,6 +182,7 @@ def search_interval(handle, run, r, h, i, j, f_new, now, new):
             return x
         value = inner[OTHER, i]
         before, after = (value - at_a) / (x - a), (at_b - value) / (b - x)
+        # Continue in the part that may contain the lower value.
         if lower_bound(a, at_a, fall, x, value, after)[1] < lower_bound(x, value, before, b, at_b, rise)[1]:
             b, at_b, rise = x, value, after
         else:

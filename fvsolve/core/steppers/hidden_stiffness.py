@@ -7,6 +7,7 @@ then do not add up to the change of the state. For steps that follow a solution 
 because the errors of the rectangle rule cancel over many steps.
 """
 
+from fvsolve.core.steppers.step_operations import error_scale
 from fvsolve.jit import njit
 
 WINDOW = 20  # steps after which both sums are compared
@@ -33,7 +34,7 @@ def has_returned(r, h, now, new):
     found = False
     for e in range(scale.size):
         rest = abs(returns[SUM, e])
-        tolerance = size * (scale[e] + abs(y_new[e]))
+        tolerance = size * error_scale(scale[e], y_new[e])
         found = found or (rest > PRODUCTS * returns[GREATEST, e] and rest > TOLERANCES * tolerance)
         # The next window starts anew: a long step of this one would raise its threshold.
         returns[SUM, e] = returns[GREATEST, e] = 0.0

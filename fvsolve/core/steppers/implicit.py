@@ -301,6 +301,7 @@ class Rosenbrock(Method):
         """
         _, _, a, c, _ = self.printed
         s = len(a)
+        # Gamma^-1 = diag(1 / gamma) - C
         inverse = [
             [(1 / Fraction(self.gamma) if i == j else Fraction(0)) - c[i][j] for j in range(s)] for i in range(s)
         ]
@@ -355,6 +356,7 @@ class Rosenbrock(Method):
         def padded_row(values):
             return np.array([0.0, *map(float, values)])
 
+        # y+ = y_s + u_s: the weights of the last stage, and 1 for u_s, which also estimates the error.
         m, error = padded_row([*a[-1][:-1], 1]), padded_row([0] * (s - 1) + [1])
         flat = [
             padded_matrix(a).ravel(),
@@ -376,6 +378,7 @@ def _inverse(lower):
     """Inverse of a lower triangular matrix of fractions."""
     s = len(lower)
     inverse = [[Fraction(0)] * s for _ in range(s)]
+    # Forward substitution, column by column.
     for j in range(s):
         for i in range(j, s):
             total = Fraction(int(i == j)) - sum(lower[i][k] * inverse[k][j] for k in range(j, i))

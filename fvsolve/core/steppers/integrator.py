@@ -51,6 +51,7 @@ class Integrator:
         self.state, self.control, self.progress, self.newton = (
             np.zeros(1, kind) for kind in (rec.STATE, rec.CONTROL, rec.PROGRESS, rec.NEWTON)
         )
+        # Row 0 of y is the present state, row 1 the last one; the third row receives the new state.
         self.progress["old"] = 1
         self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(LEDGER_ROWS * ledgers)
         self.no_floats, self.no_integers = np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -89,6 +90,7 @@ class Integrator:
         control["end_at_rows"] = self.end_at_rows
         control["fsal"] = method.explicit and method.first_same_as_last
         control["kind"] = KINDS[method.kind][1]
+        # A last stage at the end of the step gives the slope there without a new call of f.
         ends_at_stage = np.array_equal(self.coefficients[s * (s - 1) : s * s], self.coefficients[s * s : s * s + s])
         control["stage_slope"] = control["kind"] == rec.NEWTON_SOLVED and not self.dense.size and ends_at_stage
         self.restart_segment()
@@ -226,6 +228,7 @@ class Integrator:
         adaptive = control["mode"] == rec.TOLERANCE
         if control["separate_rows"] == rec.NEVER_SEPARATE and (control["kind"] == rec.EXPLICIT or not adaptive):
             return
+        # A spare step writes to its own arrays, so that it leaves no trace in those of the run.
         own = ("newton", "k", "ledger_rates", "jacobian", "product", "buffer", "ledger_slopes", "factors")
         own += ("complex_factors", "last_stages", "transformed", *IMPLICIT_VECTORS)
         if adaptive:
@@ -249,6 +252,7 @@ class Integrator:
         self.control["ledger_offset"] = ledger_offset
         if not self.calls.size:  # a single step calls no observers
             self.calls = addresses((self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join, self.watcher))
+        # The first stage is the rate at the start, which otherwise the time loop provides.
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.ledger_rates[0] = self.out[ledger_offset : ledger_offset + self.ledger_rates.shape[1]]
         error = self.attempt(handle, self.handle(False), t, h, 0, 1)
@@ -268,6 +272,7 @@ class Integrator:
         calls = addresses(
             (self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join, self.watcher)
         )
+        # In place, because the handle contains the address of this array.
         self.calls = self.calls if self.calls.size else calls
         self.calls[:] = calls
         self.control["ledger_offset"], self.armed = ledger_offset, armed

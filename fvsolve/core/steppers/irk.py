@@ -199,6 +199,7 @@ def predict(r, h):
     back, ahead = matrix(r.coefficients, s, T_INVERSE), matrix(r.coefficients, s, EXTRAPOLATION)
     for e in range(q * q):
         buffer[e] = 0.0
+    # Weights of the last slopes: T^-1 times their extrapolation to each stage.
     for k in range(q):
         x = c[k + 1] * h / h_last
         for j in range(q):
@@ -249,6 +250,7 @@ def solve_blocks(r):
     while b < q:
         u = r.transformed[R * q + b]
         if is_pair(blocks, q, b):
+            # Both real rows of a pair are real and imaginary part of a complex vector.
             v = r.transformed[R * q + b + 1]
             for e in range(n):
                 both[e] = complex(u[e], v[e])
@@ -288,6 +290,7 @@ def residuals(r, h):
     rows, q, n = r.transformed, r.k.shape[0] - 1, r.scale.size
     back, blocks = matrix(r.coefficients, q + 1, T_INVERSE), matrix(r.coefficients, q + 1, BLOCKS)
     start = matrix(r.coefficients, q + 1, START)
+    # R = T^-1 F + T^-1 A^-1 a_0 k_0 - L W / h, row by row; a row of a pair has two terms of L.
     for i in range(q):
         blend(start[i], r.k[0], back, i * q, q, F * q, rows, rows[R * q + i])
         j = i
@@ -377,6 +380,7 @@ def finish(r, h):
     """
     k, d, buffer, rows, s = r.k, r.increment, r.buffer, r.transformed, r.k.shape[0]
     q, slopes, start = s - 1, matrix(r.coefficients, s, SLOPES), matrix(r.coefficients, s, START)
+    # K = T L W / h - A^-1 a_0 k_0
     for e in range(q * q):
         buffer[e] = slopes[e] / h
     for i in range(q):

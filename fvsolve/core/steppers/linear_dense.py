@@ -30,10 +30,12 @@ def factor(structure, jacobian, shift, factors):
         factors[e] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):
+            # Rows of ledger rates are not factored.
             if rows[p] < n:
                 a[rows[p], j] = -jacobian[p]
         a[j, j] += shift
     for k in range(n):
+        # The largest entry of the column as pivot keeps the entries of L small.
         best, pivot = size_of(a[k, k]), k
         for i in range(k + 1, n):
             size = size_of(a[i, k])
@@ -60,6 +62,7 @@ def solve(structure, factors, x):
     """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n = structure[SIZE]
     pivots = factors[n * n :]
+    # All row exchanges come first, then L, then U.
     for k in range(n):
         i = int(pivots[k].real)
         x[k], x[i] = x[i], x[k]

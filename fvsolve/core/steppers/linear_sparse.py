@@ -34,6 +34,7 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     l_starts, l_columns, u_starts, u_columns = fill(count, in_order.indptr, in_order.indices)
     by_rows = np.argsort(i, kind="stable")
     j_starts = np.concatenate(([0], np.cumsum(np.bincount(i, minlength=count))))
+    # Place of an entry in the work row, which has four numbers for each block.
     j_places = (4 * j + 2 * (rows % 2) + columns % 2)[by_rows]
     parts = (members[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, places[by_rows])
     offsets = PARTS + np.cumsum([0] + [part.size for part in parts[:-1]])
@@ -117,6 +118,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
             chain[last], last = columns[p], columns[p]
         chain[last] = n
         at, end, k = l_starts[i], u_starts[i], chain[n]
+        # Columns before the diagonal are entries of L; each brings the entries of its row of U.
         while k < i:
             if at == l_columns.size:
                 return False
@@ -132,6 +134,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
                     chain[last], chain[j] = j, chain[last]
                 last = j
             k = chain[k]
+        # The columns behind the diagonal are the row of U.
         k = chain[k] if k == i else k
         while k < n:
             if end == u_columns.size:
@@ -227,6 +230,7 @@ def solve(structure, factors, x):
     u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
     lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
+    # L has a unit diagonal: forward substitution without division.
     for i in range(count):
         a, b = x[order[2 * i]], x[order[2 * i + 1]]
         for p in range(l_starts[i], l_starts[i + 1]):
@@ -234,6 +238,7 @@ def solve(structure, factors, x):
             a -= share[0] * y[0] + share[1] * y[1]
             b -= share[2] * y[0] + share[3] * y[1]
         work[2 * i], work[2 * i + 1] = a, b
+    # Backward substitution, with the stored inverses of the diagonal blocks.
     for i in range(count - 1, -1, -1):
         a, b = work[2 * i], work[2 * i + 1]
         for p in range(u_starts[i], u_starts[i + 1]):

@@ -60,6 +60,7 @@ def begin(r, now):
     for j in range(1, k.shape[0]):
         copy(k[j], r.last_stages[j])
     follow_stages(state, newton)
+    # Newton converged slowly in the last step: its Jacobian is out of date.
     if newton["increment_ratio"] > STALE:
         newton["has_jacobian"] = 0.0
     newton["increment_ratio"] = 0.0
@@ -168,6 +169,7 @@ def damping_factor(part, ahead, size):
     The trial is accepted if the next increment is at most 1 - part / 4 times as long, or if 0 <= ahead <= 1. If the
     next increment is reversed, the factor follows from the secant rule (natural monotonicity: Deuflhard 2004, 3.3).
     """
+    # The trial has left the range in which f is defined.
     if not size < np.inf:
         return 0.25 * part
     if 0.0 <= ahead <= 1.0 or size <= (1.0 - 0.25 * part) ** 2:
@@ -378,6 +380,7 @@ def solve_stage_from_start(handle, r, t, h_gamma, i, y):
             copy(ki, reached)
         elif r.control[0]["mode"] == rec.TOLERANCE:
             return FAILED
+        # The given slope was too far away: from the start of the step next, then along shorter steps.
         elif turn == 0:
             for j in range(ki.size):
                 reached[j] = 0.0
@@ -412,7 +415,7 @@ def smoothed_error(handle, r, t, h, now, new, error, shift):
         d[i] = shift * f[i]
     run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
     for i in range(y.size):
-        w = 1.0 / (size * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        w = 1.0 / (size * error_scale(scale[i], max(abs(y[i]), abs(y_new[i]))))
         plain += (w * f[i]) * (w * f[i])
         dot += (w * f[i]) * (w * d[i])
         smooth += (w * d[i]) * (w * d[i])

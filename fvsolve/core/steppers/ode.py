@@ -195,6 +195,7 @@ def _prepare(f, t0, y0) -> tuple:
         functions = _functions(f, t0, y0)
         if key is None:
             return functions, python
+        # A dict keeps the order of insertion, so its first key is the oldest.
         if len(_COMPILED) == MOST_COMPILED:
             del _COMPILED[next(iter(_COMPILED))]
         _COMPILED[key] = functions

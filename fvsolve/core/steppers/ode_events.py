@@ -175,6 +175,7 @@ def has_extremum(times: list[float], g: list[float], k: int) -> bool:
     for i in (k - 1, k):
         if not 0 <= i <= len(g) - 3:
             continue
+        # Second and first difference at point i + 1; the vertex is there minus slope / bend.
         bend, slope = g[i] - 2.0 * g[i + 1] + g[i + 2], 0.5 * (g[i + 2] - g[i])
         if bend * g[k] > 0.0 and -AT_VERTEX <= i + 1 - slope / bend - k <= 1.0 + AT_VERTEX:
             return True

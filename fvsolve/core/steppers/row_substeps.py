@@ -81,6 +81,7 @@ def defect(handle, r, own, t, h, theta, now, old):
     r.state[0]["calls"] += 1.0
     for i in range(y.size):
         d[i] -= f[i]
+    # The Newton matrix turns the defect into an error of the state, also for stiff components.
     run_handle.call_solve(r.calls[run_handle.REAL_SOLVE], r.structure, r.factors, d)
     for i in range(y.size):
         e = d[i] / (size * error_scale(scale[i], max(abs(y[i]), abs(y_new[i]))))
@@ -172,11 +173,13 @@ def substep_row(handle, r, t_old, due, now, old):
     state, progress = own.state[0], own.progress[0]
     begun = progress["t_old"] == t_old and progress["t_new"] == t
     checked = due >= state["t"] or progress["changed"] == 1  # the dense output of the last substep
+    # An earlier row, or one that the last substep cannot serve, needs substeps from the start again.
     if not begun or due < state["t"] - state["last"] or not checked:
         begin_substeps(handle, r, own, t_old, h, now, old)
     if state["step"] == 0.0:
         return False
     while state["t"] < due:
+        # A substep that ends at the row needs no dense output; a longer one serves further rows.
         end = max(due, state["t"] + state["step"])
         end = t if end > t - CLOSE * h else end
         solved = substep(handle, r, own, end - state["t"], end, due)

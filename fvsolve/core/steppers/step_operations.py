@@ -127,6 +127,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
                     out[i] += w * ka[i]
             j += 2
         if start_slope.size > 0:
+            # Correction h psi(theta) (f - p'(0)), see `start_slope_correction`.
             w, terms = 0.0, dense.shape[1] + 1
             for m in range(terms):
                 w = (w + start_slope[start_slope.size - 1 - m]) * theta
@@ -134,6 +135,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
                 out[i] += h * w * f[i]
         return
     s, r = theta, 1.0 - theta
+    # Hermite cubic: weights of y_new - y, of f and of f_new.
     h01, h10, h11 = s * s * (1.0 + 2.0 * r), h * s * r * r, -h * s * s * r
     for i in range(begin, end):  # in differences, so that a constant state stays constant to the bit
         out[i] = y[i] + (h01 * (y_new[i] - y[i]) + (h10 * f[i] + h11 * f_new[i]))
@@ -151,6 +153,7 @@ def interpolate_slope(theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
     for i in range(out.size):
         out[i] = 0.0
     for j in range(dense.shape[0]):
+        # Derivative of the sum of dense[j, m] theta^(m + 1).
         w = 0.0
         for m in range(dense.shape[1] - 1, -1, -1):
             w = w * theta + (m + 1) * dense[j, m]

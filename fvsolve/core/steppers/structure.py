@@ -181,6 +181,7 @@ def greedy(starts, rows, row_starts, columns, order, seen, result):
     """
     for at in range(order.size):
         j = order[at]
+        # The colours of all columns that share a row with this one are taken.
         for p in range(starts[j], starts[j + 1]):
             for q in range(row_starts[rows[p]], row_starts[rows[p] + 1]):
                 color = result[columns[q]]

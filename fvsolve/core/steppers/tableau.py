@@ -522,6 +522,7 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
     for line in text.strip().splitlines():
         line = line.strip()
         shown = line if len(line) <= LINE_SHOWN else f"{line[:LINE_SHOWN]}..."
+        # So many stages are a fault anyway, and each further entry would cost exact arithmetic.
         if len(head) > STAGES_MOST:
             break
         if set(line) <= set("-+ "):
@@ -575,6 +576,7 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
         for row in weights:
             if differs(row, 1):
                 wrong_sums.append(f"weights add up to {_show(sum(row, Fraction(0)))}; expected 1")
+        # If the sums hold for rounded decimals, the message says so.
         if wrong_sums and not faults:
             order = _rounded_order(method.text, _square(head), weights[0], method.given_digits)
             wrong_sums[-1] += f"; {rounding_text(method.text, order)}" if order else ""

@@ -189,6 +189,7 @@ def after_jump(handle, run, r, h, length, now, new, e):
     if not control["has_jumps"]:
         return length, e
     t, later = r.state[0]["t"], 0.0
+    # First behind all these times; if no event function is at or below zero there, at the event.
     for extension in (SAME_TIMES * h + SAME_ROUNDING * abs(r.state[0]["t"]), 0.0):
         later = min(h, length + extension)
         r.progress[0]["stage_status"] = 0

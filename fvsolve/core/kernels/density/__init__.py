@@ -83,6 +83,7 @@ def pressure_of_mass(st, floats, pipe, m):
     """Pressure [Pa] of a pipe that contains the mass per length m [kg/m]."""
     if st["law"] == LAW_MIXTURE:
         return mixture_law.pressure_of_mass(st, floats, pipe, m)
+    # m / (rho_ref A_ref) = (rho / rho_ref) (A / A_ref), whose logarithm the laws invert.
     return pressure_of_log(st, floats, pipe["compliance"], log(m / (st["rho"] * pipe["area"])))
 
 
@@ -92,6 +93,7 @@ def mass_of_pressure(st, floats, pipe, p):
     if st["law"] == LAW_MIXTURE:
         return mixture_law.mass_of_pressure(st, floats, pipe, p)
     value, slope = log_density(st, floats, p)
+    # Density and area are both exponentials, so their logarithms add up.
     m = st["rho"] * pipe["area"] * exp(value + pipe["compliance"] * (p - st["reference"]))
     return m, m * (slope + pipe["compliance"])
 
@@ -150,6 +152,7 @@ def velocity_change(st, floats, pipe, p_from, p_to):
     middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
     far = GAUSS_POINT * half
     low, high = impedance(st, floats, pipe, middle - far), impedance(st, floats, pipe, middle + far)
+    # Gauss-Legendre quadrature of 1 / (rho c) with the weights 5/9, 8/9, 5/9.
     total = 8.0 / impedance(st, floats, pipe, middle)
     total += 5.0 / low + 5.0 / high
     return half * total / 9.0

@@ -43,6 +43,7 @@ def relative_volume(st, p):
 def gas_integral(st, x):
     """Integral of the volume of free gas by `free_gas` over the gas pressure up to x [Pa], except for a constant."""
     k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
+    # Integral of x^-k (1 - x / s), of which the first term is a logarithm for k = 1.
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
     return st["gas"] * at ** (1.0 - k) * (1.0 / (1.0 - k) - at / s / (2.0 - k))
@@ -81,10 +82,12 @@ def pressure_of_enthalpy(st, floats, h):
     floor, beta = st["floor"], st["beta"]
     lift = h * st["rho"]
     x = st["reference"] - floor
+    # Newton starts from liquid without gas: h rho_ref = dp - dp^2 / (2 beta), solved for dp.
     if lift > 0.0:
         x += 2.0 * lift / (1.0 + sqrt(max(0.0, 1.0 - 2.0 * lift / beta)))
     for _ in range(100):
         p = x + floor
+        # dh/dp = 1 / rho
         step = (enthalpy(st, floats, p) - h) * st["rho"] / relative_volume(st, p)[0]
         x = x - step if step < 0.8 * x else x * exp(max(-step / x, -700.0))
         if abs(step) <= 1e-15 * abs(p) or abs(step) <= 1e-14 * x:

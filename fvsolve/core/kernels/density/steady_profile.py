@@ -44,6 +44,7 @@ def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
     m, dm = mass_of_pressure(st, floats, pipe, p)
     for _ in range(50):
         v = flow / m
+        # d/dp of h + v^2 / 2 is 1 / rho - v^2 (dm/dp) / m.
         step = (enthalpy(st, floats, p) + 0.5 * v * v - bernoulli) / (1.0 / density(st, floats, p) - v * v * dm / m)
         p -= step
         m, dm = mass_of_pressure(st, floats, pipe, p)

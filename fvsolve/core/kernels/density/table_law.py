@@ -56,8 +56,10 @@ def enthalpy(st, floats, p):
 def pressure_of_enthalpy(st, floats, h):
     """Pressure [Pa] at which the specific enthalpy is h [J/kg], by Newton."""
     prevent_inlining()
+    # Newton starts at constant density.
     p = st["reference"] + st["rho"] * h
     for _ in range(30):
+        # dh/dp = 1 / rho
         step = (enthalpy(st, floats, p) - h) * (st["rho"] * exp(log_density(st, floats, p)[0]))
         p -= step
         if abs(step) <= 1e-15 * abs(p):
@@ -72,6 +74,7 @@ def pressure_of_log(st, floats, compliance, q):
     compliance : relative area change of the wall per pressure [1/Pa]
     """
     prevent_inlining()
+    # Newton starts at constant bulk modulus.
     p = st["reference"] + q / (1.0 / st["beta"] + compliance)
     for _ in range(30):
         value, slope = log_density(st, floats, p)

@@ -123,8 +123,10 @@ def set_revolute(body, t, y, tables, own):
     """Rotate a body by its revolute joint; add the joint velocity and, for a driven joint, its acceleration."""
     angle, rate, change = joint_coordinate(body, t, y, tables)
     rotation_about_axis(tables.scratch, 0, angle, body["axis"])
+    # Attitude of the joint axes, rotated by the joint.
     multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, layout.ATTITUDE)
     axis = rotate(own, layout.ATTITUDE, body["axis"], 0)
+    # Only a driven joint has a given acceleration; others are solved later.
     if change != 0.0:
         add_drive_acceleration(own, scaled(change, axis), True)
     w = scaled(rate, axis)
@@ -260,6 +262,7 @@ def update_elements(out, tables):
         if line["acts"] == ABOUT:
             a, b, c = spin_of(out, tables, i)
             u, v, w = spin_of(out, tables, j)
+            # The axis is fixed in the body of `to` and turns with it.
             r = body_row(tables, tables.points[j]["body"]) + layout.ATTITUDE
             write_vector(out, at, *rotate(out, r, line["direction"], 0))
             out[to], out[to + 1] = 0.0, out[at] * (u - a) + out[at + 1] * (v - b) + out[at + 2] * (w - c)
@@ -295,6 +298,7 @@ def kinematics(t, y, dydt, out, handle):
             set_free_body(body, y, own)
         else:
             set_jointed_body(body, t, y, out, tables, own)
+        # Motion at o serves the equations; loads and points need that of the origin.
         turning = cross(own, layout.SPIN, *vector(own, layout.ARM))
         write_vector(own, layout.VELOCITY, *plus(vector(own, layout.VELOCITY_AT_O), turning))
         write_vector(own, layout.BIAS, *origin_acceleration(own, layout.BIAS_AT_O, layout.SPIN_BIAS))

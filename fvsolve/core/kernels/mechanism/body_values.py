@@ -101,6 +101,7 @@ def joint_load(out, tables, i):
         body, here = bodies[j], body_row(tables, j)
         offset = minus(vector(out, here + layout.POSITION), vector(out, first + layout.POSITION))
         centre, applied = centre_of(body, out, here)[:3], vector(out, here + layout.FORCE)
+        # Newton for the force, Euler for the torque J alpha + w x J w, then both moved to the origin.
         push = scaled(body["mass"], acceleration_at(out, here, here + layout.ACCELERATION, *centre))
         turn = inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE))
         turn = plus(turn, cross(out, here + layout.SPIN, *angular_momentum(body, out, here)))
@@ -108,6 +109,7 @@ def joint_load(out, tables, i):
         # The joint supplies what the other loads on the bodies do not.
         force = minus(plus(force, push), applied)
         torque = plus(torque, minus(turn, vector_product(offset, applied)))
+        # FORCE contains the water of a basin for q'' = 0; here follows its part due to q''.
         for k in range(tables.basins.size):
             if tables.basins[k]["body"] == j and tables.basins[k]["loads_body"] == 1:
                 load = extra_basin_load(out, tables, k)
@@ -124,9 +126,11 @@ def extra_basin_load(out, tables, b):
     """
     here, tank = body_row(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     arm = minus(vector(out, tank + layout.BASIN_ARM), vector(out, here + layout.ARM))
+    # Only the part of the motion that q'' causes: total minus bias.
     spin = minus(vector(out, here + layout.SPIN_RATE), vector(out, here + layout.SPIN_BIAS))
     (x, y, z), (p, q, u) = arm, spin
     ax, ay, az = minus(vector(out, here + layout.ACCELERATION), vector(out, here + layout.BIAS))
+    # Normal acceleration of the bed as coefficients of 1, x and y, times the moments of mass.
     rises = dot(out, tank + layout.NORMAL, ax + q * z - u * y, ay + u * x - p * z, az + p * y - q * x)
     north, east = -dot(out, tank + layout.NORTH, *spin), dot(out, tank + layout.EAST, *spin)
     m = tank + layout.MOMENTS
@@ -164,6 +168,7 @@ def euler_parameters(body, y, out, here):
         size = sqrt(h * h + a * a + b * b + c * c)
         return h / size, a / size, b / size, c / size
     r = here + layout.ATTITUDE
+    # Entries of R give 4 eta eps by differences, 4 eps_i eps_j by sums, 4 e^2 by the diagonal.
     xx, yy, zz = out[r], out[r + 4], out[r + 8]
     x, y0, z = out[r + 7] - out[r + 5], out[r + 2] - out[r + 6], out[r + 3] - out[r + 1]
     p, q, s = out[r + 1] + out[r + 3], out[r + 2] + out[r + 6], out[r + 5] + out[r + 7]
@@ -179,6 +184,7 @@ def euler_parameters(body, y, out, here):
     else:
         h, a, b = z, q, s
     size = sqrt(h * h + a * a + b * b + c * c)
+    # Both signs denote the same attitude.
     if h < 0.0:
         size = -size
     return h / size, a / size, b / size, c / size
@@ -213,6 +219,7 @@ def body_value(t, y, out, tables, i, number):
     momentum = scaled(body["mass"], motion[3:])
     if number < 31:
         return momentum[number - 28]
+    # r x m v is added to the angular momentum about the centre of mass.
     p, q, s = plus(motion[:3], vector(out, here + layout.POSITION))
     lx, ly, lz = angular_momentum(body, out, here)
     u, v, w = momentum
@@ -243,6 +250,7 @@ def point_value(out, tables, k, number):
     b = body_row(tables, tables.bodies[i]["parent"]) if tables.bodies[i]["parent"] >= 0 else here
     arm = minus(moved, vector(out, b + layout.POSITION))
     dragged = cross(out, b + layout.SPIN, *arm)
+    # Velocity in the turning axes of the parent, of which Coriolis is twice the spin times it.
     velocity = minus(minus(moved[3:], vector(out, b + layout.VELOCITY)), dragged)
     coriolis, transversal = cross(out, b + layout.SPIN, *scaled(2.0, velocity)), cross(out, b + layout.SPIN_RATE, *arm)
     centripetal = cross(out, b + layout.SPIN, *dragged)
@@ -252,6 +260,7 @@ def point_value(out, tables, k, number):
         return transversal[axis]
     if share == 4:
         return centripetal[axis]
+    # The relative acceleration is what the other terms leave.
     rest = transversal[axis] + centripetal[axis] + coriolis[axis]
     return acceleration[axis] - out[b + layout.ACCELERATION + axis] - rest if b != here else 0.0
 
@@ -300,6 +309,7 @@ def body_energy_rate(body, out, here, gravity):
 def joint_spring_energy(body, y):
     """(change of the energy of the spring of a joint since the start [J], its rate [W]), for a joint with one axis."""
     s, far = body["start"][0], y[body["y"]]
+    # k ((s + far)^2 - s^2) / 2 as a product: no difference of squares.
     return (
         body["stiffness"] * far * (s + 0.5 * far),
         body["stiffness"] * (s + far) * (body["speed"][0] + y[body["rate"]]),

@@ -82,6 +82,7 @@ def relative_motion(out, tables, link):
     gap, rate = minus(to, point_at(out, tables, link["from_point"], layout.POSITION)), to[3:]
     if i >= 0:
         here = body_row(tables, i)
+        # Minus the velocity that the body of `from` has at the place of `to`.
         arm = minus(to, vector(out, here + layout.POSITION))
         rate = minus(minus(rate, vector(out, here + layout.VELOCITY)), cross(out, here + layout.SPIN, *arm))
     return gap, rate
@@ -277,10 +278,12 @@ def relative_acceleration(out, tables, pin, velocity):
     """
     i, j = body_of_point(tables, pin["from_point"]), body_of_point(tables, pin["to_point"])
     a = 0.0, 0.0, 0.0
+    # Acceleration of `to` in the world.
     if j >= 0:
         here = body_row(tables, j)
         place = rotate(out, here + layout.ATTITUDE, tables.points[pin["to_point"]]["place"], 0)
         a = acceleration_at(out, here, here + layout.ACCELERATION, *place)
+    # Minus the acceleration of the axes of `from` at this place, and minus Coriolis, 2 w x v.
     if i >= 0:
         here = body_row(tables, i)
         arm = minus(point_at(out, tables, pin["to_point"], layout.POSITION), vector(out, here + layout.POSITION))
@@ -299,6 +302,7 @@ def fill_constraint_rows(out, tables):
     rows = 0
     for k in range(pins.size):
         rows += pins[k]["rows"]
+    # In `scratch` after G: Z, the matrix Z' Z, the right-hand sides.
     z, last = g + rows * n, g + 2 * rows * n + rows * rows
     row = 0
     for k in range(pins.size):
@@ -314,6 +318,7 @@ def fill_constraint_rows(out, tables):
             for m in range(n):
                 work[z + at + m] = work[g + at + m]
             mass.solve_factor(tables, z + at)
+            # Baumgarte: a + 2 pull v + pull^2 gap = 0 lets a deviation decay with critical damping.
             slip, left = scalar_product(direction, velocity), scalar_product(direction, gap) - pin["gap"][r]
             work[last + row] = -(scalar_product(direction, acceleration) + 2.0 * pull * slip + pull * pull * left)
             row += 1
@@ -328,6 +333,7 @@ def multipliers(tables, rows):
     """
     work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
     h, last = z + rows * n, z + rows * n + rows * rows
+    # Products Z' Z and their Cholesky factor C, row by row, in the same sweep.
     for i in range(rows):
         for j in range(i + 1):
             total = 0.0
@@ -336,6 +342,7 @@ def multipliers(tables, rows):
             for m in range(j):
                 total -= work[h + i * rows + m] * work[h + j * rows + m]
             work[h + i * rows + j] = sqrt(total) if i == j else total / work[h + j * rows + j]
+    # Forward substitution with C, then backward with C'.
     for i in range(rows):
         for m in range(i):
             work[last + i] -= work[h + i * rows + m] * work[last + m]
@@ -390,6 +397,7 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
     multipliers(tables, rows)
     g = constraint_offset(tables)
     last = g + 2 * rows * n + rows * rows
+    # The forces G' lambda give accelerations that are added to those without pins.
     for m in range(n):
         total = 0.0
         for i in range(rows):

@@ -42,9 +42,11 @@ def segment_energy(tables, out, here, segment, z, rise):
         power that the inflow brings [W]
     """
     motion, g, (r, t, m) = tables.scratch, tables.settings[0]["gravity"], segment
+    # V = v + a s along the segment, so V^2 / 2 integrates to a sum over mass moments.
     v, a = velocity_at(motion, r), cross(motion, fluid.BODY_SPIN, *t)
     kinetic = 0.5 * m[0] * scalar_product(v, v) + m[1] * scalar_product(v, a)
     kinetic += 0.5 * m[2] * scalar_product(a, a)
+    # The height above the network at rest is linear along the segment too.
     slope = dot(out, here + layout.ATTITUDE + 6, *t) - rise
     return kinetic + g * (m[0] * (height_on_body(out, here, r) - z) + m[1] * slope)
 
@@ -63,6 +65,7 @@ def path_velocity(motion, path):
 def segment_energy_rate(tables, out, here, segment, d, z, rise):
     """Rate of the energy of a segment that `segment_energy` gives [W]."""
     motion, (r, t, m) = tables.scratch, segment
+    # Power that the body supplies, plus the energy that changes of mass bring.
     carried = -path_velocity(motion, fluid.segment_load(motion, r, t, m, fluid.ZERO_VECTOR))
     return carried + segment_energy(tables, out, here, (r, t, d), z, rise)
 
@@ -71,6 +74,7 @@ def segment_energy_rate(tables, out, here, segment, d, z, rise):
 def path_energy_rate(tables, out, here, path, change, flow, rate):
     """Rate of the energy M (v . C + W . Z) of a mass flow M along a flow path (C, Z) on a body [W]."""
     motion, g, up = tables.scratch, tables.settings[0]["gravity"], vector(out, here + layout.ATTITUDE + 6)
+    # d/dt of v in axes of the body is a_o - W x v, which is minus `pull`.
     pull = cross(motion, fluid.BODY_SPIN, *vector(motion, fluid.BODY_VELOCITY))
     pull = plus(scaled(g, up), plus(pull, vector(motion, fluid.BODY_GRAVITY)))
     faster = -scalar_product(path, pull) + dot(motion, fluid.BODY_SPIN_RATE, *path[3:])
@@ -108,6 +112,7 @@ def add_node_power(y, dydt, out, tables, here, i, power):
     node, st = tables.nodes[i], tables.settings[0]
     segment, z = fluid.node_segment(y, tables, i), node["elevation"]
     if node["kind"] == FIXED or node["kind"] == JUNCTION:
+        # Fluid from outside has the velocity of the node at which it enters.
         v = velocity_at(tables.scratch, segment[0])
         head = st["gravity"] * (height_on_body(out, here, segment[0]) - z) + 0.5 * scalar_product(v, v)
         power[NODE * i] += head * out[tables.layout[0]["supply"] + i]
@@ -232,6 +237,7 @@ def add_power(t, y, dydt, out, handle, power):
         pipe, end = pipes[k], tables.layout[0]["ends"] + 4 * k
         here = carrier(tables, out, pipe["moving_segment"])
         if here >= 0:
+            # Fluid brings the energy of the motion at both ends with the flow there.
             into = extra_head(y, out, tables, here, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
             into -= extra_head(y, out, tables, here, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
             power[at] += into - path_velocity(motion, fluid.pipe_load(y, dydt, tables, k))

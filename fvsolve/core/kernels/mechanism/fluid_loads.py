@@ -90,6 +90,7 @@ def segment_load(motion, r, t, m, d):
     """Force and torque of a segment of fluid on its body."""
     g = vector(motion, BODY_GRAVITY)
     w, e = vector(motion, BODY_SPIN), vector(motion, BODY_SPIN_RATE)
+    # S = sum of mass times position, and the momentum W x S + S'.
     s = plus(scaled(m[0], r), scaled(m[1], t))
     momentum = plus(plus(vector_product(w, s), scaled(d[0], r)), scaled(d[1], t))
     force = minus(minus(scaled(m[0], g), vector_product(e, s)), vector_product(w, momentum))
@@ -100,6 +101,7 @@ def segment_load(motion, r, t, m, d):
 @njit
 def flow_load(motion, path, change, flow, rate):
     """Force and torque of a mass flow along a flow path on its body."""
+    # C and Z in axes of the world change as the body turns: C' + W x C, Z' + W x Z.
     straight = plus(change, cross(motion, BODY_SPIN, *path[:3]))
     around = plus(change[3:], cross(motion, BODY_SPIN, *path[3:]))
     return minus(scaled(-rate, path), scaled(flow, straight)) + minus(scaled(-rate, path[3:]), scaled(flow, around))
@@ -166,6 +168,7 @@ def node_segment_rates(y, dydt, out, tables, i):
     """
     node = tables.nodes[i]
     if node["kind"] == TANK:
+        # Fluid enters at the surface, so its moments are those of a mass at this height.
         high, more = level_at(y, tables, i), dydt[node["y"]]
         return more, more * high, more * high * high
     if node["kind"] == CHAMBER:
@@ -244,6 +247,7 @@ def pipe_load(y, dydt, tables, k):
     m, flow = pipe_moments(tables, y, k, length, 1.0)
     d, rate = pipe_moments(tables, dydt, k, length, 0.0)
     load = add_six(segment_load(motion, r, t, m, d), flow_load(motion, straight_path(r, t), ZERO_FLOW_PATH, flow, rate))
+    # In a tank the flow goes on from the end of the pipe to the surface.
     for right in range(2):
         i, flow = pipe_end(y, tables, k, right, 1.0)
         if i >= 0:
@@ -306,6 +310,7 @@ def column_load(y, dydt, tables, k):
     faster = tank_paths(tables, i, j, level_rate(dydt, tables, i), level_rate(dydt, tables, j))
     flow, rate = column["flow"] + y[column["y"]], dydt[column["y"]]
     load = flow_load(motion, column_path(y, tables, column), faster, flow, rate)
+    # Segments of a column are always full: their moments have no rates.
     for m in range(column["moving_segments"]):
         r, t, mass = column_segment(tables, column, m)
         load = add_six(load, segment_load(motion, r, t, mass, ZERO_VECTOR))
@@ -397,6 +402,7 @@ def add_segment_inertia(out, tables, i, segment):
     """
     (r, t, m), work, here = segment, tables.scratch, body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
+    # Velocity per unit rate is v at the start of the segment, plus a s along it.
     start = plus(rotate(out, here + layout.ATTITUDE, r, 0), vector(out, here + layout.ARM))
     along = rotate(out, here + layout.ATTITUDE, t, 0)
     for p in range(count):
@@ -498,6 +504,7 @@ def add_basin_inertia(out, tables):
         for p in range(count):
             j = paths[path + p]
             row, (a, c, d) = 8 * n + freedoms[j]["row"], normal_accelerations(out, work, tank, 6 * j)
+            # N times the column of J for j; its products with the other columns are entries of M.
             m = tank + layout.MOMENTS
             e = out[m] * a + out[m + 1] * c + out[m + 2] * d
             f = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d

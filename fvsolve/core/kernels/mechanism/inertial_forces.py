@@ -72,6 +72,7 @@ def bottom_pressure_per_density(tables, out, segment, level):
     """
     fluid.set_body_motion(tables, out, segment["body"], layout.BIAS, layout.SPIN_BIAS)
     motion, (x, y, z) = tables.scratch, vector(segment["start"], 0)
+    # Rotation adds the difference of |W x r|^2 / 2 between surface and bottom.
     squares = speed_squared(motion, (x, y, z + level)) - speed_squared(motion, (x, y, z))
     turning = motion[fluid.BODY_SPIN_RATE] * y - motion[fluid.BODY_SPIN_RATE + 1] * x
     return -(level * (motion[fluid.BODY_GRAVITY + 2] - turning) + 0.5 * squares)
@@ -119,6 +120,7 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK and nodes[i]["moving_segment"] >= 0:
             drive, rest = tank_drives(tables, out, i, fluid.level_at(y, tables, i))
+            # Hydrostatics at variable density: the integral of dp / density is a change of enthalpy.
             h = enthalpy(st, tables.floats, st["ambient"])
             now = pressure_of_enthalpy(st, tables.floats, h + drive)
             out[pressure + i] = now - pressure_of_enthalpy(st, tables.floats, h + rest)
@@ -135,6 +137,7 @@ def moving_column_rates(t, y, dydt, out, handle):
     columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["moving_segment"]
     for k in range(columns.size):
         column, drive = columns[k], 0.0
+        # A column that is not on a body has no drive.
         for m in range(column["moving_segments"] if column["moving_segment"] >= 0 else 0):
             drive += out[at + column["moving_segment"] + m]
         drop = out[p + column["from_node"]] - out[p + column["to_node"]] + tables.settings[0]["rho"] * drive
@@ -175,6 +178,7 @@ def add_cell_drives_barotropic(t, y, dydt, out, handle):
         pipe = pipes[i]
         n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
         for k in range(n if first >= 0 else 0):
+            # Mass that waves add is driven too, unlike under the density law `linear`.
             m = profile[pipe["center"] + k] + (y[o + k] + y[o + n + k]) / pipe["speed"]
             push = 0.5 * m / pipe["dx"] * out[at + first + k]
             dydt[o + k] += push
@@ -207,6 +211,7 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
     pipe, (r, t, length) = tables.pipes[k], fluid.pipe_segment(tables, k)
     n, o = pipe["cells"], pipe["y"]
     acceleration = path_acceleration(out, tables, pipe["moving_segment"], fluid.straight_path(r, t))
+    # Half for each wave; the ends may be closer together than the pipe is long.
     push = 0.5 * length / n / pipe["dx"] * acceleration
     linear = tables.settings[0]["law"] == LAW_LINEAR
     for i in range(n):

@@ -67,6 +67,7 @@ def joint_columns(body, own, s):
             write_vector(s, 0, *axis)
             write_vector(s, 3, *vector_product(arm, axis))
         return
+    # Ball joint or free body: a column of rotation about each axis of the body.
     for k in range(3):
         axis = own[layout.ATTITUDE + k], own[layout.ATTITUDE + 3 + k], own[layout.ATTITUDE + 6 + k]
         write_vector(s, first + 6 * k, *axis)
@@ -83,10 +84,12 @@ def inertia_about_o(body, own, result):
     The numbers are mass, mass times centre (3), and moments of inertia xx yy zz xy xz yz.
     """
     m, inertia, r = body["mass"], body["inertia"], layout.ATTITUDE
+    # Centre of mass from o: from the origin of the body, plus the arm from o to the origin.
     gx, gy, gz = rotate(own, r, body["centre"], 0)
     gx, gy, gz = gx + own[layout.ARM], gy + own[layout.ARM + 1], gz + own[layout.ARM + 2]
     result[0] = m
     write_vector(result, 1, m * gx, m * gy, m * gz)
+    # Rows of R J; their products with R' follow in the moments below.
     ax, ay, az = inertia_row(own, r, inertia)
     bx, by, bz = inertia_row(own, r + 3, inertia)
     cx, cy, cz = inertia_row(own, r + 6, inertia)
@@ -138,10 +141,12 @@ def bias_load(own, inertia, load):
     They are I A + V x* I V - applied loads on the body. I : inertia; V : spatial velocity; A : spatial acceleration for
     q'' = 0; x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
     """
+    # I V, then I A; V x* I V adds w x L + v x p to the torque and w x p to the force.
     angular, linear = spatial_momentum(inertia, vector(own, layout.SPIN), vector(own, layout.VELOCITY_AT_O))
     torque, force = spatial_momentum(inertia, vector(own, layout.SPIN_BIAS), vector(own, layout.BIAS_AT_O))
     torque = plus(plus(torque, cross(own, layout.SPIN, *angular)), cross(own, layout.VELOCITY_AT_O, *linear))
     applied = vector(own, layout.FORCE)
+    # The applied loads are about the origin of the body and are moved to o.
     write_vector(load, 0, *minus(minus(torque, vector(own, layout.TORQUE)), cross(own, layout.ARM, *applied)))
     write_vector(load, 3, *minus(plus(force, cross(own, layout.SPIN, *linear)), applied))
 
@@ -170,6 +175,7 @@ def fill_mass_matrix(y, out, tables):
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
             s, path, depth = work[6 * j :], paths[freedoms[j]["path"] :], freedoms[j]["depth"]
             row = work[8 * n + freedoms[j]["row"] :]
+            # Generalised force: minus the load of all carried bodies along the column S.
             force = -dot(s, 0, *vector(load, 0)) - dot(s, 3, *vector(load, 3))
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
@@ -178,6 +184,7 @@ def fill_mass_matrix(y, out, tables):
                 force -= body["stiffness"] * (body["start"][0] + y[body["y"]])
             # last: forces balanced at the start cancel without rounding
             work[6 * n + j] = force - freedoms[j]["balance"]
+            # Row j of M: S_k . I S_j for all degrees of freedom k from the root to j.
             torque, push = spatial_momentum(inertia, vector(s, 0), vector(s, 3))
             for k in range(depth + 1):
                 c = work[6 * path[k] :]
@@ -206,6 +213,7 @@ def factor_mass_matrix(tables):
         row[depth] = per
         for k in range(depth):
             row[k] *= per
+        # The outer product of the row changes only rows of degrees of freedom on its path.
         for k in range(depth):
             up, share = work[8 * n + freedoms[path[k]]["row"] :], row[k]
             for m in range(k + 1):
@@ -231,6 +239,7 @@ def solve_mass_matrix(tables, at):
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     solve_factor(tables, at)
     b = work[at : at + n]
+    # Second half, L x = z, from the root to the leaves.
     for j in range(n):
         row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
         x = b[j]
@@ -250,6 +259,7 @@ def spread_accelerations(out, tables):
     for i in range(bodies.size):
         body, at, acceleration = bodies[i], body_row(tables, i), work[loads + LOAD_SIZE * i :]
         own = out[at : at + BODY_OUT]
+        # A body has the acceleration of its parent and the columns of its own joint times their rates.
         if body["parent"] >= 0:
             up = work[loads + LOAD_SIZE * body["parent"] :]
             for k in range(LOAD_SIZE):
@@ -283,6 +293,7 @@ def coordinate_rates(body, y, dydt):
         first = 3
     h, a, b, c = kinematics.joint_parameters(body, first, y)
     x, y0, z = kinematics.joint_velocities(body, first, y)
+    # e' = E(e) w / 2, with the Euler parameters e and the angular velocity w.
     dydt[at + first] = -0.5 * (a * x + b * y0 + c * z)
     write_vector(dydt, at + first + 1, 0.5 * (h * x + b * z - c * y0), 0.5 * (h * y0 + c * x - a * z),
         0.5 * (h * z + a * y0 - b * x))  # fmt: skip
@@ -309,6 +320,7 @@ def add_body_force(out, tables, i, p, f, at):
     """
     if i >= 0:
         here = body_row(tables, i)
+        # From o, about which the columns S are written.
         arm = plus(minus(p, vector(out, here + layout.POSITION)), vector(out, here + layout.ARM))
         add_body_wrench(tables, i, vector_product(arm, f), f, at)
 
@@ -394,10 +406,12 @@ def body_rate_limit(out, tables):
     for k in range(lines.size):
         line = lines[k]
         spring, damper = push_stiffness(out, tables, line["push"])
+        # A given force adds no rate, and `mobility` is costly.
         if spring == 0.0 and damper == 0.0:
             continue
         along = vector(out, tables.layout[0]["along"] + 3 * k)
         clear_column(tables, at)
+        # The column becomes the direction b of a unit force along the element.
         add_point_force(out, tables, line["to_point"], line["acts"], along, at)
         add_point_force(out, tables, line["from_point"], line["acts"], scaled(-1.0, along), at)
         inverse_mass = mobility(tables, at)

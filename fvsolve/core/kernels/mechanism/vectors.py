@@ -79,6 +79,7 @@ def rotate(out, r, v, k):
 @njit(forceinline=True)
 def rotate_back(out, r, x, y, z):
     """Transform (x, y, z) from axes of the world to axes of a body; out[r] : rotation matrix of the body, by rows."""
+    # The transpose of a rotation matrix is its inverse.
     return (
         out[r] * x + out[r + 3] * y + out[r + 6] * z,
         out[r + 1] * x + out[r + 4] * y + out[r + 7] * z,

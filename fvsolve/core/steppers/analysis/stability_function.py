@@ -124,6 +124,7 @@ def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
         moments.append(float(b @ power))
         power = a @ power
         traces.append(float(np.trace(np.linalg.matrix_power(a, k + 1))))
+    # Newton's identities give the series of 1 / det(I - s |A|) from the traces of powers.
     sums = [1.0]
     for k in range(1, s + 1):
         sums.append(sum(traces[i] * sums[k - 1 - i] for i in range(k)) / k)
@@ -140,6 +141,7 @@ def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:
     rows = [[(j, x) for j, x in enumerate(row) if x != 0] for row in a]
     characteristic, m = [Fraction(1)], [[Fraction(i == j) for j in range(s)] for i in range(s)]
     adjugate = []
+    # Recurrence: c_k = -trace(A M_k) / k, M_(k+1) = A M_k + c_k I.
     for k in range(1, s + 1):
         adjugate.append(m)
         m = [[sum((x * m[j][col] for j, x in row if m[j][col] != 0), Fraction(0)) for col in range(s)] for row in rows]

@@ -47,6 +47,7 @@ def real_interval(r: StabilityFunction) -> float:
     down, up = (
         Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
     )
+    # At s = -x, R <= 1 where D - N >= 0 and R >= -1 where D + N >= 0.
     edges = [chopped(p, r.doubts[0] + r.doubts[1]) for p in (down - up, down + up)]
     if any(_negative_near_zero(p) for p in edges):
         return 0.0
@@ -96,6 +97,7 @@ def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
 
 def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
     """|p(-x exp(i phi))|^2 as a polynomial in x: sum_jk p_j p_k (-x)^(j+k) cos((j - k) phi); cosine : cos(phi)."""
+    # cos(k phi) by Chebyshev's recurrence stays a fraction.
     cosines = [Fraction(1), cosine]
     while len(cosines) <= p.degree:
         cosines.append(2 * cosine * cosines[-1] - cosines[-2])
@@ -189,6 +191,7 @@ def _monotone(k: list[list], r: Fraction) -> bool:
     It is False if I + r K is singular. The computation is exact. k : matrix K
     """
     n = len(k)
+    # Gauss-Jordan elimination of I + r K with the right-hand sides e and r K.
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
     for i in range(n):
         pivot = next((m for m in range(i, n) if rows[m][i] != 0), None)

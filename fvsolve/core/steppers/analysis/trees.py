@@ -62,6 +62,7 @@ class Conditions:
         left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
         residual = left - Fraction(1, density(tree))
         if self.rounding and residual != 0:
+            # The sum of sizes, without cancellation, bounds the effect of rounded coefficients.
             size = sum(short(abs(x)) * y for x, y in zip(b, self._phi(tree, True), strict=True))
             uncertainty = 2 * tree[0] * self.rounding * size
             if abs(residual) <= uncertainty < Fraction(1, density(tree)):

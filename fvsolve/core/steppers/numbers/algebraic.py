@@ -140,6 +140,7 @@ class Algebraic:
             raise ZeroDivisionError("division by zero")
         modulus, polynomial = self.field.polynomial, Polynomial(self.parts)
         modulus = modulus // modulus.gcd(polynomial)  # drop the factors that do not vanish at theta
+        # Invariant: r1 is s1 times the number, modulo the polynomial of theta.
         r0, r1, s0, s1 = modulus, polynomial % modulus, Polynomial([]), Polynomial([1])
         while r1.degree > 0:
             quotient, rest = divmod(r0, r1)
@@ -170,6 +171,7 @@ class Algebraic:
 
     def _vanishes(self) -> bool:
         common = self.field.polynomial.gcd(Polynomial(self.parts))
+        # The number is zero if theta is a root of the common factor, which then changes sign there.
         return common.degree > 0 and common(self.field.low) * common(self.field.high) <= 0
 
     def __eq__(self, other) -> bool:
@@ -228,6 +230,7 @@ def number(field: Field, parts):
 def square_root(n: int):
     """sqrt(n) of an integer n >= 0, as an integer times the root of a square-free integer."""
     outside, inside, k = 1, n, 2
+    # Square factors leave the root, so that equal numbers have equal forms.
     while k * k <= inside:
         while inside % (k * k) == 0:
             outside, inside = outside * k, inside // (k * k)

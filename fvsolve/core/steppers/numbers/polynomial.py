@@ -149,6 +149,7 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
     with the Lagrange polynomials l_j (Hairer, Norsett and Wanner 1993, II.7).
     rounding : relative error of a coefficient
     """
+    # Equal nodes have no Lagrange polynomials, and an explicit method is no collocation.
     if len(set(c)) < len(c) or (len(c) > 1 and not any(x != 0 for i, row in enumerate(a) for x in row[i:])):
         return ()
 
@@ -156,6 +157,7 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
         return abs(x - y) <= 100 * rounding * len(c) if rounding else x == y
 
     integrated = integrals(c)
+    # Integrals up to c_i must give the rows of A, integrals up to 1 the weights.
     for x, row in zip((*c, Fraction(1)), (*a, b), strict=True):
         if not all(equal(value, integral(x)) for value, integral in zip(row, integrated, strict=True)):
             return ()
@@ -186,6 +188,7 @@ def chain(p: Polynomial) -> list[Polynomial]:
         remainder = -(polynomials[-2] % polynomials[-1])
         if remainder.degree < 0:
             break
+        # A positive factor keeps the signs of the chain and its fractions short.
         top = remainder.coefficients[-1]
         polynomials.append(remainder / (top if sign(top) > 0 else -top))
     return polynomials
@@ -223,9 +226,11 @@ def first_sign_change(p: Polynomial) -> float | None:
     if p.degree < 1:
         return None
     polynomials, low, high = chain(p), Fraction(0), Fraction(1)
+    # Sturm: the number of roots up to x is the loss of sign changes from 0 to x.
     at_low, far = _changes(polynomials, low, 1), _changes(polynomials, None, 1)
     if at_low == far:
         return None
+    # First an interval that contains a root, then one with a single root, then bisection.
     while _changes(polynomials, high, 1) == at_low:
         low, high = high, 2 * high
     while at_low - _changes(polynomials, high, 1) > 1:
@@ -258,6 +263,7 @@ def roots_right(p: Polynomial) -> bool:
     """True if all roots of p lie in the open right half plane, by Routh's array of p(-x)."""
     up = [x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients)][::-1]
     upper, lower = up[0::2], up[1::2]
+    # Routh: the first column of the array must not change its sign.
     first = sign(upper[0])
     while lower:
         if sign(lower[0]) != first:

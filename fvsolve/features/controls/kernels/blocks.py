@@ -51,6 +51,7 @@ LINEAR = None  # of the template: True for the density law `linear`
 def measured_change(tables, control, j):
     """Change of input j of a block since the start, before its filter."""
     code = tables.integers[control["inputs"] + j]
+    # A negative code is the output of another block, counted from -1.
     value = tables.readings[code] if code >= 0 else tables.applied[-1 - code]
     return value - tables.floats[control["starts"] + j]
 
@@ -131,11 +132,13 @@ def write_outputs(t, y, out, tables, late):
     for k in range(controls.size):
         control = controls[k]
         if control["late"] == late:
+            # A sampled block holds the output of its last sample.
             if control["period"] > 0.0:
                 v = out[at + 2 * k] = tables.discrete[control["memory"]]
             else:
                 v = call_decide(tables.block_hooks[control["hooks"], DECIDE], t, y, tables, control)
                 out[at + 2 * k] = limited(v, tables.armed, control)
+            # Output before its limits, which event functions and the rates of states read.
             applied[controls.size + k] = v
             apply_output(t, tables, k, out[at + 2 * k])
 
@@ -146,6 +149,7 @@ def drive_node(t, out, tables, i):
     node, layout = tables.nodes[i], tables.layout[0]
     value = schedule_value(tables, node["schedule"], t)
     if node["kind"] != FIXED:
+        # The net inflow contains the demand of the schedule at its old value, which is taken out.
         out[layout["net"] + i] -= value + out[layout["supply"] + i]
         out[layout["supply"] + i] = -value
         return
@@ -161,6 +165,7 @@ def _decide_early(t, y, dydt, out, handle):
     write_outputs(t, y, out, tables, 0)
     for m in range(tables.driven.size):
         kind, i = tables.driven[m]["kind"], tables.driven[m]["index"]
+        # The phase `prepare` has set valves and devices with the outputs before, so they are set again.
         if kind == DRIVEN_VALVE:
             out[core.layout[0]["conductance"] + i] = valve_conductance(core, i, t)
         elif kind == DRIVEN_DEVICE:
@@ -198,8 +203,10 @@ def control_rates(t, y, dydt, out, handle):
             continue
         for j in range(control["filters"]):
             i = control["y"] + j
+            # First-order filter: its state follows the input with the rate 1 / time constant.
             dydt[i] = (measured_change(tables, control, j) - y[i]) * control["filter_rate"]
         hook = tables.block_hooks[control["hooks"], ADAPT]
+        # States of sampled blocks change at samples alone.
         if hook != 0 and control["y"] >= 0 and control["period"] == 0.0:
             call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
         if not abs(applied[k]) < inf:
@@ -228,6 +235,7 @@ def control_events(t, y, out, handle, g):
             call_switch(hook, t, y, tables, control, g)
         if flag >= 0:
             v = applied[controls.size + k]
+            # Distances to both limits before they act: they set the flags that `limited` reads.
             is_low(v - control["least"], 0.0, flag, none, g)
             is_low(control["greatest"] - v, 2.0, flag, none, g)
 
@@ -266,14 +274,17 @@ def take_samples(t, y, out, handle, values):
     """At a time at which a sample is due (STATUS is ARRIVED), let the blocks act, in the order of their table."""
     tables = open_blocks(handle)
     controls, discrete = tables.controls, tables.discrete
+    # Breaks arrive first; samples follow when this state has been evaluated again.
     if out[STATUS] != ARRIVED or let_breaks_arrive(t, tables):
         return
     read_sensors(t, y, out, tables)
     for k in range(controls.size):
         control = controls[k]
         if is_due(t, tables, control):
+            # Breaks of its delayed input that are due take effect before it acts.
             if control["delay"] > 0.0:
                 admit_breaks(tables, k, t)
+            # A sample is a jump of the output, which no history may interpolate across.
             if tables.histories.size > 0:
                 set_breaks(tables, k, t, JUMP)
             sample = tables.block_hooks[control["hooks"], SAMPLE]

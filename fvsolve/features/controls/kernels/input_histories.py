@@ -65,8 +65,10 @@ def value_before(tables, control, t):
     """Change of the input of a block at the time t - delay."""
     histories, before = tables.histories, tables.floats[control["data"] + BEFORE]
     at = head_of(histories, control["history"])
+    # No break has arrived yet: the output still belongs to the time before the first entry.
     if histories[at + ARRIVED] < 0.0:
         return before
+    # Entries from the next break on are later than t - delay: none of them may be read.
     last = int(histories[at + COUNT] if histories[at + NEXT] < 0.0 else histories[at + NEXT]) - 1
     first, time = int(histories[at + ARRIVED]), t - control["delay"]
     oldest = max(0, int(histories[at + COUNT]) - int(histories[CAPACITY]))
@@ -99,6 +101,7 @@ def interpolated(histories, at, first, last, time):
         histories[place_of(histories, at, low) + 1],
         0.0,
     )
+    # Lagrange polynomial of the differences from entry `low`.
     for i in range(POINTS, POINTS + points):
         here, weight = place_of(histories, at, int(histories[i])), 1.0
         for j in range(POINTS, POINTS + points):
@@ -119,9 +122,11 @@ def choose_points(histories, at, first, last, low):
     """
     histories[POINTS], histories[POINTS + 1], points, left, right = low, low + 1, 2, low, low + 1
     gap, count_left, count_right = LEAST_RATIO * (time_of(histories, at, right) - time_of(histories, at, left)), 1, 1
+    # In the second turn, breaks of high derivatives may be crossed, which so few points do not resolve.
     for turn in range(2):
         crossed, goes_left, goes_right = NONE if turn == 0 else float(points), True, True
         while points < MOST_POINTS and (goes_left or goes_right):
+            # Points are added on the side with fewer of them: in the middle a polynomial is most accurate.
             if goes_left and (not goes_right or count_left <= count_right):
                 chosen = point_before(histories, at, left, first, gap, crossed)
                 goes_left, left, count_left = chosen >= 0, left if chosen < 0 else chosen, count_left + 1
@@ -190,6 +195,7 @@ def record_inputs(t, out, tables):
         control = tables.controls[k]
         if control["delay"] > 0.0:
             at, level = head_of(histories, control["history"]), SMOOTH
+            # An event or a schedule breaks the derivative of every input, a break of an output only some.
             if switched:
                 level = KINK
             elif caused and histories[at + BREAK_LEVEL] <= LAST_LEVEL:
@@ -211,8 +217,10 @@ def accurate_step(histories, at, tolerance):
     """
     count = int(histories[at + COUNT])
     first = count - MOST_POINTS - 1
+    # Fewer than seven entries have no divided difference of sixth order.
     if first < 0 or tolerance == 0.0:
         return FAR
+    # Across a break the divided difference says nothing about the smooth parts.
     for k in range(first + 1, count):
         if is_after_break(histories, at, k):
             return FAR
@@ -222,12 +230,15 @@ def accurate_step(histories, at, tolerance):
         for j in range(first, count):
             if j != i:
                 product *= time_of(histories, at, i) - time_of(histories, at, j)
+        # Relative to the first value, so that a constant input gives exactly zero.
         difference += (
             histories[place_of(histories, at, i) + 1] - histories[place_of(histories, at, first) + 1]
         ) / product
     step = time_of(histories, at, count - 1) - time_of(histories, at, count - 2)
+    # Error in the middle interval of equal steps as long as the last one.
     error = abs(difference) * MIDDLE * step**MOST_POINTS
     allowed = tolerance * histories[at + GREATEST]
+    # The error grows with the sixth power of the step.
     return step * (allowed / error) ** (1.0 / MOST_POINTS) if error > 0.0 else FAR
 
 
@@ -252,6 +263,7 @@ def store_input(histories, at, t, change, level, before, small):
         return
     if t < histories[place]:
         return
+    # Two different values at the same time: the input jumps.
     if abs(change - histories[place + 1]) > ROUNDING * histories[at + GREATEST]:
         level = JUMP
     if level == SMOOTH:
@@ -277,6 +289,7 @@ def add_entry(histories, at, t, change, level):
     count = int(histories[at + COUNT])
     place = place_of(histories, at, count)
     histories[place], histories[place + 1], histories[place + 2] = t, change, level
+    # Breaks arrive in the order of their entries, so only the first one is awaited.
     if level != SMOOTH and histories[at + NEXT] < 0.0:
         histories[at + NEXT] = count
     histories[at + COUNT] = count + 1.0

@@ -98,6 +98,7 @@ def extremes_at_jump(t, time, y, state, handle):
         probe = tables.probes[k]
         if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
             continue  # see `update_probe_extremes`
+        # Linear between both records, with the jumps that `state` contains.
         value = values[k] + share * (spare[first + k] - spare[third + k])
         update_extremes(tables.extremes, k, time, value)
         mark = probe["mark"]
@@ -147,6 +148,7 @@ def record_lines(t, y, out, handle, values):
     if amended:
         return
     store_values(tables, out, values)
+    # An arrival that is due stays until `admit_jumps` lets the jump arrive.
     if past[history.NEXT_ARRIVAL] > t + history.time_tolerance(past):
         past[history.NEXT_ARRIVAL] = next_arrival(past, places, tables, t)
     arrival = past[history.NEXT_ARRIVAL]
@@ -191,6 +193,7 @@ def record_step(past, places, tables, t, y, out, handle):
             past[history.CORRECTED_TIME] = history.NAN
         jumps.write_joint_arrivals(past, places, tables, t)  # again: nodes were solved without the jumps in between
     entry, ends = history.begin_entry(past, t), tables.layout[0]["ends"]
+    # NaN: jumps have corrected the state, which must be evaluated again.
     if past[history.CORRECTED_TIME] != past[history.CORRECTED_TIME]:
         past[history.CORRECTED_TIME], out[STATUS] = t, AMENDED
     for i in range(tables.delays.size):
@@ -200,6 +203,7 @@ def record_step(past, places, tables, t, y, out, handle):
         history.write_entry(past, places, line, last, entry, 1, out[at + 3])
         sent = max(abs(out[at]), abs(out[at + 3]))
         past[history.GREATEST_WAVE] = max(past[history.GREATEST_WAVE], sent / tables.pipes[line["pipe"]]["admittance"])
+        # A wave that arrives at a joint is sent into the next stretch.
         for q in range(last):
             joint = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
             history.write_entry(past, places, line, q + 1, entry, 0, past[joint + 1])
@@ -402,10 +406,12 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         return False
     sharp, changing = own.sharp, times_may_change(past, own, t)
     tables, state = open_lines(sharp), own.spare[: own.layout[0]["size"]]
+    # Nodes are first solved as if no jump arrived in this step.
     past[history.ONLY_PASSED_JUMPS], past[history.ARRIVALS_TIME] = 1.0, history.NAN
     run_job(CLOSE, t, y, y[:0], state, handle)
     past[history.ONLY_PASSED_JUMPS] = 0.0
     past[history.ARRIVALS_TIME], past[history.ARRIVALS_COUNT] = t, past[history.COUNT]
+    # Arriving waves without the jumps, which are added one by one as they pass.
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
         past[places[0] + history.ARRIVALS_SIZE * end_stretch(line, 0)] = state[at + 1]
@@ -419,6 +425,7 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         if not alone:
             solve_nodes_again(past, places, tables, t, y, state, changes, sharp, times)
         send_changes(past, places, tables, changes, time)
+        # Jumps sent now may arrive, or let others arrive, within the same step.
         if changing:
             write_all_times(past, places, own, tree, latest)
         extremes_at_jump(t, time, y, state, handle)
@@ -488,11 +495,13 @@ def enter_plain_node(past, tables, y, state, changes, number, side, size, times)
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node, at = tables.nodes[i], layout["ends"] + 4 * line["pipe"]
     state[at + 1 + side] += size
+    # Known pressure: the jump is reflected with the opposite sign.
     if node["kind"] != JUNCTION:
         state[at + 3 * side] -= size
         add_change(changes, 4 * number + side, -size)
         jumps.correct_store(past, tables, y, state, pipe, i, 2.0 * size, times)
         return
+    # Junction: dp = 2 dw / sum of Y, and each pipe receives Y dp minus the wave that came from it.
     change = 2.0 * size / node["admittance"]
     state[layout["pressure"] + i] += change
     jumps.correct_columns(past, tables, y, i, change, times)

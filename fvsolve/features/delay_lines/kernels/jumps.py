@@ -125,6 +125,7 @@ def reflected_part(past, places, line, pipe, q, wave, size, t):
         return 0.0
     clock = history.reading_data(past, history.newest_before(past, t))
     head = history.jump_head(places, line["stretch"] + q, 0)
+    # Friction acts on the waves that meet in the middle, with the jumps that passed there before.
     r, l = history.smooth_waves(past, places, clock, line, q, t - line["hold"])
     r += history.passed_jumps(past, places, head)
     l += history.passed_jumps(past, places, head + history.HEAD_SIZE)
@@ -166,6 +167,7 @@ def pass_waiting_jumps(past, places, tables, line, q, t, latest, least):
             size = past[place + queue]
             share = reflected_part(past, places, line, pipe, q, wave, size, t)
             past[history.jump_head(places, s, wave) + history.ARRIVED_COUNT] += 1.0
+            # Friction reflects `share` of a forward jump; of a backward jump it is the part that goes ahead.
             ahead += share if wave == 1 else size - share
             back += share if wave == 0 else size - share
             time, wave, place = next_to_leave(past, places, line, q, latest)
@@ -255,6 +257,7 @@ def detect_jumps(past, places, tables, t, y, out, short):
         out[STATUS] to AMENDED, because the state must be evaluated again.
     """
     k, ends, state = int(past[history.COUNT]) - 1, tables.layout[0]["ends"], out
+    # In short lines a part of a sent wave arrives at once, so nodes must be solved with it.
     if short:
         state = tables.spare[: tables.layout[0]["size"]]
         write_all_arrivals(past, tables, t)
@@ -294,6 +297,7 @@ def change_times(past, tables, t, time, sent):
         return t - time, 0.0
     before, settings = history.time_of(past, int(past[history.COUNT]) - 1), tables.line_settings[0]
     h, booked, at, stages = t - before, 0.0, settings["weights"], settings["stages"]
+    # A stage at or after the change has counted it with its weight for the whole step.
     for i in range(stages):
         if before + tables.floats[at + stages + i] * h >= time - history.time_tolerance(past):
             booked += tables.floats[at + i]
@@ -310,6 +314,7 @@ def missing_time(times, rate):
     """
     since, booked = times
     late = since - booked
+    # Integral of exp(-rate t) from the counted time to the time since the change.
     return late if rate * abs(late) < 1e-12 else -exp(-rate * booked) * expm1(-rate * late) / rate
 
 
@@ -355,6 +360,7 @@ def correct_columns(past, tables, y, i, change, times):
         side = 1 * (columns[k]["from_node"] == i) - 1 * (columns[k]["to_node"] == i)
         if side != 0 and change != 0.0:
             share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
+            # The pressure relaxes as the flow of the column changes, against the admittance of pipes.
             rate = share / admittance if admittance > 0.0 else 0.0
             y[columns[k]["y"]] += side * change * share * missing_time(times, rate)
             past[history.CORRECTED_TIME] = history.NAN

@@ -67,6 +67,7 @@ def kink_before(past, places, line, q, t, least):
     k += x == 1.0
     if k >= history.PROFILE_ENTRIES and history.time_of(past, k) < before:
         latest = max(latest, history.time_of(past, k))
+    # Jumps are sent between entries too.
     for wave in range(2):
         at = history.jump_head(places, line["stretch"] + q, wave)
         for i in range(int(past[at + history.JUMP_COUNT])):
@@ -93,6 +94,7 @@ def stretch_integrals(t, out, tables, number, q):
     top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
     net, ahead, back = 0.0, 0.0, 0.0
     end, oldest, middle = t, t - hold + history.time_tolerance(past), t - 0.5 * hold
+    # Pieces end at kinks, and in the middle where friction acts, so that quadrature sees smooth waves.
     while end > oldest:
         least = middle if end > middle + history.time_tolerance(past) else t - hold
         begin = kink_before(past, places, line, q, end, least)
@@ -100,6 +102,7 @@ def stretch_integrals(t, out, tables, number, q):
             at = end + (GAUSS_POINTS[g] - 0.5) * (end - begin)
             r, l = sent_waves(t, out, tables, number, q, at)
             x, w = (t - at) / hold, GAUSS_WEIGHTS[g] * (end - begin) * (pipe["speed"] * share)
+            # Older than half of the travel time: both waves have passed the friction in the middle.
             if share == 1.0 and at < middle:
                 delta = friction_loss(pipe, line, r, l)
                 r, l = r - delta, l + delta
@@ -135,6 +138,7 @@ def line_power(t, out, tables, number, rows):
     per, length = 1.0 / (tables.settings[0]["rho"] * pipe["area"]), pipe["speed"] * line["tau"]
     friction, taken = 0.0, 0.0
     for q in range(line["stretches"]):
+        # Friction acts on the waves in the middle, sent half a travel time ago; in a short line a step ago.
         r, l = sent_waves(t, out, tables, number, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
         delta = friction_loss(pipe, line, r, l)
         flow = pipe["flow"] + (r - l - delta)
@@ -142,8 +146,10 @@ def line_power(t, out, tables, number, rows):
         friction += length * flow * pull
         taken += length * (pull - pipe["drag"]) * flow
         mean = 0.0
+        # Only an initial drag lets q0 fall along the line; its part of the power needs the mean flow.
         if pipe["drag"] != 0.0:
             mean = stretch_integrals(t, out, tables, number, q)[0] / length
+        # A line shorter than a step takes energy from each wave, beta (1 - beta) c (s - s_h)^2.
         if beta > 0.0:
             ahead, back = out[at] - r, out[at + 3] - l
             mean += beta * (out[at] - out[at + 3]) - delta

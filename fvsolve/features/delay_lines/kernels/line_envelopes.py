@@ -151,6 +151,7 @@ def cross_jumps(past, places, clock, tables, line, q, x, at, i, bounds, crossed,
     delta, n, r = past[places[0] + history.ARRIVALS_SIZE * s + 2], line["places"], history.NAN
     place = history.jump_place(past, places, forward, i)
     sent, size = past[place], past[place + queue]
+    # Times of sending with which a backward jump crosses this jump within the step and the cell.
     opens, ends = max(2.0 * before - tau - sent, sent - tau), min(2.0 * t - tau - sent, sent + tau)
     opens, ends = max(opens, sent - tau + 2.0 * tau * x[0]), min(ends, sent - tau + 2.0 * tau * x[1])
     for k in range(crossed.size):
@@ -160,10 +161,12 @@ def cross_jumps(past, places, clock, tables, line, q, x, at, i, bounds, crossed,
         opposite, change = past[other], past[other + queue]
         if opposite <= opens + same or opposite > ends + same:
             continue
+        # The forward wave is needed only if a pair may extend the envelope.
         if r != r:
             r = wave_at_jump(past, places, clock, ring, mask, forward, 0, i)
         j = history.jump_number(past, places, backward, other)
         l = wave_at_jump(past, places, clock, ring, mask, backward, 1, j)
+        # Two jumps meet where their ages add up to the travel time.
         where, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
         cell = first_cell + min(int((q + where) * n / line["stretches"]), n - 1)
         for side in range(4):
@@ -209,8 +212,10 @@ def update_stretch_extremes(past, places, clock, tables, line, q, before, t, unc
         ahead = wave_bounds.bounds_between(past, bounds, mask, 0, first, last)
         back = wave_bounds.bounds_between(past, bounds, mask, 1, back_first, back_last)
         most, floor = 0.0, envelope[0, cell + j]
+        # Friction changes the sum of both waves by less than delta along the stretch.
         if delta != 0.0:
             most = abs(delta) + BOUND_ROUNDING * (abs(ahead[0]) + abs(ahead[1]) + abs(back[0]) + abs(back[1]))
+        # While the pipe has not boiled, values below vapour pressure must not be left out.
         if tables.marks[line["pipe"]] != tables.marks[line["pipe"]]:
             floor = max(floor, tables.profile[cell + j])
         known = (floor, envelope[2, cell + j])
@@ -302,6 +307,7 @@ def write_waves_at_joints(t, past, places, clock, line, r, l):
     """Write both waves at the time t of the last entry to the places of a line that are at joints, as in `waves_at`."""
     stretches, n = line["stretches"], r.size
     for joint in range(1, stretches):
+        # True if a cell centre is at the joint, (j + 1/2) / n = joint / stretches, without rounding.
         if (2 * n * joint - stretches) % (2 * stretches) == 0:
             j = (2 * n * joint - stretches) // (2 * stretches)
             r[j], l[j] = (

@@ -60,6 +60,7 @@ def friction_loss(pipe, line, r, l):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
     rough = SLOPE_ERROR if pipe["friction"] == FRICTION_ROUGH else 0.0
+    # Newton starts from friction linearised at the initial steady flow.
     m, least = x * line["transmission"], FLOW_TOLERANCE * (abs(x) + 1e-3 * abs(flow))
     for _ in range(MAX_ITERATIONS):
         force, slope = drag_and_slope(pipe, flow + m)
@@ -84,9 +85,11 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
     l = v + history.arrived_until(past, places, clock, head + history.HEAD_SIZE, t, line["tau"])
     delta, beta = friction_loss(pipe, line, r, l), line["now"]
     back, ahead = l + delta, r - delta
+    # Of the smooth wave, 1 - beta was sent a step ago; the rest is sent now and depends on the nodes.
     if beta > 0.0:
         ahead -= beta * (u + history.jumps_until(past, places, head, t + clock[4]))
         back -= beta * (v + history.jumps_until(past, places, head + history.HEAD_SIZE, t + clock[4]))
+        # At p' = 0 a node sends minus its arriving wave: ahead = A - beta back, back = B - beta ahead.
         per = 1.0 / (1.0 - beta * beta)
         ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
     at = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
@@ -150,6 +153,7 @@ def incoming_line_waves(t, y, dydt, out, handle):
         at, admittance = ends + 4 * line["pipe"], pipe["admittance"]
         near = admittance * out[pressure + pipe["from_node"]]
         far = admittance * out[pressure + pipe["to_node"]]
+        # The waves that p' sends reach the other end at once by the fraction beta.
         if line["now"] > 0.0:
             beta = line["now"]
             per = beta / (1.0 - beta * beta)
@@ -185,6 +189,7 @@ def sent_wave(t, out, tables, number, q, wave, at):
     if q == (line["stretches"] - 1 if wave == 1 else 0):  # interpolated to the wave that its node sends now
         now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
         return value + (now - value) * (at - last) / (t - last)
+    # Into an inner stretch goes the wave that leaves its neighbour, with the friction there.
     pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
     r, l = history.read_waves(past, places, history.reading_data(past, newest), line, before, at - line["tau"])
     delta = friction_loss(pipe, line, r, l)
@@ -214,6 +219,7 @@ def waves_at(t, out, tables, number, share):
     x, tau = share * stretches - q, line["tau"]
     r = sent_wave(t, out, tables, number, q, 0, t - x * tau)
     l = sent_wave(t, out, tables, number, q, 1, t - (1.0 - x) * tau)
+    # Waves that met in the middle, where friction acted, were both sent at this time.
     then = t - max(x, 1.0 - x) * tau
     near = r if x >= 0.5 else sent_wave(t, out, tables, number, q, 0, then)
     far = l if x < 0.5 else sent_wave(t, out, tables, number, q, 1, then)
@@ -238,6 +244,7 @@ def entry_before(past, clock, t):
 
     Before all entries k is BEFORE_ALL.
     """
+    # Within the last equal steps the entry follows from the time without a search.
     place = (t - clock[1]) * clock[2]
     if place > -clock[3]:
         back = int(place)
@@ -272,6 +279,7 @@ def waves_in_stretch(t, past, places, clock, line, q, first, r, l, unchanged, gr
     (ring, mask), jumps = history.ring_of(places, line, q), history.jump_head(places, s, 0)
     delta, steps, others = past[places[0] + history.ARRIVALS_SIZE * s + 2], tau * clock[2], jumps + history.HEAD_SIZE
     i, k = int(past[jumps + history.JUMP_COUNT]), 0
+    # Equal steps over the whole travel time and no jumps: entries are read by their index.
     calm = steps + 2.0 < clock[3] and i + past[others + history.JUMP_COUNT] == 0.0
     while j < n and (q + 1 == stretches or int((j + 0.5) / n * stretches) <= q):
         if unchanged.size > 0 and unchanged[j] > 0.0:

@@ -46,7 +46,9 @@ def write_jump_bounds(past, places, clock, ring, mask, at, wave, begin):
         sent, size, total = past[place], past[place + queue], past[place + 2 * queue]
         wave_after = wave_at_jump(past, places, clock, ring, mask, at, wave, i)
         smooth = smooth_wave_linear(past, clock, ring, mask, wave, sent)
+        # Wave after the jump and before it; the third differs among jumps at times that count as equal.
         first, second, third = wave_after, wave_after - size, smooth + total
+        # Widened by the rounding of sums and of times, so that no value read later lies outside.
         rounding = BOUND_ROUNDING * (abs(smooth) + abs(total) + abs(size) + abs(wave_after))
         rounding += GRID_ROUNDING * smooth_changes(past, clock, ring, mask, wave, sent)
         past[place + 3 * queue] = min(first, second, third) - rounding
@@ -64,6 +66,7 @@ def write_bounds(past, places, clock, line, q, wave):
     at, (ring, mask) = history.jump_head(places, line["stretch"] + q, wave), history.ring_of(places, line, q)
     k, bounds = newest, history.bounds_of(places, line, q) + 2 * wave
     written = bounds - history.BOUNDS_BEGIN - wave
+    # Begin earlier: at an entry recorded again, or one travel time back if bounds are missing.
     if past[written] != newest - 1 or past[history.RESTATED_ENTRY] == newest - 1:
         oldest = history.time_of(past, newest - 1) - (line["tau"] if past[written] != k - 1 else 0.0)
         k = newest - 1
@@ -74,6 +77,7 @@ def write_bounds(past, places, clock, line, q, wave):
     count = int(past[at + history.JUMP_COUNT])
     i = history.count_back(past, places, at, count, begin - near)
     write_jump_bounds(past, places, clock, ring, mask, at, wave, i)
+    # Jumps sent before the first interval are part of the wave at its beginning.
     before = history.count_until(past, places, at, i, begin + same)
     while k <= newest:
         end, first = history.time_of(past, k), history.sum_of_first(past, places, at, before)
@@ -82,6 +86,7 @@ def write_bounds(past, places, clock, line, q, wave):
         a = past[ring + 2 * ((k - 1) & mask) + wave] if k > history.PROFILE_ENTRIES else 0.0
         turn = a + (b - a)  # greatest or least value of rounded interpolation
         low, high = min(a + first, b + last, turn + last), max(a + first, b + last, turn + last)
+        # Jumps near both ends too, because a time of reading may be rounded past an entry.
         i = history.count_until(past, places, at, i, begin - near)
         for j in range(i, count):
             place = history.jump_place(past, places, at, j)

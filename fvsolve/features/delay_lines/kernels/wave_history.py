@@ -271,6 +271,7 @@ def stencil(past, clock, t):
         return lagrange_unequal(past, newest, t)
     steps = int(place) - 1 if place < int(place) else int(place)
     k, x = newest + steps, place - steps
+    # Near the newest entry fewer entries follow, so the polynomial has fewer points.
     if k + 3 <= newest and steps - 2 >= -even:
         return k, lagrange_six(x)
     if k + 2 <= newest and steps - 1 >= -even:
@@ -336,6 +337,7 @@ def sum_listed_jumps(past, places, at, t):
     The list must not be empty.
     """
     count = int(past[at + JUMP_COUNT])
+    # If the last jump was sent by t, all were, and no search is needed.
     if past[jump_place(past, places, at, count - 1)] > t:
         count = first_after(past, places, at, t)
     return sum_of_first(past, places, at, count)
@@ -393,6 +395,7 @@ def insert_jump(past, places, at, t, size):
     """
     queue, count, tolerance = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT]), time_tolerance(past)
     i = count
+    # From the end of the list, because jumps are inserted mostly in the order of their times.
     while i > 0 and past[jump_place(past, places, at, i - 1)] > t + tolerance:
         i -= 1
     before = jump_place(past, places, at, max(i - 1, 0))
@@ -453,6 +456,7 @@ def begin_entry(past, t):
         return PROFILE_ENTRIES
     h = t - time_of(past, k - 1)
     past[STEP_BEFORE], past[EQUAL_STEPS_BEFORE] = past[LAST_STEP], past[EQUAL_STEPS]
+    # Steps in the steady state before the start count as equal to the first step.
     if k == PROFILE_ENTRIES + 1:
         past[LAST_STEP] = h
     elif abs(h - past[LAST_STEP]) <= 1e-9 * h:

@@ -32,6 +32,7 @@ def _heat_of_restrictions(t, y, dydt, out, handle):
         if sources[j]["device"] >= 0:
             device = tables.devices[sources[j]["device"]]
             hook, own = tables.hooks[device["hooks"], POWER], tables.hooks[device["hooks"], HEAT]
+            # A device may state its heat; else all power that it dissipates is heat.
             if own != 0:
                 heat += calls.call_heat(own, t, y, out, tables, device)
             elif hook != 0:  # `y` in place of rates, which the dissipation does not read
@@ -74,6 +75,7 @@ def _heat_of_pipes(t, y, dydt, out, handle):
             heat = power / (full * scalar["specific_heat"])
             dydt[at + i] += heat
             total += heat
+            # The ledger has an entry for each cell, or one for the pipe.
             if scalar["by_cell"] == 1:
                 out[row + i] = pipe["dx"] * heat
         if scalar["by_cell"] == 0:

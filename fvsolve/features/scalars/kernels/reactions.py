@@ -98,11 +98,13 @@ def greatest_rate(tables):
     size, bound = 0.0, 0.0
     for q in range(tables.scalars.size):
         size = max(size, abs(tables.stack[q]))
+    # Where all amounts are zero the difference is absolute.
     step = DIFFERENCE * size if size > 0.0 else DIFFERENCE
     for k in range(tables.reactions.size):
         ahead, back = rates_both_ways(tables, k)
         total = 0.0
         for l in range(tables.reactions.size):
+            # dr_k/dx_l as a difference quotient along the extent of reaction l.
             move_along(tables, l, step)
             more_ahead, more_back = rates_both_ways(tables, k)
             move_along(tables, l, -step)
@@ -129,6 +131,7 @@ def react(y, dydt, out, tables, first, stride, mass, p, present, weight, entry):
             # A scalar may determine the rate without being changed, as a catalyst does.
             if coefficient != 0.0:
                 dydt[first + stride * integers[reaction["scalars"] + e]] += coefficient * change
+        # The ledger has a single sum for all places, or an entry for each place.
         at = tables.layout[0]["extent"] + reaction["extent"]
         if reaction["extents"] == 1:
             out[at] += weight * change
@@ -172,6 +175,7 @@ def reaction_rates(t, y, dydt, out, handle):
     """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the ledger."""
     tables = open_tables(handle)
     layout, scalar, stride = tables.layout[0], tables.scalars[0], scalar_stride(tables)
+    # A single sum is added up place by place, so it starts from zero in each evaluation.
     for k in range(tables.reactions.size):
         for m in range(tables.reactions[k]["extents"]):
             out[layout["extent"] + tables.reactions[k]["extent"] + m] = 0.0
@@ -203,6 +207,7 @@ def add_observed(tables, k, volume, sums):
     flow = volume * (ahead - back)
     sums[0] += flow
     sums[2] += abs(flow)
+    # Without a reverse rate the affinity would be infinite.
     if tables.reactions[k]["reverse"] > 0.0:
         affinity = affinity_of(tables.reactions[k], ahead, back)
         sums[1] += flow * affinity

@@ -280,6 +280,7 @@ def write_exchange(y, out, tables, q, total, share):
             else:
                 flow = mass_inflow(out, tables, i)
             capacity = exchanger["effectiveness"] * specific_heat * flow
+        # Q = K (T_node - T_thermal) + eps cp M (T_inflow - T_thermal)
         heat = exchanger["conductance"] * (leaving - other) + capacity * (arriving - other)
         out[at + 2 * k + 1], out[first + k] = heat, -heat / specific_heat
         conductance = exchanger["conductance"] + capacity
@@ -390,6 +391,7 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             out[inflow + node] += sign * through
     for k in range(valves.size):
         i, j, flow = valves[k]["from_node"], valves[k]["to_node"], out[layout["valve"] + k]
+        # Upwind: a valve carries the value of the node from which the fluid comes.
         amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
         out[inflow + i] -= amount
         out[inflow + j] += amount
@@ -409,6 +411,7 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             out[gain + i] = supply * out[value + i]
         if has_storage(kind) and dydt.size > 0:
             at = tables.integers[scalar["places"] + i]
+            # Decay at the rate k to the ambient value: k (amount - ambient value times mass).
             fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
             dydt[at] = out[inflow + i] + out[gain + i] - fades
             record_loss(out, tables, q, at - scalar["y"], fades)
