@@ -11,6 +11,7 @@ import shutil
 import sys
 import tempfile
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 from fvsolve.compile import file_access, store
@@ -81,19 +82,21 @@ def source_hash() -> str:
     return _digest(PACKAGE, compiled_sources())
 
 
-def add_sources(folder: Path, *patterns: str) -> None:
+def add_sources(folder: Path, *patterns: str, beside: Iterable[Path] = ()) -> None:
     """Allow caching of functions defined in a folder under the hash of its sources, beside those of the core.
 
     An edit there compiles only these functions again. folder : of another package, or of a feature
     patterns : files in it on which compiled functions depend; all its modules if none is given
+    beside : folders that have been added and whose functions these functions call
     """
     folder = Path(folder).resolve()
     paths = {path for pattern in patterns or ("**/*.py",) for path in folder.glob(pattern)}
-    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(paths))}"
+    others = "".join(EXTRA_FOLDERS[Path(other).resolve()] for other in beside)
+    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(paths), others)}"
 
 
-def _digest(top: Path, paths) -> str:
-    digest = hashlib.sha256()
+def _digest(top: Path, paths, others: str = "") -> str:
+    digest = hashlib.sha256(others.encode())
     for path in paths:
         digest.update(str(path.relative_to(top)).encode() + b"\0")
         digest.update(path.read_bytes() + b"\0")

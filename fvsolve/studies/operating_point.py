@@ -65,7 +65,7 @@ def operating_point(
     probes : names of probes that are added before the probes of the case
     Delay lines are replaced by cells, unless `lines` is True and the point is the start. If the case gives no scheme
     and the default scheme is limited, it is replaced by the linear scheme that it equals in smooth solutions, or by
-    `upwind` in a case with basins. Raises CaseError for a case or probe that cannot be read, and FvsolveError for a
+    `upwind` in a case with meshes. Raises CaseError for a case or probe that cannot be read, and FvsolveError for a
     case without states, for a time `at` before the start, and for a run that does not reach `at`.
     """
     from fvsolve.case import load

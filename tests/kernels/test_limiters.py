@@ -8,11 +8,12 @@ from numpy.testing import assert_array_equal
 
 from fvsolve.core.assembly.scheme_codes import CODES
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.kernels import reconstruction, scalar_transport
+from fvsolve.core.kernels import reconstruction
 from fvsolve.core.kernels.reconstruction import by_limiter, limited
 from fvsolve.features.basins import advection
 from fvsolve.features.basins.free_surface import surface_rows as shallow_rows
 from fvsolve.features.basins.liquid import grid_nonlinear, liquid_sides
+from fvsolve.features.scalars.kernels import scalar_transport
 
 CELLS, NONE = 40, 99
 

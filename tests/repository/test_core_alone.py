@@ -1,4 +1,4 @@
-"""The core runs without features, studies, reports and exchange; each feature runs without the others."""
+"""The core runs without features, studies, reports and exchange; each feature runs with those only that it imports."""
 
 import os
 import shutil
@@ -22,6 +22,7 @@ AWAKE = {
     "networks": ["clutch"],
     "motion": ["closed-cylinder"],
 }
+CALLED = {"basins": ["scalars"]}  # features that a feature may import
 RUN = "import sys, fvsolve; from fvsolve.cli import main; print(fvsolve.__file__); sys.exit(main())"
 
 
@@ -34,7 +35,7 @@ def copy_of_package(top: Path, feature: str) -> None:
         if file.name != "__init__.py":
             file.unlink()
     for folder in (top / "fvsolve" / "features").iterdir():
-        if folder.is_dir() and folder.name != feature:
+        if folder.is_dir() and folder.name not in (feature, *CALLED.get(feature, ())):
             shutil.rmtree(folder)
 
 

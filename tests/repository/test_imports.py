@@ -48,6 +48,8 @@ def is_compiled(module: str) -> bool:
     folder, *names = below_core(module)
     if folder == "parts":
         return len(names) == 2 and names[1].startswith("law")
+    if folder == "features" and names[:2] == ["scalars", "kernels"]:
+        return True
     if folder != "features" or names[:1] != ["basins"] or len(names) == 1:
         return False
     path = Path(fvsolve.__file__).parent.joinpath("features", *names).with_suffix(".py")

@@ -532,6 +532,13 @@ class FeatureRun:
     def flags_changed(self, t: float, before: np.ndarray) -> None:
         """Continue at an event at t; before : event flags before it, those after it are `run_data.armed`"""
 
+    def explanation(self, status: int, index: int, out: np.ndarray) -> dict[str, Any]:
+        """Names and values in the text of a status of the feature with which functions end a run.
+
+        status, index : numbers in out[STATUS] and out[WHERE], see `kernels.dtypes`
+        """
+        return {}
+
     def failure(self, earliest: float) -> str:
         """Reason why a run failed, with a time not before `earliest` [s]; "" if the feature knows none."""
         return ""

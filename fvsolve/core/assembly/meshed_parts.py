@@ -155,6 +155,10 @@ class MeshedPart:
         """
         return {}
 
+    def node_points(self) -> dict[str, np.ndarray]:
+        """Point in its plane of each node at its faces, by the name of the node : float64[2] [m]."""
+        return {}
+
     def ground(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Elevation of the bottom of the part at points (x, y) of its plane [m]."""
         return np.full(x.shape, self.part.elevation or 0.0)

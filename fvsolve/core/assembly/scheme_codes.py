@@ -20,19 +20,16 @@ def family(scheme: str) -> int:
     return FAMILIES[SCHEMES[scheme].family]
 
 
-def code_of_limiter(limiter: str, basins: bool) -> int:
+def code_of_limiter(limiter: str, user: str = "") -> int:
     """Code of a limiter for kernels; that of a user is compiled here if no code is stored.
 
-    basins : True for the limiter of a basin. Raises FvsolveError if the function of a user cannot be compiled.
+    user : module that calls the loops, see `own_limiters.loops_of`. Raises FvsolveError if it cannot be compiled.
     """
     own = LIMITERS[limiter].own
     if own is None:
         return CODES[limiter]
-    if basins and not own.symmetric:  # flows through walls would not be zero
-        raise FvsolveError(f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}; expected a limiter with "
-                           "phi(r) / r = phi(1 / r) for basins on grids")  # fmt: skip
     try:
-        return limiter_code(own.phi, own.symmetric, own.digest, basins)
+        return limiter_code(own.phi, own.symmetric, own.digest, user)
     except Exception as error:
         if not type(error).__module__.startswith("numba."):
             raise
@@ -59,7 +56,7 @@ def scheme_settings(settings, scheme: str, limiter: str) -> None:
 
     settings : record of the type `kernels.dtypes.SETTINGS`
     """
-    row, settings["limiter"] = SCHEMES[scheme], code_of_limiter(limiter, basins=False)
+    row, settings["limiter"] = SCHEMES[scheme], code_of_limiter(limiter)
     settings["scheme"], settings["degree"] = family(scheme), row.degree
     if settings["scheme"] == rec.LINEAR:
         for k, weight in enumerate(row.weights):

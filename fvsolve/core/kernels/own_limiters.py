@@ -20,25 +20,24 @@ from fvsolve.jit import COMPILING, Intrinsic, compile_once, njit
 CLOSEST = 1e-15  # least difference ahead relative to the difference behind: rounding; bounds the ratio r
 LEAST = 1e-300  # least difference ahead, so that equal values have the ratio 0
 FIRST_ADDRESS = 4096  # codes from here on are addresses of tables
-RECONSTRUCTION, ADVECTION = "fvsolve.core.kernels.reconstruction", "fvsolve.features.basins.advection"
+RECONSTRUCTION = "fvsolve.core.kernels.reconstruction"
 # Loops that `by_limiter` calls : module, types of the arguments after the limiter (see `kernels.calls`), of the result.
 # A number follows the type of the items of a tuple; F is the function `limited_value` of the module.
 LOOPS = {
     "slope": (RECONSTRUCTION, "tt", "t"),
     "muscl_forward": (RECONSTRUCTION, "VV", ""),
     "muscl_backward": (RECONSTRUCTION, "VV", ""),
-    "inner_slopes": ("fvsolve.core.kernels.scalar_transport", "VV", ""),
-    "faces_limited": ("fvsolve.features.basins.liquid.liquid_sides", "VVVV", ""),
-    "faces_upwind_limited": ("fvsolve.features.basins.liquid.grid_nonlinear", "VVVVVVV", ""),
-    "put_sloped": ("fvsolve.features.basins.free_surface.surface_rows", "iVVVV", ""),
-    "put_sloped_at_kerbs": ("fvsolve.features.basins.free_surface.surface_rows", "iVVVV", ""),
-    "put_slopes": ("fvsolve.features.basins.conduit.conduit_cells", "iV", ""),
-    "put_face_values": (ADVECTION, "FtVVVVVV", ""),
-    "single_face_value": (ADVECTION, "Fbtttt", "t"),
-    "north_values_and_rates": (ADVECTION, "FtVtV4V3V3V", ""),
+    "inner_slopes": (RECONSTRUCTION, "VV", ""),
 }
+FEATURE = re.compile(r"fvsolve\.features\.\w+")  # package of a feature; its own loops follow in its tables
 PLAIN: list[Callable] = []  # limiter functions without JIT; code FIRST_ADDRESS + k is entry k
 RATIO = None  # of the template: phi(r) of the user
+
+
+def loops_of(module: str) -> dict[str, tuple[str, str, str]]:
+    """Loops in the tables of a module, in their order: LOOPS, then those in `limited_loops.LOOPS` of its feature."""
+    home = FEATURE.match(module)
+    return LOOPS | import_module(f"{home.group()}.limited_loops").LOOPS if home else LOOPS
 
 
 def symmetric_limiter(a, b):
@@ -92,9 +91,8 @@ def copied(value):
     return uncached(value) if limited or isinstance(value, FunctionType) else value
 
 
-def loop_address(name: str, limiter, folder: str) -> tuple:
-    """(address, function) of a loop of `LOOPS` compiled with a limiter function; folder : subfolder of its code."""
-    module, letters, _ = LOOPS[name]
+def loop_address(name: str, module: str, letters: str, limiter, folder: str) -> tuple:
+    """(address, function) of a loop compiled with a limiter function; folder : subfolder of its code."""
     home = import_module(module)
     names = ", ".join(f"x{k}" for k in range(len(re.findall("[a-zA-EG-Z]", letters))))
     head = "value, " if letters.startswith("F") else ""
@@ -109,24 +107,25 @@ def loop_address(name: str, limiter, folder: str) -> tuple:
 
 
 @compile_once
-def limiter_table(phi: Callable, symmetric: bool, digest: str, basins: bool) -> tuple:
+def limiter_table(phi: Callable, symmetric: bool, digest: str, user: str) -> tuple:
     """Table of the addresses of loops with the limiter phi(r) : (int64[loops], functions that own the code).
 
-    symmetric : True if phi(r) / r = phi(1 / r); digest : hash of the function; basins : True with the loops of basins
+    symmetric : True if phi(r) / r = phi(1 / r); digest : hash of the function; user : module that
+    calls the loops, see `loops_of`
     """
     limiter = uncached(symmetric_limiter if symmetric else ordered_limiter, RATIO=uncached(phi))
-    table, owners = np.zeros(len(LOOPS), dtype=np.int64), []
-    for k, (name, (module, *_)) in enumerate(LOOPS.items()):
-        if basins or module.startswith("fvsolve.core.kernels"):
-            table[k], owner = loop_address(name, limiter, f"outside/{digest}")
-            owners.append(owner)
+    loops, owners = loops_of(user), []
+    table = np.zeros(len(loops), dtype=np.int64)
+    for k, (name, (module, letters, _)) in enumerate(loops.items()):
+        table[k], owner = loop_address(name, module, letters, limiter, f"outside/{digest}")
+        owners.append(owner)
     return table, owners
 
 
-def limiter_code(phi: Callable, symmetric: bool, digest: str, basins: bool) -> int:
+def limiter_code(phi: Callable, symmetric: bool, digest: str, user: str) -> int:
     """Code of the limiter of a user, for `by_limiter`; arguments as for `limiter_table`."""
     if COMPILING:
-        return limiter_table(phi, symmetric, digest, basins)[0].ctypes.data
+        return limiter_table(phi, symmetric, digest, user)[0].ctypes.data
     template = symmetric_limiter if symmetric else ordered_limiter
     PLAIN.append(FunctionType(template.__code__, globals() | {"RATIO": phi}))
     return FIRST_ADDRESS + len(PLAIN) - 1
@@ -141,12 +140,13 @@ if COMPILING:
 
         from fvsolve.compile.code_generation import call_in_table
 
-        name = loop.dispatcher.py_func.__name__
-        if name not in LOOPS:
-            raise errors.TypingError(f"{name} has no entry in LOOPS of kernels.own_limiters")
-        _, letters, returned = LOOPS[name]
+        function = loop.dispatcher.py_func
+        name, loops = function.__name__, loops_of(function.__module__)
+        if name not in loops:
+            raise errors.TypingError(f"{name} has no entry in LOOPS of kernels.own_limiters or of its feature")
+        _, letters, returned = loops[name]
         result = calls.argument_types(returned)
-        return call_in_table(loop, given, list(LOOPS).index(name), argument_kinds(letters), result)
+        return call_in_table(loop, given, list(loops).index(name), argument_kinds(letters), result)
 
 else:
 

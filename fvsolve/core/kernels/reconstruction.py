@@ -59,6 +59,17 @@ def slope(limiter, a, b):
     return numerator / denominator
 
 
+@inline
+def inner_slopes(limiter, c, d):
+    """Write limited slopes of c (differences over a cell) to d, for all cells except those at the ends.
+
+    limiter : limiter function of two differences; c : float64[cells]  values
+    """
+    here, next, inside = c[1:], c[2:], d[1:]
+    for i in range(c.size - 2):
+        inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
+
+
 @njit
 def half_slopes(limiter, a, b, c, d):
     """(half slope from the differences a and b, half slope from c and d) by the function `limiter`.

@@ -146,8 +146,6 @@ COMPONENTS = {
 }
 COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
-BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.features.basins", boundary_exchange="basin_patches: put_boundary_flows")
-MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 
@@ -188,8 +186,6 @@ class ModelFeatures(NamedTuple):
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""
         if self.bands:
             yield BANDS
-        if self.boundary_exchange:
-            yield BOUNDARY_EXCHANGE
         linear = self.family == "linear"
         # Only pipes have cavities: without pipes the barotropic functions serve a cavitating law too.
         family = self.family if linear or self.pipes else "barotropic"
@@ -267,6 +263,7 @@ class ModelFeatures(NamedTuple):
         jobs : names of fields of `RhsTerms`
         """
         members = dict.fromkeys(self.components())  # components that several members need, once
+        jobs = [job for job in jobs if job != "boundary_exchange" or self.boundary_exchange]
         return [
             load_function(member.package, name) for job in jobs for member in members if (name := getattr(member, job))
         ]

@@ -35,7 +35,7 @@ def checks(model) -> dict[str, Any]:
         name: {"elevation": row["elevation"].item(), "pressure": row["pressure"].item(),
                "head": float(model.head(row["pressure"], row["elevation"]))}
         for name, row in zip(model.node_names, model.tables.nodes, strict=True)
-        if row["kind"] != rec.PATCH or not name.endswith(".inside")  # behind patches; no part of the case
+        if row["kind"] != rec.PATCH or not name.endswith(".inside")  # in a mesh; no part of the case
     }  # fmt: skip
     pipes, unsteady, creeps = {}, model.steady["unsteady"], model.steady["creep"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):

@@ -46,7 +46,7 @@ PVD_TAIL = "</Collection>\n</VTKFile>\n"
 class FieldSeries:
     """Series of .vtu files with their index fields.pvd, which is complete after each frame (output time).
 
-    pieces : None, or the `ParallelBasinWriter` of basins whose rows are distributed over MPI ranks
+    pieces : None, or the `ParallelBasinWriter` of meshes whose rows are distributed over MPI ranks
     """
 
     def __init__(self, folder: Path, model):
@@ -141,7 +141,7 @@ class FieldSeries:
             if basin.part.on is not None:
                 values = values | basin.vectors_at(values, frame["out"], self.model.layout)
             blocks = {key: split_blocks(value, cells) for key, value in values.items()}
-            moves = basin.name in frame["points"]  # moving basins have points of their own at each time
+            moves = basin.name in frame["points"]  # moving meshes have points of their own at each time
             if moves:
                 points = np.append(self.places[basin.name], 0.0) + frame["points"][basin.name]
             write_frame(self.folder / file, self.grid(basin.name, points, cells, not moves), blocks, units)
@@ -243,19 +243,14 @@ def unit_xml(units: dict[str, str], name: str) -> str:
 def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Points [m] and lines of all pipes : float64[n, 3], int[cells, 2].
 
-    Pipes share the point of their common node; the point of a basin patch is the mean of its faces.
+    Pipes share the point of their common node; the point of a node at a mesh is the mean of its faces.
     plan : part -> plan position float64[2] [m]
     """
     from fvsolve.core.output import network_layout
 
     places = {name: plan[network_layout.place(name)] for name in model.node_names}
-    for basin in model.meshed:
-        from fvsolve.case.basins import patch_names
-
-        for patch in patch_names(basin.mesh):
-            places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.faces(patch).index].mean(
-                axis=0
-            )
+    for part in model.meshed:
+        places |= {name: plan[part.name] + point for name, point in part.node_points().items()}
     bends = network_layout.link_bends(model.case.links)
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
     index = {name: i for i, name in enumerate(ends)}
@@ -354,7 +349,7 @@ def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, 
 
 
 class ParallelBasinWriter:
-    """Writer of the fields of basins whose rows are distributed over MPI ranks.
+    """Writer of the fields of meshes whose rows are distributed over MPI ranks.
 
     comm : MPI communicator of all ranks
     rows : basin -> int64[ranks + 1]  first row of each rank, then the number of rows

@@ -1,6 +1,6 @@
 """Loop over the time steps of a run: arrays, step settings, events, and collisions of rigid water columns."""
 
-from collections import deque
+from collections import ChainMap, deque
 from collections.abc import Callable
 
 import numpy as np
@@ -330,16 +330,12 @@ class RunLoop:
                 text, names = CONDUITS_EXHAUSTED, names | values
             if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
                 text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
+            told = ChainMap(*(own.explanation(status, index, self.out) for own in self.run_data.features))
             if status == rec.NO_WEIGHT:
                 waters = [*(part.name for part in model.meshed), *model.node_names]
                 names["name"] = waters[index].removesuffix(".inside")
-            elif status == rec.NO_COOLANT:
-                from fvsolve.core.kernels.scalar_transport import GREATEST_RISE
-
-                names["rise"] = GREATEST_RISE
-                k = model.tables.heat_sources[index]["valve"]
-                end = "from_node" if self.out[model.layout["valve"] + k] < 0.0 else "to_node"
-                names["part"], names["name"] = model.valve_names[k], model.node_names[model.tables.valves[k][end]]
+            elif told:
+                names |= told
             else:
                 names["place"] = f" at {model.node_names[index]}" if index >= 0 else ""
             self.step_back()

@@ -244,7 +244,7 @@ def pipe_symbol(weights: tuple, n: int) -> np.ndarray:
 
 
 def memory_modes(model) -> Modes:
-    """Modes of unsteady friction and creeping walls: for each pipe an estimate of the eigenvalue of the fastest decay.
+    """Modes of unsteady friction and wall creep: for each pipe an estimate of the eigenvalue of the fastest decay.
 
     It is minus the sum of the rate of the fastest relaxation term and the gains of all terms; for unsteady friction the
     sum includes the slope of the steady friction.

@@ -1,7 +1,11 @@
-"""Reactions of scalars in the cells of basins, see `kernels.reactions`."""
+"""Reactions of scalars in the cells of basins, see `features.scalars.kernels.reactions`."""
 
 from fvsolve.core.kernels.dtypes import CELL_SCALAR, LOCAL_AFFINITY, RATE, RATE_UNWANTED, REACTION_VALUE
-from fvsolve.core.kernels.reactions import (
+from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.basins.advection import THIN
+from fvsolve.features.basins.basin_scalars import cell_value
+from fvsolve.features.basins.cell_sides import deviations_of
+from fvsolve.features.scalars.kernels.reactions import (
     add_observed,
     affinity_of,
     chosen,
@@ -11,10 +15,6 @@ from fvsolve.core.kernels.reactions import (
     read_amounts,
     sums_of_network,
 )  # fmt: skip
-from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.features.basins.advection import THIN
-from fvsolve.features.basins.basin_scalars import cell_value
-from fvsolve.features.basins.cell_sides import deviations_of
 from fvsolve.jit import njit
 
 

@@ -9,7 +9,6 @@ from math import cos, pi
 
 from fvsolve.core.kernels import stage_sums
 from fvsolve.core.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, INTERIOR, MUSCL, NO_CLOSURE, RATE, UPWIND
-from fvsolve.core.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import advection, fifth_order
@@ -24,6 +23,7 @@ from fvsolve.features.basins.boundary_cells import (
     weighted_volume,
 )
 from fvsolve.features.basins.cell_sides import deviations_of
+from fvsolve.features.scalars.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.jit import njit
 
 DRY_WEIGHT = 1e-12  # weight of a dry cell in the value at a patch [m]

@@ -2,10 +2,16 @@
 
 from collections.abc import Iterator
 
-from fvsolve.core.kernels.rhs_assembly import MIXED, RhsTerms
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
+from fvsolve.features.scalars.terms import MIXED
 
 PACKAGE = "fvsolve.features.basins"
-COMMON = RhsTerms(package=PACKAGE, observe="basin_output: observe_flows", power="basin_output: patch_power")
+COMMON = RhsTerms(
+    package=PACKAGE,
+    boundary_exchange="basin_patches: put_boundary_flows",
+    observe="basin_output: observe_flows",
+    power="basin_output: patch_power",
+)
 DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_output: observe_dense_flows")  # all laws but linear
 SHORTAGES = RhsTerms(package=PACKAGE, record="basin_patches: record_patches")
 WALLS = RhsTerms(

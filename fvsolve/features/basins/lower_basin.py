@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.basins import boundary_cells
+from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.core.assembly.scheme_codes import code_of_limiter, family
 from fvsolve.core.assembly.state_names import Numbered
@@ -18,7 +18,7 @@ from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
 from fvsolve.core.schemes import LIMITERS, SCHEMES
 from fvsolve.core.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.core.steppers.tableau import METHODS
-from fvsolve.errors import Notice, listing
+from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.features.basins import advection_faces
 from fvsolve.features.basins.advection import DRY, advection_work, diffusion_work
 from fvsolve.features.basins.basin_output import SPEED, U, V
@@ -300,6 +300,10 @@ class BasinRows(BandedRows):
         """Present over undeformed area of each cell at the states y of the model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
+    def node_points(self) -> dict[str, np.ndarray]:
+        middle, faces = self.mesh.middle, self.mesh.faces
+        return {f"{self.name}.{patch}": middle[faces(patch).index].mean(axis=0) for patch in patch_names(self.mesh)}
+
     def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
         """Vectors in cells of a basin on a body, in axes of the world: "velocity" and "normal" -> float64[n, 3].
 
@@ -343,7 +347,11 @@ class BasinRows(BandedRows):
         row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
         row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
-        row["limiter"] = code_of_limiter(numerics.limiter, basins=self.is_grid)
+        own = LIMITERS[numerics.limiter].own
+        if self.is_grid and own is not None and not own.symmetric:  # flows through walls would not be zero
+            text = f"numerics.limiter: {numerics.limiter} is not symmetric: {own.costs[-1]}"
+            raise FvsolveError(f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids")
+        row["limiter"] = code_of_limiter(numerics.limiter, __name__ if self.is_grid else "")
         row["steepest"] = self.steepest
         row["wide"] = LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)

@@ -10,30 +10,13 @@ from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.assembly.scheme_codes import lower_position
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.kernels.rhs_assembly import MIXED, RhsTerms
+from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.core.model.probe_tables import cells_at_point, fill_probes
-from fvsolve.features.scalars import lower, reactions
+from fvsolve.features.scalars import lower, reactions, terms
 from fvsolve.parts.nodes_and_links import is_in_network
 
 REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
 SENSED = (rec.NODE_SCALAR, rec.PIPE_SCALAR)
-AMOUNTS = RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars")
-CARRIED = RhsTerms(outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates")
-REACTIONS = RhsTerms(
-    prepare="reactions: limit_rates", scalar_rates="reactions: reaction_rates", observe="reactions: observe_reactions"
-)
-HEAT = {
-    True: RhsTerms(outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"),
-    False: RhsTerms(
-        outlet_values="fluid_heat: heat_of_restrictions_barotropic", scalar_rates="fluid_heat: heat_of_pipes_barotropic"
-    ),
-}
-HEAT_FOR_EVENTS = {
-    True: RhsTerms(events="fluid_heat: heat_for_events"),
-    False: RhsTerms(events="fluid_heat: heat_for_events_barotropic"),
-}
-VALUES_FOR_EVENTS = RhsTerms(events="scalar_transport: mix_for_events")
-VISCOSITY = RhsTerms(rates="viscosity: viscous_friction")
 
 
 class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
@@ -97,23 +80,23 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
         heated = bool((tables.scalars["specific_heat"] > 0.0).any())
         if any(row["kind"] in SENSED for feature in model.features for row in feature.probe_rows()[0]):
             if heated:
-                yield "solved", HEAT_FOR_EVENTS[linear]
-            yield "solved", VALUES_FOR_EVENTS
+                yield "solved", terms.HEAT_FOR_EVENTS[linear]
+            yield "solved", terms.VALUES_FOR_EVENTS
         if len(tables.scalars):
-            yield "carried", AMOUNTS
+            yield "carried", terms.AMOUNTS
             if not cast.alone:
-                yield "carried", MIXED
+                yield "carried", terms.MIXED
             if cast.pipes:
-                yield "carried", CARRIED
+                yield "carried", terms.CARRIED
             if heated:
-                yield "carried", HEAT[linear]
+                yield "carried", terms.HEAT[linear]
             if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
-                yield "carried", VISCOSITY
+                yield "carried", terms.VISCOSITY
         if len(tables.reactions):  # those in basins are added later
-            yield "carried", REACTIONS
+            yield "carried", terms.REACTIONS
 
     def run(self, run_data) -> FeatureRun:
-        return FeatureRun(self, run_data)
+        return ScalarRun(self, run_data)
 
     def pattern(self, couplings):
         from fvsolve.features.scalars.pattern import ScalarPattern
@@ -157,3 +140,19 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
         from fvsolve.features.scalars.balances import scalar_ledgers
 
         return scalar_ledgers(model, y, ledger)
+
+
+class ScalarRun(FeatureRun):
+    """Heat in a run."""
+
+    def explanation(self, status: int, index: int, out: np.ndarray) -> dict:
+        """Names of the source of heat that finds no coolant, and of the node at its outlet."""
+        if status != rec.NO_COOLANT:
+            return {}
+        from fvsolve.features.scalars.kernels.scalar_transport import GREATEST_RISE
+
+        model = self.run_data.model
+        k = model.tables.heat_sources[index]["valve"]
+        end = "from_node" if out[model.layout["valve"] + k] < 0.0 else "to_node"
+        names = {"part": model.valve_names[k], "name": model.node_names[model.tables.valves[k][end]]}
+        return names | {"rise": GREATEST_RISE}

@@ -15,7 +15,6 @@ from math import exp
 from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.devices import SET, VALUE
 from fvsolve.core.kernels.energy_rows import device_power_row, device_stored_row
-from fvsolve.core.kernels.scalar_transport import heated_scalar
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.networks.kernels.tables import open_networks
@@ -152,7 +151,7 @@ def write_temperatures(y, out, tables):
     """Write the temperatures of the thermal nodes of heat exchangers, in the unit of the scalar, to `out`."""
     exchangers, at = tables.exchangers, tables.layout[0]["exchange"]
     if exchangers.size > 0:
-        zero = tables.scalars[heated_scalar(tables)]["zero"]
+        zero = tables.scalars[tables.settings[0]["temperature"]]["zero"]
         for k in range(exchangers.size):
             out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
 

@@ -9,10 +9,10 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.devices import HEAT, POWER
 from fvsolve.core.kernels.network_energy import total_head, total_pressure
 from fvsolve.core.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, mass_at_point, polynomial_width
-from fvsolve.core.kernels.scalar_transport import heated_scalar
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.viscosity import cell_reynolds
+from fvsolve.features.scalars.kernels.scalar_transport import heated_scalar
 from fvsolve.jit import specialise
 
 POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates

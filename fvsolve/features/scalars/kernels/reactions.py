@@ -23,8 +23,14 @@ from fvsolve.core.kernels.dtypes import (
     REVERSE_ORDER,
 )  # fmt: skip
 from fvsolve.core.kernels.formula_programs import run_program
-from fvsolve.core.kernels.scalar_transport import DRY_DEPTH, cell_mass, has_storage, value_at_probe, wall_mass
 from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.scalars.kernels.scalar_transport import (
+    DRY_DEPTH,
+    cell_mass,
+    has_storage,
+    value_at_probe,
+    wall_mass,
+)
 from fvsolve.jit import njit
 
 DIFFERENCE = 1e-6  # of amounts, relative to the greatest: for slopes of rates, which limit steps

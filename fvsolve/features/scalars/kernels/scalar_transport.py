@@ -31,10 +31,10 @@ from fvsolve.core.kernels.dtypes import (
     UPWIND,
     WHERE,
 )
-from fvsolve.core.kernels.reconstruction import by_limiter, limited, slope
+from fvsolve.core.kernels.reconstruction import by_limiter, inner_slopes, limited
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.jit import inline, njit
+from fvsolve.jit import njit
 
 # Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.
 MAX_SWEEPS, CHANGE_TOLERANCE = 10000, 4e-16
@@ -445,17 +445,6 @@ def concentrations(s, m, wall, c):
     """Write the values of a scalar in cells to c: amounts s over masses m, plus that of the wall; all per length."""
     for i in range(c.size):
         c[i] = s[i] / (m[i] + wall)
-
-
-@inline
-def inner_slopes(limiter, c, d):
-    """Write limited slopes of c (differences over a cell) to d, for all cells except those at the ends.
-
-    limiter : limiter function of two differences; c : float64[cells]  values of a scalar
-    """
-    here, next, inside = c[1:], c[2:], d[1:]
-    for i in range(c.size - 2):
-        inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
 
 
 @njit

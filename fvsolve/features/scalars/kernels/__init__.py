@@ -1,0 +1,1 @@
+"""Compiled functions of scalars, reactions and heat."""
