@@ -321,9 +321,10 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["from_arriving"] = case.numerics.scheme == "upwind" and case.numerics.method == "euler"
     s["viscosity"] = draft.fluid.viscosity or 0.0
-    if draft.fluid.walther is not None and (draft.scalar_table["specific_heat"] > 0.0).any():
-        s["walther_a"], s["walther_b"] = draft.fluid.walther
+    if (draft.scalar_table["specific_heat"] > 0.0).any():
         s["temperature"] = int(draft.scalar_table["specific_heat"].argmax())
+        if draft.fluid.walther is not None:
+            s["walther_a"], s["walther_b"] = draft.fluid.walther
     s["start"] = case.numerics.start
     s["reads_solved"] = any(feature.reads_solved for feature in draft.features)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
