@@ -137,7 +137,7 @@ def pytest_configure(config) -> None:
 
 
 def pytest_collection_modifyitems(items) -> None:
-    items[:] = [item for item in items if is_in_turn(item)]
+    items[:] = [item for item in items if is_in_turn(item) and is_in_turn(item, "quick_in_turn")]
 
 
 def record(folder: Path) -> None:

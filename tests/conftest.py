@@ -36,6 +36,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    text = "quick_in_turn: the quick tests run each value of each parameter list at least once, the others the rest"
+    config.addinivalue_line("markers", text)
     worker = getattr(config, "workerinput", None)
     config.stash[TIER] = worker["tier"] if worker else tier(config)
     hypothesis.settings.load_profile("quick" if config.stash[TIER] == "quick" else "full")
@@ -60,7 +62,7 @@ def pytest_collection_modifyitems(config, items):
     drawing = {item for item in items if getattr(getattr(item, "function", None), "hypothesis", None)}
     for item in drawing if not NEW else ():
         hypothesis.seed(zlib.crc32(item.originalname.encode()))(item.function)
-    quick = {item for item in items if item.nodeid not in SLOW}
+    quick = {item for item in items if item.nodeid not in SLOW and is_in_turn(item, "quick_in_turn")}
     if config.stash[TIER] != "full":
         config.stash[TALLY].names["unknown"] = unknown_names(SLOW, [item.nodeid for item in items])
     chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]

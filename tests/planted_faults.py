@@ -1,10 +1,11 @@
 """Plant small faults in the package, and count how many the quick tests and all tests find.
 
-    python tests/planted_faults.py [--full] [--only TEXT] [--jobs 2]
+    python tests/planted_faults.py [--full] [--only TEXT] [--jobs 2] [--draw 40 --seed 1 [--near]]
 
 A fault is a sign, an index or a factor of 1.01. Each is planted alone in a copy of the repository. The quick tests of
 its module run first, then all quick tests; with --full all tests run on a fault that these miss. A fault that stops the
-import of fvsolve would be found by any test, and is an error of this list.
+import of fvsolve would be found by any test, and is an error of this list. --draw plants faults at drawn places instead
+of those of the list (`drawn_faults.py`).
 """
 
 from __future__ import annotations
@@ -19,8 +20,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from drawn_faults import DrawnFault, drawn
+
 TOP = Path(__file__).parents[1]
+PACKAGE = TOP / "fvsolve"
 QUICK_NEEDED, ALL_NEEDED = 46, 50
+DRAWN_NEEDED = 34, 38  # of 40 drawn faults
 WITHOUT_OWN_TEST = (
     "--deselect",
     "tests/repository/test_tools_of_tests.py",
@@ -43,6 +48,10 @@ class Fault:
         if text.count(self.old) != 1:
             raise ValueError(f"fvsolve/{self.path}: {self.old!r} stands {text.count(self.old)} times, expected once")
         return text.replace(self.old, self.new)
+
+    def shown(self, text: str) -> str:
+        """Line number and text of the fault."""
+        return f"{text.count(chr(10), 0, text.index(self.old)) + 1}: {self.new}"
 
 
 FAULTS = [
@@ -233,7 +242,7 @@ def tests_fail(folder: Path, jobs: int, *options: str) -> str:
     return lines[0].split(" - ")[0]
 
 
-def near(fault: Fault) -> list[str]:
+def near(fault: Fault | DrawnFault) -> list[str]:
     """Files of tests that import the module of a fault or have its name, or that of its folder, in their own name.
 
     Without such files it is the folder of tests of this part of the package, if there is one.
@@ -251,37 +260,55 @@ def near(fault: Fault) -> list[str]:
     return files or ([f"tests/{part}"] if (TOP / "tests" / part).is_dir() else [])
 
 
+def searched(folder: Path, fault: Fault | DrawnFault, options: argparse.Namespace) -> tuple[str, str]:
+    """Tests that find a fault, "quick", "full" or "", and the first of them that fails."""
+    path = folder / "fvsolve" / fault.path
+    text, files = path.read_text(encoding="utf-8"), near(fault)
+    path.write_text(fault.planted(text), encoding="utf-8")
+    try:
+        if first := files and tests_fail(folder, options.jobs, "--quick", *files):
+            return "quick", first
+        if options.near:
+            return "", ""
+        if first := tests_fail(folder, options.jobs):
+            return "quick", first
+        first = options.full and tests_fail(folder, options.jobs, "--full")
+        return ("full", first) if first else ("", "")
+    finally:
+        path.write_text(text, encoding="utf-8")
+
+
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--full", action="store_true", help="run all tests on faults that the quick tests miss")
+    asked.add_argument("--near", action="store_true", help="run the quick tests of the module of a fault only")
+    asked.add_argument("--list", action="store_true", help="print the faults and run no tests")
     asked.add_argument("--only", default="", metavar="TEXT", help="only faults whose path contains this text")
+    asked.add_argument(
+        "--draw", type=int, default=0, metavar="N", help="number of drawn faults; those of the list if 0"
+    )
+    asked.add_argument("--seed", type=int, default=1, metavar="N", help="seed of drawn faults (default 1)")
     asked.add_argument("--jobs", type=int, default=2, metavar="N", help="number of processes of a test run (default 2)")
     options = asked.parse_args()
+    faults = drawn(options.seed, options.draw) if options.draw else FAULTS
+    needed = DRAWN_NEEDED if options.draw else (QUICK_NEEDED, ALL_NEEDED)
     quick = every = count = 0
     with tempfile.TemporaryDirectory(prefix="fvsolve-faults-") as name:
         folder = copied(Path(name))
-        for fault in FAULTS:
-            if options.only not in fault.path:
+        for fault in (fault for fault in faults if options.only in fault.path):
+            start, line = time.perf_counter(), fault.shown((PACKAGE / fault.path).read_text(encoding="utf-8"))
+            if options.list:
+                print(f"fvsolve/{fault.path}:{line}")
                 continue
-            path, start = folder / "fvsolve" / fault.path, time.perf_counter()
-            text = path.read_text(encoding="utf-8")
-            path.write_text(fault.planted(text), encoding="utf-8")
-            files = near(fault)
-            first = files and tests_fail(folder, options.jobs, "--quick", *files) or tests_fail(folder, options.jobs)
-            by = "quick" if first else ""
-            if not first and options.full:
-                first = tests_fail(folder, options.jobs, "--full")
-                by = "full" if first else ""
-            path.write_text(text, encoding="utf-8")
+            by, first = searched(folder, fault, options)
             count, quick, every = count + 1, quick + (by == "quick"), every + bool(by)
-            print(
-                f"{by or 'MISSED':6s} {time.perf_counter() - start:5.0f} s  {fault.path}: {fault.new}  {first}",
-                flush=True,
-            )
-    print(f"{count} faults: quick tests find {quick}, expected {QUICK_NEEDED}")
+            print(f"{by or 'MISSED':6s} {time.perf_counter() - start:5.0f} s  {fault.path}:{line}  {first}", flush=True)
+    if options.list:
+        return
+    print(f"{count} faults: quick tests find {quick}, expected {needed[0]}")
     if options.full:
-        print(f"all tests find {every}, expected {ALL_NEEDED}")
-    sys.exit(not options.only and (quick < QUICK_NEEDED or (options.full and every < ALL_NEEDED)))
+        print(f"all tests find {every}, expected {needed[1]}")
+    sys.exit(not options.only and (quick < needed[0] or (options.full and every < needed[1])))
 
 
 if __name__ == "__main__":

@@ -26,13 +26,13 @@ def pairs_of(row: tuple) -> set:
     return set(combinations(enumerate(row), 2))
 
 
-def is_in_turn(item) -> bool:
-    """False for the combinations of parameters that the mark `in_turn` leaves out.
+def is_in_turn(item, mark: str = "in_turn") -> bool:
+    """False for the combinations of parameters that the mark leaves out.
 
     The k-th value of the longest list is combined with value k of each other list, which begins again at its end. So
     each value of each list occurs at least once.
     """
-    if not item.get_closest_marker("in_turn"):
+    if not item.get_closest_marker(mark):
         return True
     axes = [place_in_list(mark, item.callspec.params) for mark in item.iter_markers("parametrize")]
     _, k = max(axes, key=lambda axis: axis[0])

@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import drawn_faults
 import hypothesis_profiles
 import planted_faults
 import pytest
@@ -31,7 +32,7 @@ OTHERS = {"repository", "invariance", "reference"}  # tests of several packages 
 def test_every_folder_of_tests_is_a_package_or_an_exception():
     tests = folders.CASES.parent / "tests"
     stand = {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")}
-    stages = [PACKAGE, *(PACKAGE / name for name in ("core", "exchange", "report", "studies"))]
+    stages = [PACKAGE, *(PACKAGE / name for name in ("core", "exchange", "features", "report", "studies"))]
     assert stand - OTHERS <= {path.stem for stage in stages for path in stage.iterdir()}
 
 
@@ -106,6 +107,45 @@ def test_there_are_enough_and_each_folder_of_the_package_has_a_fault():
     assert sum(count.values()) == 54
     assert folders - of_parts <= set(count)
     assert sum(count[folder] for folder in count if folder.parts[:1] == ("parts",)) >= 4
+
+
+def test_drawn_faults_follow_their_seed_and_still_compile():
+    """Each kind of fault in each group of files occurs; no two faults are in a file, and each changes a single line."""
+    faults = drawn_faults.drawn(1, 40)
+    assert faults == drawn_faults.drawn(1, 40) and faults[:4] != drawn_faults.drawn(2, 4)
+    assert len({fault.path for fault in faults}) == 40
+    assert {drawn_faults.group_of(Path(fault.path)) for fault in faults[:4]} == set(drawn_faults.GROUPS)
+    for fault in faults:
+        text = (PACKAGE / fault.path).read_text(encoding="utf-8")
+        planted = fault.planted(text)
+        compile(planted, fault.path, "exec")
+        lines = zip(text.splitlines(), planted.splitlines(), strict=True)
+        assert sum(before != after for before, after in lines) == 1
+        assert text[: fault.start] == planted[: fault.start]
+
+
+@pytest.mark.parametrize(
+    "kind, source, changes",
+    [
+        ("sign", "return a - (b + c)", [("-", "+"), ("+", "-")]),
+        ("sign", 'return "a" + b', []),
+        ("factor", "return 2.0 * a + 3 * b", [("", "1.01 * ")]),
+        ("comparison", "return a < b and c >= d", [("<", ">"), (">=", "<=")]),
+        ("index", "return a[k] + b[k + 1] + c[name]", [("k", "k - 1"), ("k + 1", "k")]),
+    ],
+)
+def test_places_of_faults_are_operators_and_indices(kind, source, changes):
+    text = f"LIMIT = 2.0 * 3.0 - 1.0\n\n\ndef f(a, b, c, d, k):\n    # a - b\n    {source}\n"
+    places = list(drawn_faults.Places(text).of_kind(kind))
+    assert sorted(place[1:] for place in places) == sorted(changes)
+    assert all(text.startswith(old, start) for start, old, _ in places)
+
+
+def test_a_fault_is_planted_at_its_own_place():
+    text = "x = a + b\ny = a + b\n"
+    assert drawn_faults.DrawnFault("x.py", 16, "+", "-").planted(text) == "x = a + b\ny = a - b\n"
+    with pytest.raises(ValueError, match="does not stand"):
+        drawn_faults.DrawnFault("x.py", 15, "+", "-").planted(text)
 
 
 def drawn() -> list[float]:
