@@ -39,7 +39,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1482, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (23974, 148),
+    "fvsolve/features": (23975, 148),
     "fvsolve/parts": (20015, 133),
     "fvsolve/report": (5007, 21),
     "fvsolve/studies": (17584, 68),
