@@ -82,16 +82,16 @@ def source_hash() -> str:
     return _digest(PACKAGE, compiled_sources())
 
 
-def add_sources(folder: Path, *patterns: str, beside: Iterable[Path] = ()) -> None:
+def add_sources(folder: Path, *patterns: str, called: Iterable[Path] = ()) -> None:
     """Allow caching of functions defined in a folder under the hash of its sources, beside those of the core.
 
     An edit there compiles only these functions again. folder : of another package, or of a feature
     patterns : files in it on which compiled functions depend; all its modules if none is given
-    beside : folders that have been added and whose functions these functions call
+    called : folders that have been added and whose functions these functions call
     """
     folder = Path(folder).resolve()
     paths = {path for pattern in patterns or ("**/*.py",) for path in folder.glob(pattern)}
-    others = "".join(EXTRA_FOLDERS[Path(other).resolve()] for other in beside)
+    others = "".join(EXTRA_FOLDERS[Path(other).resolve()] for other in called)
     EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(paths), others)}"
 
 

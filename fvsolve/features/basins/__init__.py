@@ -11,4 +11,4 @@ UNCOMPILED_PREFIXES = ("part", "lower", "feature", "pattern", "accounts", "facts
 COMPILED = [path for path in sorted(FOLDER.rglob("*.py")) if not path.name.startswith(UNCOMPILED_PREFIXES)]
 
 # functions of basins call those of scalars
-add_sources(FOLDER, *(str(path.relative_to(FOLDER)) for path in COMPILED), beside=[Path(scalars.__file__).parent])
+add_sources(FOLDER, *(str(path.relative_to(FOLDER)) for path in COMPILED), called=[Path(scalars.__file__).parent])

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
-from fvsolve.features.scalars.terms import MIXED
+from fvsolve.features.scalars.kernels.terms import MIXED
 
 PACKAGE = "fvsolve.features.basins"
 COMMON = RhsTerms(

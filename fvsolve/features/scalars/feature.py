@@ -12,7 +12,8 @@ from fvsolve.core.assembly.scheme_codes import lower_position
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.core.model.probe_tables import cells_at_point, fill_probes
-from fvsolve.features.scalars import lower, reactions, terms
+from fvsolve.features.scalars import lower, reactions
+from fvsolve.features.scalars.kernels import terms
 from fvsolve.parts.nodes_and_links import is_in_network
 
 REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
