@@ -26,12 +26,12 @@ class StepLimit(NamedTuple):
 
 
 def multiples(first: float, factor: float, last: float) -> Iterator[float]:
-    """Yield first, first factor, first factor^2, ..., up to the first number that reaches or passes `last`.
+    """Yield first, first factor, first factor^2, ...: with a factor above 1 up to the first number above `last`.
 
-    The numbers rise with a factor above 1, and fall with a factor below 1.
+    With a factor below 1 the last number is the first that is not above `last`.
     """
     h = first
-    while h < last if factor > 1 else h > last:
+    while h <= last if factor > 1 else h > last:
         yield h
         h *= factor
     yield h
@@ -65,7 +65,7 @@ def limit_from(
     Steps rise by the factor `ratio`; if none up to `far` fails, the limit is inf. If `first` fails, it is halved down
     to 1e-9 of its value. width : relative width at which the bisection ends
     """
-    rising, falling = multiples(first, ratio, ratio * far), multiples(0.5 * first, 0.5, LEAST_PART * first)
+    rising, falling = multiples(first, ratio, far), multiples(0.5 * first, 0.5, LEAST_PART * first)
     return greatest_step(fails, rising, falling, width=width)
 
 
