@@ -1,5 +1,7 @@
 """Features of other packages: the package of docs/features.md, as printed, and headers that are refused."""
 
+import ast
+import inspect
 import re
 import shutil
 import tomllib
@@ -103,3 +105,14 @@ def digest(folder, patterns) -> str:
     """Name of the folder for machine code of a copy of a feature."""
     cache_folders.add_sources(folder, *patterns)
     return cache_folders.EXTRA_FOLDERS.pop(folder.resolve())
+
+
+@pytest.mark.parametrize("name", [*features.FEATURES])
+def test_no_attribute_of_a_feature_hides_a_method_of_the_protocol(name):
+    """The core calls some methods only in rare studies, which would find a value in their place."""
+    module = inspect.getmodule(features.FEATURES.load(name))
+    classes = features.Feature, features.FeatureRun, features.FeaturePattern
+    methods = {key for one in classes for key, value in vars(one).items() if inspect.isfunction(value)}
+    nodes = [node for node in ast.walk(ast.parse(inspect.getsource(module))) if isinstance(node, ast.Attribute)]
+    assigned = {node.attr for node in nodes if isinstance(node.ctx, ast.Store)}
+    assert "driven" in methods and not assigned & methods

@@ -169,9 +169,6 @@ HOLDS = {"ledger": ledger, "restated": restated, "bits": bits, "resumed": resume
 @pytest.mark.parametrize("of", PROPERTIES)
 def test_a_specimen_has_the_property(request, name, of):
     specimen = SPECIMENS[name]
-    if of == "linearised" and "controls" in specimen.case:  # remove these lines with the fault: the mark is strict
-        reason = "array `driven` of the feature Controls hides the method `driven` of features"
-        request.applymarker(pytest.mark.xfail(raises=TypeError, reason=reason))
     if of == "order" and of in specimen.lacks:
         pytest.skip(specimen.lacks[of])
     HOLDS[of](specimen)
