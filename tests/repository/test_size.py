@@ -45,7 +45,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (17584, 68),
     "fvsolve/core/assembly": (2469, 10),
     "fvsolve/core/fluid": (1087, 4),
-    "fvsolve/core/kernels": (11752, 53),
+    "fvsolve/core/kernels": (11753, 53),
     "fvsolve/core/mesh": (1512, 6),
     "fvsolve/core/model": (4068, 18),
     "fvsolve/core/output": (2722, 14),
