@@ -596,17 +596,17 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
 
 @pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
 def test_a_term_left_out_of_the_ledger_of_bodies_is_its_remainder(kind, place, monkeypatch):
-    from fvsolve.core.model import energy_accounts
+    from fvsolve.features.motion.feature import Motion
 
-    honest, plain = energy(machine()), energy_accounts.Accounts.bodies
+    honest, plain = energy(machine()), Motion.add_accounts
     lost = honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
 
-    def forgetful(self):
-        plain(self)
-        own = [one for one in self.accounts if (one.place, one.kind) == (place, kind) and one.category != "rate"]
-        self.accounts = [one for one in self.accounts if one not in own]
+    def forgetful(self, accounts):
+        plain(self, accounts)
+        own = [one for one in accounts.accounts if (one.place, one.kind) == (place, kind) and one.category != "rate"]
+        accounts.accounts = [one for one in accounts.accounts if one not in own]
 
-    monkeypatch.setattr(energy_accounts.Accounts, "bodies", forgetful)
+    monkeypatch.setattr(Motion, "add_accounts", forgetful)
     remains = energy(machine()).remainder[-1]
     assert abs(lost) > 1e-3 and abs(remains) == approx(abs(lost), rel=1e-4)
 
