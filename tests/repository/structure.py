@@ -42,12 +42,12 @@ class Limit(NamedTuple):
 # Goals are those of issue 61. Its values are those of 07b0f210: 215 files, 48 811 lines, 223 cells, 96 functions,
 # 53 characters, 1 circle. The issue's goal of 4 comment lines was reached, then raised.
 LIMITS = {
-    "files imported by run valve-closure": Limit(limit=184, goal=130, slack=7),
-    "lines of these files": Limit(limit=40_500, goal=35_000, slack=1500),
+    "files imported by run valve-closure": Limit(limit=180, goal=130, slack=7),
+    "lines of these files": Limit(limit=39_000, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
-    "cells of the hub matrix": Limit(limit=170, goal=70, slack=6),
-    "cells of the hub matrix, code alone": Limit(limit=132, goal=70, slack=6),
-    "functions per 1000 code lines": Limit(limit=97, goal=75, slack=2),
+    "cells of the hub matrix": Limit(limit=159, goal=70, slack=6),
+    "cells of the hub matrix, code alone": Limit(limit=125, goal=70, slack=6),
+    "functions per 1000 code lines": Limit(limit=97.2, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
     "comment lines per 100 code lines of kernels and steppers": Limit(limit=5.4, goal=5.5, slack=0.2),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
