@@ -39,7 +39,8 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
-CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
+FOLDER = "fvsolve.core.kernels.mass_dynamics"
+CHAMBERS, PUSHES = f"{FOLDER}: piston_chambers", f"{FOLDER}: mass_rates"
 
 
 class Configuration(StaticForces):
