@@ -42,7 +42,8 @@ class Controls(Feature, slot=1, wakes="section controls"):
     """Blocks of a case.
 
     table : blocks, in an order in which each comes after those that it reads at once; laws : modules of their laws
-    sensors, sensor_table : probes that blocks read; driven : rows of tables that blocks drive before nodes are solved
+    sensors, sensor_table : probes that blocks read
+    driven_rows : rows of tables that blocks drive before nodes are solved
     discrete : numbers that change at events and samples only, at the start
     timed : (flag, place in `discrete` of its last change)
     """
@@ -53,7 +54,7 @@ class Controls(Feature, slot=1, wakes="section controls"):
     def __init__(self, case, given_up=()) -> None:
         super().__init__(case, given_up)
         self.table, self.sensor_table = np.zeros(0, CONTROL), np.zeros(0, rec.PROBE)
-        self.driven, self.settings = np.zeros(0, DRIVEN), np.zeros(1, BLOCK_SETTINGS)
+        self.driven_rows, self.settings = np.zeros(0, DRIVEN), np.zeros(1, BLOCK_SETTINGS)
         self.sensors: list = []
         self.laws: list[str] = []
         self.discrete: list[float] = []
@@ -119,7 +120,7 @@ class Controls(Feature, slot=1, wakes="section controls"):
         return own
 
     def close(self, draft) -> None:
-        for array in (self.table, self.sensor_table, self.driven, self.settings):
+        for array in (self.table, self.sensor_table, self.driven_rows, self.settings):
             array.flags.writeable = False
 
     # model ----------
@@ -218,7 +219,7 @@ class ControlRun(FeatureRun):
         own = self.feature
         blocks = own.table[:0] if view == "sensing" else own.table  # sensors do not read probes of blocks
         return tables.BlockTables(
-            blocks, own.sensor_table, own.driven, own.settings, own.block_hooks(), self.discrete, self.histories,
+            blocks, own.sensor_table, own.driven_rows, own.settings, own.block_hooks(), self.discrete, self.histories,
             self.readings, self.sensing,
         )  # fmt: skip
 

@@ -37,7 +37,7 @@ def lower_controls(draft, own) -> None:
     own.table = np.zeros(len(blocks), CONTROL)
     driven = list(driven_rows(draft))
     early = early_blocks(draft, driven)
-    own.driven = np.array([(kind, row) for kind, row, _ in driven], DRIVEN)
+    own.driven_rows = np.array([(kind, row) for kind, row, _ in driven], DRIVEN)
     for (name, _), row in zip(blocks.items(), own.table, strict=True):
         block = draft.case.controls[name]
         fill_block(draft, own, name, block, list(probes), row)
