@@ -39,7 +39,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1482, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (30068, 172),
+    "fvsolve/features": (30059, 172),
     "fvsolve/parts": (19944, 134),
     "fvsolve/report": (4973, 21),
     "fvsolve/studies": (17428, 67),

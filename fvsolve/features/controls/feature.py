@@ -219,12 +219,8 @@ class ControlRun(FeatureRun):
         own = self.feature
         blocks = own.table[:0] if view == "sensing" else own.table  # sensors do not read probes of blocks
         return tables.BlockTables(
-<<<<<<< HEAD
             blocks, own.sensor_table, own.driven_rows, own.settings, own.block_hooks(),
             self.discrete, self.histories,
-=======
-            blocks, own.sensor_table, own.driven_rows, own.settings, own.block_hooks(), self.discrete, self.histories,
->>>>>>> ba2c79b655c589a2c263372d4cf373cd078527a5
             self.readings, self.sensing,
         )  # fmt: skip
 

@@ -41,12 +41,7 @@ from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
-<<<<<<< HEAD:fvsolve/features/motion/equilibrium_search.py
 CHAMBERS, PUSHES = f"{FOLDER}.mass_dynamics: piston_chambers", f"{FOLDER}.mass_dynamics: mass_rates"
-=======
-FOLDER = "fvsolve.core.kernels.mass_dynamics"
-CHAMBERS, PUSHES = f"{FOLDER}: piston_chambers", f"{FOLDER}: mass_rates"
->>>>>>> ba2c79b655c589a2c263372d4cf373cd078527a5:fvsolve/core/model/equilibrium_search.py
 
 
 class Configuration(StaticForces):
