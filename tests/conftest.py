@@ -16,6 +16,7 @@ import hypothesis
 import pytest
 from hypothesis_profiles import NEW, fix_constants
 from reference.pairs import is_in_turn
+from reference.small_package import package  # noqa: F401  (a fixture)
 from tally import Tally, unknown_names
 
 from fvsolve.core.steppers.tableau import METHODS

@@ -71,6 +71,17 @@ FAULTS = [
         "reynolds * math.pi / 4.0 * diameter",
         "1.01 * reynolds * math.pi / 4.0 * diameter",
     ),
+    Fault("core/model/energy_norm.py", "float(np.sqrt(own[i]))", "float(1.01 * np.sqrt(own[i]))"),
+    Fault(
+        "features/motion/kernels/mass_dynamics.py",
+        '- brace["damping"] * (speed - brace["speed"])',
+        '+ brace["damping"] * (speed - brace["speed"])',
+    ),
+    Fault(
+        "features/scalars/kernels/scalar_transport.py",
+        "c[i] = s[i] / (m[i] + wall)",
+        "c[i] = 1.01 * s[i] / (m[i] + wall)",
+    ),
     Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
     Fault("report/draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("core/schemes.py", "(k + 1) ** power - k**power", "(k + 1) ** power + k**power"),

@@ -182,7 +182,7 @@ def test_it_is_checked_by_its_own_declaration(process_results):
 def test_every_physics_is_a_folder_that_lowers_itself():
     """Each physics has a folder of basins with `part.py` and `lower.py`, and a basin has all its keys."""
     folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "features" / "basins").glob("*/part.py")}
-    assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
+    assert {one.__module__.split(".")[-2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)
         assert set(one.starts.model_fields) <= set(BasinStart.keys())

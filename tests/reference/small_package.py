@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from fvsolve import errors, jit
-from fvsolve.compile import child_process, store
+from fvsolve.compile import store
 
 LAW = """from fvsolve.jit import njit
 
@@ -34,14 +34,15 @@ def loop(n):
 def package(tmp_path):
     """Small copy of the package: what compiles, and two compiled functions; the second calls the first."""
     folder = tmp_path / "fvsolve"
-    for room in (folder, folder / "kernels", folder / "steppers"):
+    core = folder / "core"
+    for room in (folder, core, core / "kernels", core / "steppers"):
         room.mkdir()
         (room / "__init__.py").touch()
-    for module in (jit, errors, child_process):
+    for module in (jit, errors):
         shutil.copy(module.__file__, folder)
     shutil.copytree(Path(store.__file__).parent, folder / "compile", ignore=shutil.ignore_patterns("__pycache__"))
-    (folder / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
-    (folder / "steppers" / "loop.py").write_text(LOOP)
+    (core / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
+    (core / "steppers" / "loop.py").write_text(LOOP)
     return folder
 
 

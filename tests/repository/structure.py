@@ -49,7 +49,7 @@ LIMITS = {
     "cells of the hub matrix, code alone": Limit(limit=125, goal=70, slack=6),
     "functions per 1000 code lines": Limit(limit=97.2, goal=75, slack=2),
     "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
-    "comment lines per 100 code lines of kernels and steppers": Limit(limit=5.4, goal=5.5, slack=0.2),
+    "comment lines per 100 code lines of kernels and steppers": Limit(limit=5.3, goal=5.5, slack=0.2),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
 }
 

@@ -68,7 +68,7 @@ for function in (sum_of_squares, sum_of_cubes):
 def test_second_process_needs_no_numba_and_an_edit_in_another_module_is_noticed(package):
     assert python(package, PROBE) == ["12.0", "True", "1"]
     assert python(package, PROBE) == ["12.0", "False", "False"]
-    (package / "kernels" / "law.py").write_text(LAW.format(factor=3.0))
+    (package / "core" / "kernels" / "law.py").write_text(LAW.format(factor=3.0))
     assert python(package, PROBE) == ["18.0", "True", "1"]
     for kept in (package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"):
         kept.unlink()
@@ -95,11 +95,11 @@ def test_without_the_store_all_code_comes_from_numba(package):
 ])  # fmt: skip
 def test_a_template_is_compiled_once_under_a_name(package, copy, told):
     """The copy of the second module ran the code of the first, loaded from the cache."""
-    (package / "kernels" / "powers.py").write_text(POWERS)
+    (package / "core" / "kernels" / "powers.py").write_text(POWERS)
     line = "from fvsolve.jit import specialise\nfrom fvsolve.core.kernels.powers import _sums, cube\n"
-    (package / "steppers" / "more.py").write_text(f"{line}other = specialise(_sums, {copy})\n")
+    (package / "core" / "steppers" / "more.py").write_text(f"{line}other = specialise(_sums, {copy})\n")
     code = "try:\n    import fvsolve.core.steppers.more\nexcept ValueError as fault:\n    print(fault)"
-    assert f"fvsolve.core.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.kernels.", "")
+    assert f"fvsolve.core.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.core.kernels.", "")
 
 
 def test_a_run_without_the_store_has_the_same_results():
@@ -149,7 +149,7 @@ for rows in (1, 2):
     print(corner(table))
 print('numba' in sys.modules)
 """
-    (package / "kernels" / "corner.py").write_text(
+    (package / "core" / "kernels" / "corner.py").write_text(
         "from fvsolve.jit import njit\n\n@njit\ndef corner(table):\n    return table[0, 0]\n"
     )
     assert python(package, code) == ["7.0", "7.0", "True"]
@@ -161,7 +161,7 @@ print('numba' in sys.modules)
 
 def test_specialisations_of_a_template_are_stored_each_under_its_own_name(package):
     """The second process loads both without numba; without the store they come from numba's own cache."""
-    (package / "kernels" / "powers.py").write_text(POWERS)
+    (package / "core" / "kernels" / "powers.py").write_text(POWERS)
     assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "0", "1", "0", "1"]
     assert python(package, SPECIALISED)[:3] == ["14.0", "38.0", "False"]
     stored = list((package.parent / "cache" / "code").rglob(f"sum_of_*{store.SUFFIX}"))
@@ -170,7 +170,7 @@ def test_specialisations_of_a_template_are_stored_each_under_its_own_name(packag
         path.unlink()
     assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "1", "0", "1", "0"]
     assert python(package, SPECIALISED, NUMBA_DISABLE_JIT="1") == ["14.0", "38.0", "False"]
-    (package / "kernels" / "powers.py").write_text(POWERS.replace("ADDED=0.5", "ADDED=1.5"))
+    (package / "core" / "kernels" / "powers.py").write_text(POWERS.replace("ADDED=0.5", "ADDED=1.5"))
     assert python(package, SPECIALISED) == ["14.0", "42.0", "True", "0", "1", "0", "1"]
 
 

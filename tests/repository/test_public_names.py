@@ -48,10 +48,10 @@ def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
         assert values[:, 0] == pytest.approx([1.0, math.exp(-0.5), math.exp(-1.0)], rel=1e-6)
 
 
-def test_functions_are_not_hidden_by_the_modules_they_live_in():
-    for module in ("run", "solve"):
-        import_module(f"fvsolve.{module}")
-        assert isfunction(getattr(fvsolve, module))
+def test_functions_are_not_hidden_by_modules_of_the_same_name():
+    for package, name in (("fvsolve", "run"), ("fvsolve", "solve"), ("fvsolve.exact", "solution")):
+        import_module(f"fvsolve.core.{name}" if package == "fvsolve" else f"{package}.{name}")
+        assert isfunction(getattr(import_module(package), name))
 
 
 def test_an_unknown_name_is_an_attribute_error():

@@ -67,7 +67,7 @@ def top(values, counts):
 @pytest.mark.parametrize("large", [0, 10**9])
 def test_functions_that_are_optimised_alone_give_the_same(package, large):  # noqa: F811
     """Also where one calls another directly and through a third, for two types, from the cache and from the store."""
-    (package / "kernels" / "chain.py").write_text(FUNCTIONS)
+    (package / "core" / "kernels" / "chain.py").write_text(FUNCTIONS)
     total = 1.0 + 4.0 + 16.0
     wanted = [str(2.5 * total), str(0.5 * total), str(0.5 * total + total + 2.0 * total + 5.0), "negative"]
     code = CHAIN.format(large=large, compiled=True)
