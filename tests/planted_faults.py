@@ -80,7 +80,7 @@ FAULTS = [
     Fault(
         "features/scalars/kernels/scalar_transport.py",
         "c[i] = s[i] / (m[i] + wall)",
-        "c[i] = 1.01 * s[i] / (m[i] + wall)",
+        "c[i] = 2.0 * s[i] / (m[i] + wall)",
     ),
     Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
     Fault("report/draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),

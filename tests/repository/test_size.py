@@ -30,7 +30,7 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 DIVIDED = "fvsolve", "fvsolve/core", "fvsolve/exchange", "tests"  # folders whose subfolders have limits of their own
 FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve": (1605, 12),
-    "tests": (1257, 9),
+    "tests": (1269, 9),
     "benchmarks": (9597, 64),
     "fvsolve/case": (8414, 30),
     "fvsolve/cli": (3753, 19),
@@ -71,7 +71,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/model": (2412, 11),
     "tests/output": (898, 4),
     "tests/parts": (19415, 52),
-    "tests/reference": (5645, 66),
+    "tests/reference": (5646, 66),
     "tests/report": (865, 4),
     "tests/repository": (5809, 32),
     "tests/schemes": (570, 2),
