@@ -16,7 +16,7 @@ from fvsolve.core.assembly.pipe_terms import mass_in_creep
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.run_data import RunData
 from fvsolve.display import Displayable
-from fvsolve.errors import FvsolveError, Notice
+from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -185,8 +185,11 @@ class Model(Displayable):
         return decision_order(self.case.controls)
 
     def schedule_of(self, name: str) -> int:
-        """Number of the schedule of a link of a feature."""
-        return next(own for feature in self.features if (own := feature.link_schedules.get(name, -1)) >= 0)
+        """Number of the schedule of a link of a feature; raises FvsolveError if there is none."""
+        numbers = {link: k for feature in self.features for link, k in feature.link_schedules.items() if k >= 0}
+        if not isinstance(name, str) or name not in numbers:
+            raise FvsolveError(f"{show(name)} has no schedule; expected {listing([*numbers]) or 'a link of a feature'}")
+        return numbers[name]
 
     @property
     def y_size(self) -> int:
