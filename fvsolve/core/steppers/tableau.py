@@ -44,9 +44,9 @@ class Methods(UserDict):
 
     def complete(self) -> None:
         """Declare all built-in methods."""
-        module, self.further = self.further, ""
-        if module:
-            importlib.import_module(module)
+        if self.further:
+            importlib.import_module(self.further)  # another thread waits here until all are declared
+            self.further = ""
 
     def __contains__(self, name: object) -> bool:
         if name not in self.data:

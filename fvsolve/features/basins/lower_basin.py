@@ -347,11 +347,7 @@ class BasinRows(BandedRows):
         row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
         row["deep"], row["given"] = self.deep, self.given
         row["scheme"] = family(self.scheme)
-        own = LIMITERS[numerics.limiter].own
-        if self.is_grid and own is not None and not own.symmetric:  # flows through walls would not be zero
-            text = f"numerics.limiter: {numerics.limiter} is not symmetric: {own.costs[-1]}"
-            raise FvsolveError(f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids")
-        row["limiter"] = code_of_limiter(numerics.limiter, __name__ if self.is_grid else "")
+        row["limiter"] = self.limiter_code(numerics.limiter)
         row["steepest"] = self.steepest
         row["wide"] = LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
@@ -399,6 +395,14 @@ class BasinRows(BandedRows):
         self.memory = 8 * (draft.used_size() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
+
+    def limiter_code(self, limiter: str) -> int:
+        """Code of a limiter for kernels. Raises FvsolveError on grids for one that is not symmetric."""
+        own = LIMITERS[limiter].own
+        if self.is_grid and own is not None and not own.symmetric:  # flows through walls would not be zero
+            text = f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}"
+            raise FvsolveError(f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids")
+        return code_of_limiter(limiter, __name__ if self.is_grid else "")
 
     def lower_scalars(self, draft, row) -> None:
         """Reserve arrays of scalars: flows, values beyond the boundary, work; warn if values may leave their bounds."""
