@@ -134,8 +134,8 @@ def build_like(case: Case, like: Model | None = None) -> Model:
 def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case with its initial steady state; raises CaseError if there are faults.
 
-    draft : tables before the start, to be filled, or None to make them; unfit : names of pipes that cannot be delay
-    lines
+    draft : tables before the start, to be filled, or None to make them
+    unfit : names of parts that features have given up
     """
     draft = draft or tables_before_start(case, unfit)
     draft.check()
@@ -148,7 +148,7 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
 
 
 def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
-    """Tables of a case before its initial steady state is known; unfit : names of pipes that cannot be delay lines."""
+    """Tables of a case before its initial steady state is known; unfit : names of parts that features have given up."""
     draft = ModelDraft(case)
     draft.features = features_of(case, unfit)
     for feature in draft.features:
