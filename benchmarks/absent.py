@@ -19,9 +19,26 @@ from fvsolve.core.steppers import integrate
 STEP = 1e-3  # [s]
 HIGH, LOW, AREA, GRAVITY, CD = 3.0, 1.5, 50e-4, 9.80665, 0.61
 CASE = {
-    "fluid": {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0},
-    "nodes": {"high": {"type": "tank", "area": HIGH, "level": 4.0}, "low": {"type": "tank", "area": LOW, "level": 1.0}},
-    "links": {"hole": {"type": "orifice", "from": "high", "to": "low", "area": AREA, "discharge_coefficient": CD}},
+    "fluid": {
+        "name": "user",
+        "density": 1000.0,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 2300.0,
+    },
+    "nodes": {
+        "high": {"type": "tank", "area": HIGH, "level": 4.0},
+        "low": {"type": "tank", "area": LOW, "level": 1.0},
+    },
+    "links": {
+        "hole": {
+            "type": "orifice",
+            "from": "high",
+            "to": "low",
+            "area": AREA,
+            "discharge_coefficient": CD,
+        }
+    },
     "numerics": {"end": STEP, "method": "rk4", "step": STEP},
     "output": {"probes": ["high.level"], "every": STEP},
 }
@@ -58,8 +75,13 @@ def main() -> None:
     steps, times = (2_000, 2) if parser(__doc__).parse_args().quick else (200_000, 7)
     scene(steps), hand(steps)
     a, b = (min(f(steps) for _ in range(times)) for f in (scene, hand))
-    print(f"two tanks, {steps} steps of rk4, four rates each; the states agree to {abs(a[1] - b[1]):.1e} m")
-    for name, (seconds, _) in (("two-tank case, marks and extremes at every step", a), ("two states by hand", b)):
+    print(
+        f"two tanks, {steps} steps of rk4, four rates each; the states agree to {abs(a[1] - b[1]):.1e} m"
+    )
+    for name, (seconds, _) in (
+        ("two-tank case, marks and extremes at every step", a),
+        ("two states by hand", b),
+    ):
         print(f"{name:48s} {1e9 * seconds / steps:6.0f} ns a step")
     agree("difference of levels at the end [m]", abs(a[1] - b[1]), 1e-9)
     print(f"ratio {a[0] / b[0]:.2f}; states of the case: {np.size(build(load(CASE)).scale)}")

@@ -23,7 +23,14 @@ WIDTH = 0.08  # of the pulse exp(-((x - 1/2) / WIDTH)^2), in lengths of the pipe
 
 def case(cells: int, scheme: str = "upwind5", **numerics) -> dict:
     """Case of the pipe at rest."""
-    main = {"type": "pipe", "from": "lake", "to": "end", "length": LENGTH, "diameter": 0.5, "wave_speed": SPEED}
+    main = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "end",
+        "length": LENGTH,
+        "diameter": 0.5,
+        "wave_speed": SPEED,
+    }
     return {
         "schema": 1,
         "title": "a pulse in a pipe",
@@ -44,7 +51,8 @@ class Acoustics:
     def __init__(self, cells: int) -> None:
         self.cells = cells
         self.model = self.build(method="rk4", courant=1.0)
-        self.mixed = np.arange(2 * cells).reshape(2, cells).T.ravel()  # interleaved -> fvsolve's position
+        # interleaved -> fvsolve's position
+        self.mixed = np.arange(2 * cells).reshape(2, cells).T.ravel()
         self.rhs = self._rhs()
         self.rhs_mixed = self._rhs_mixed()
 
@@ -56,7 +64,9 @@ class Acoustics:
     def start(self) -> State:
         """State at the start: a forward wave with the shape of the pulse."""
         x = (np.arange(self.cells) + 0.5) / self.cells
-        return State(0.0, np.concatenate([np.exp(-(((x - 0.5) / WIDTH) ** 2)), np.zeros(self.cells)]))
+        return State(
+            0.0, np.concatenate([np.exp(-(((x - 0.5) / WIDTH) ** 2)), np.zeros(self.cells)])
+        )
 
     @cached_property
     def matrix(self) -> csc_array:
@@ -86,9 +96,18 @@ class Acoustics:
 
     def _rhs(self):
         """Compiled right-hand side of the model as f(t, y, dydt); it reads its tables and `out` at their addresses."""
-        at, slate, out = int(addresses((self.model.functions.rhs,))[0]), RunData(self.model), self.model.new_out()
+        at, slate, out = (
+            int(addresses((self.model.functions.rhs,))[0]),
+            RunData(self.model),
+            self.model.new_out(),
+        )
         self._kept, handle = (slate, out), slate.handle
-        handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
+        handle_at, handle_size, out_at, out_size = (
+            handle.ctypes.data,
+            handle.size,
+            out.ctypes.data,
+            out.size,
+        )
 
         @numba.njit(error_model="numpy")
         def function(t, y, dydt):

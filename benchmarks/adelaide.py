@@ -25,8 +25,12 @@ EXPECTED = "0.04,2080\n0.2,-98.99\n0.405,1965\n0.6,-98.99\n"  # cases/adelaide.t
 def main() -> None:
     """Draw the picture of a measurement, or of the pressures that the case expects."""
     options = parser(__doc__)
-    options.add_argument("measured", nargs="?", type=Path, metavar="MEASURED.csv", help="measured pressures")
-    options.add_argument("picture", nargs="?", type=Path, default=ROOT / "docs" / "adelaide.png", help="file to draw")
+    options.add_argument(
+        "measured", nargs="?", type=Path, metavar="MEASURED.csv", help="measured pressures"
+    )
+    options.add_argument(
+        "picture", nargs="?", type=Path, default=ROOT / "docs" / "adelaide.png", help="file to draw"
+    )
     given = options.parse_args()
     if given.quick:
         with tempfile.TemporaryDirectory() as folder:
@@ -48,7 +52,13 @@ def draw(measured: str, picture: Path, cells: int) -> float:
     result = fvsolve.run(ROOT / "cases" / "adelaide.toml", set={"links.main.cells": cells})
     figure, axes = plt.subplots(figsize=(9, 4))
     axes.plot(t, p, ".", color="0.6", markersize=3, label="measured, digitised")
-    axes.plot(result.t, result["gate.gauge_pressure"], color="#0f766e", linewidth=1.0, label=f"fvsolve, {cells} cells")
+    axes.plot(
+        result.t,
+        result["gate.gauge_pressure"],
+        color="#0f766e",
+        linewidth=1.0,
+        label=f"fvsolve, {cells} cells",
+    )
     axes.axhline(-98.99, color="0.3", linewidth=0.6, linestyle=":")
     axes.annotate("vapour pressure", (0.5, -98.99), (0.5, 60.0), fontsize=8, color="0.3")
     axes.set(xlabel="t [s]", ylabel="gauge pressure at the valve [kPa]", xlim=(0.0, 0.8))

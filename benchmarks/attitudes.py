@@ -22,7 +22,8 @@ TOPS = {  # weight times lever arm [N m], angular velocity in the body [rad/s], 
     "heavy": (5.0, np.array([0.1, 0.2, 6.0]), 10.0, (400, 1600)),
 }
 DELTAS, STEPS = (0.3, 0.1, 0.03, 0.01, 0.003), (0.05, 0.02, 0.005)
-TURN = np.array([0.0, 1.0, 0.0])  # angular velocity about the y axis of a body rolled by delta [rad/s]
+# angular velocity about the y axis of a body rolled by delta [rad/s]
+TURN = np.array([0.0, 1.0, 0.0])
 WAYS = ("e, R of e/|e|", "e renormalised", "roll-pitch-yaw", "e by gauss-4")
 
 
@@ -37,10 +38,12 @@ def spin_rate(w, up, weight):
 
 def by_parameters(weight):
     """Function f(t, y) of Euler parameters e and angular velocity w, with R from e / |e|."""
-    return lambda t, y: np.concatenate([
-        attitude.euler_parameters_rate(y[:4], y[4:]),
-        spin_rate(y[4:], attitude.of_euler_parameters(y[:4])[2], weight),
-    ])  # fmt: skip
+    return lambda t, y: np.concatenate(
+        [
+            attitude.euler_parameters_rate(y[:4], y[4:]),
+            spin_rate(y[4:], attitude.of_euler_parameters(y[:4])[2], weight),
+        ]
+    )
 
 
 def angle_rates(angles, w):
@@ -51,9 +54,9 @@ def angle_rates(angles, w):
 
 def by_angles(weight):
     """Function f(t, y) of roll, pitch, yaw and w."""
-    return lambda t, y: np.concatenate([
-        angle_rates(y[:3], y[3:]), spin_rate(y[3:], attitude.of_roll_pitch_yaw(*y[:3])[2], weight)
-    ])  # fmt: skip
+    return lambda t, y: np.concatenate(
+        [angle_rates(y[:3], y[3:]), spin_rate(y[3:], attitude.of_roll_pitch_yaw(*y[:3])[2], weight)]
+    )
 
 
 def stepped(f, y, end, steps, method="rk4"):
@@ -85,11 +88,19 @@ def ends(weight, w, end, steps):
 
 def tops(quick):
     """Rows of the first table: name, steps, largest error of R for each of WAYS; with `quick` a single top for 1 s."""
-    for name, (weight, w, end, many) in {"heavy": (*TOPS["heavy"][:2], 1.0, (40,))}.items() if quick else TOPS.items():
-        found = solve_ivp(by_parameters(weight), (0.0, end), [*START, *w], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    for name, (weight, w, end, many) in (
+        {"heavy": (*TOPS["heavy"][:2], 1.0, (40,))}.items() if quick else TOPS.items()
+    ):
+        found = solve_ivp(
+            by_parameters(weight), (0.0, end), [*START, *w], "DOP853", rtol=1e-13, atol=1e-14
+        ).y[:, -1]
         exact = attitude.of_euler_parameters(found[:4])
         for steps in many:
-            yield name, steps, [float(np.abs(one - exact).max()) for one in ends(weight, w, end, steps)]
+            yield (
+                name,
+                steps,
+                [float(np.abs(one - exact).max()) for one in ends(weight, w, end, steps)],
+            )
 
 
 def drifts(steps, h=0.05):
@@ -98,7 +109,10 @@ def drifts(steps, h=0.05):
     for method in ("rk4", "gauss-4"):
         y = stepped(by_parameters(0.0), np.concatenate([START, w]), steps * h, steps, method)
         sizes = [(np.sqrt(y[:4] @ y[:4]), 1.0)]
-        sizes += [(of(y[4:]), of(w)) for of in (lambda v: v @ (INERTIA * v), lambda v: np.linalg.norm(INERTIA * v))]
+        sizes += [
+            (of(y[4:]), of(w))
+            for of in (lambda v: v @ (INERTIA * v), lambda v: np.linalg.norm(INERTIA * v))
+        ]
         yield method, [float(a / b - 1.0) for a, b in sizes]
 
 
@@ -131,8 +145,12 @@ def main() -> None:
     print("\npast a pitch of 90 degrees: error of R by roll-pitch-yaw, by Euler parameters")
     print(f"{'delta [rad]':<14}{''.join(f'h = {h:<20g}' for h in lengths)}")
     for delta, errors in past_the_pole(deltas, lengths):
-        agree(f"error of R past a pitch of 90 degrees, roll of {delta:g} rad", max(errors[1::2]), 1e-7)
-        pairs = [f"{a:.0e}  {b:.0e}".ljust(24) for a, b in zip(errors[::2], errors[1::2], strict=True)]
+        agree(
+            f"error of R past a pitch of 90 degrees, roll of {delta:g} rad", max(errors[1::2]), 1e-7
+        )
+        pairs = [
+            f"{a:.0e}  {b:.0e}".ljust(24) for a, b in zip(errors[::2], errors[1::2], strict=True)
+        ]
         print(f"{delta:<14g}{''.join(pairs)}".rstrip())
 
 

@@ -21,23 +21,58 @@ from fvsolve.studies.outcome import NO_FIELDS
 from fvsolve.studies.peak_error import SIGNS, peak_errors
 from fvsolve.studies.resolution import refined_keys
 
-WATER = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0,
-         "cavitation": True}  # fmt: skip
+WATER = {
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": 2.2e9,
+    "viscosity": 1e-3,
+    "vapor_pressure": 2300.0,
+    "cavitation": True,
+}
 TIMES, WIDEST, SMALL = 8.0, 3.0, 1e-3
-WINDOW = 0.1  # fraction of the run before and after the time of the first peak, in which the finer peak is sought
+# fraction of the run before and after the time of the first peak, in which the finer peak is sought
+WINDOW = 0.1
 
 
-def column(head: float, speed: float, slope: float, friction: float, closure: float, cells: int) -> dict:
+def column(
+    head: float, speed: float, slope: float, friction: float, closure: float, cells: int
+) -> dict:
     """Case of a column of 100 m that leaves a closing end."""
     flow = 0.25 * math.pi * 0.1**2 * speed
-    nodes = {"lake": {"type": "reservoir", "head": head, "elevation": 0.0},
-             "end": {"type": "junction", "elevation": slope,
-                     "demand": {"start": 0.1, "duration": closure, "value": [flow, 0.0]}}}  # fmt: skip
+    nodes = {
+        "lake": {"type": "reservoir", "head": head, "elevation": 0.0},
+        "end": {
+            "type": "junction",
+            "elevation": slope,
+            "demand": {"start": 0.1, "duration": closure, "value": [flow, 0.0]},
+        },
+    }
     model = {"model": "steady", "factor": friction} if friction else {"model": "none"}
-    links = {"main": {"type": "pipe", "from": "lake", "to": "end", "length": 100.0, "diameter": 0.1,
-                      "wave_speed": 1000.0, "cells": cells, "friction": model}}  # fmt: skip
-    output = {"every": 0.002, "fields": 0, "probes": ["end.pressure", "main.pressure@0.5", "main.flow@1"]}
-    return {"schema": 1, "fluid": WATER, "nodes": nodes, "links": links, "numerics": {"end": 1.2}, "output": output}
+    links = {
+        "main": {
+            "type": "pipe",
+            "from": "lake",
+            "to": "end",
+            "length": 100.0,
+            "diameter": 0.1,
+            "wave_speed": 1000.0,
+            "cells": cells,
+            "friction": model,
+        }
+    }
+    output = {
+        "every": 0.002,
+        "fields": 0,
+        "probes": ["end.pressure", "main.pressure@0.5", "main.flow@1"],
+    }
+    return {
+        "schema": 1,
+        "fluid": WATER,
+        "nodes": nodes,
+        "links": links,
+        "numerics": {"end": 1.2},
+        "output": output,
+    }
 
 
 COLUMNS = [column(30.0, 0.8, 0.0, 0.02, 0.02, 24), column(20.0, 0.6, 0.0, 0.0, 0.0, 32),
@@ -66,17 +101,30 @@ def first_peaks(source: object) -> list[tuple[str, float, float, float]]:
 
 def main() -> None:
     options = parser(__doc__)
-    options.add_argument("cases", nargs="*", metavar="CASE", help="cases (default five columns and two shipped cases)")
+    options.add_argument(
+        "cases",
+        nargs="*",
+        metavar="CASE",
+        help="cases (default five columns and two shipped cases)",
+    )
     given, began, outside, wide, many = options.parse_args(), time.process_time(), 0, 0, 0
-    sources = given.cases or [*COLUMNS[: 1 if given.quick else None], *(() if given.quick else SHIPPED)]
+    sources = given.cases or [
+        *COLUMNS[: 1 if given.quick else None],
+        *(() if given.quick else SHIPPED),
+    ]
     for k, source in enumerate(sources):
         for name, band, change, span in first_peaks(source):
             many += 1
             outside += change > band + SMALL * span
             wide += band > WIDEST * max(change, SMALL * span)
             label = source if isinstance(source, str) else f"column {k}"
-            print(f"{label}: {name}: band {band:.3g}, change {change:.3g}, range {span:.3g}", flush=True)
-    print(f"{many} first peaks, {outside} outside their band, {wide} with a band above {WIDEST:g} times the change")
+            print(
+                f"{label}: {name}: band {band:.3g}, change {change:.3g}, range {span:.3g}",
+                flush=True,
+            )
+    print(
+        f"{many} first peaks, {outside} outside their band, {wide} with a band above {WIDEST:g} times the change"
+    )
     print(f"{time.process_time() - began:.0f} s of processor time")
     if given.quick:
         agree("first peaks outside their band", outside, 0)

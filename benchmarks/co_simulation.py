@@ -22,11 +22,18 @@ from fvsolve.core.solve.run_loop import NO_LIMIT
 STEP = 1e-3  # [s]
 GOAL = 100.0  # of a step of an FMU beside the solver [us]
 CASES = {
-    "two-tanks": {"hole.opening": 0.5}, "valve-closure": {"valve.opening": 0.5},
+    "two-tanks": {"hole.opening": 0.5},
+    "valve-closure": {"valve.opening": 0.5},
     "governor": {"controls.governor.setpoint": 1.0},
-}  # fmt: skip
+}
 PERIOD, CHUNK = 0.1, 1000  # period of the controller [s]; samples of a turn in the case
-FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
+FLUID = {
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": 2.2e9,
+    "viscosity": 1e-3,
+    "vapor_pressure": 2300.0,
+}
 
 
 def least(action, steps: int, turns: int) -> float:
@@ -71,9 +78,14 @@ def hosted(case, held, folder: Path):
     from fvsolve.exchange.fmi.export import write_fmu
 
     path, variables = write_fmu(case, folder / f"{case.name}.fmu")
-    about, unpacked = fmpy.read_model_description(str(path)), fmpy.extract(str(path), str(folder / case.name))
+    about, unpacked = (
+        fmpy.read_model_description(str(path)),
+        fmpy.extract(str(path), str(folder / case.name)),
+    )
     identifier = about.coSimulation.modelIdentifier
-    fmu = FMU2Slave(guid=about.guid, unzipDirectory=unpacked, modelIdentifier=identifier, instanceName=case.name)
+    fmu = FMU2Slave(
+        guid=about.guid, unzipDirectory=unpacked, modelIdentifier=identifier, instanceName=case.name
+    )
     fmu.instantiate()
     fmu.setupExperiment(startTime=0.0)
     fmu.enterInitializationMode()
@@ -91,22 +103,37 @@ def hosted(case, held, folder: Path):
 
 def tower(controls: dict) -> dict:
     """Case of a tank between a lake and the air, with a valve that a PI with samples moves, or a Python program."""
-    nodes = {"source": {"type": "reservoir", "head": 20.0, "elevation": 0.0},
-             "tower": {"type": "tank", "area": 2.0, "level": 4.0, "elevation": 0.0},
-             "town": {"type": "reservoir", "head": 0.0, "elevation": 0.0}}  # fmt: skip
+    nodes = {
+        "source": {"type": "reservoir", "head": 20.0, "elevation": 0.0},
+        "tower": {"type": "tank", "area": 2.0, "level": 4.0, "elevation": 0.0},
+        "town": {"type": "reservoir", "head": 0.0, "elevation": 0.0},
+    }
     valve = {"type": "valve", "area": 2e-3, "discharge_coefficient": 0.61}
     opening = {"control": "hold"} if controls else 0.25
-    links = {"inlet": {**valve, "from": "source", "to": "tower", "opening": opening},
-             "outlet": {**valve, "from": "tower", "to": "town", "opening": 0.5}}  # fmt: skip
+    links = {
+        "inlet": {**valve, "from": "source", "to": "tower", "opening": opening},
+        "outlet": {**valve, "from": "tower", "to": "town", "opening": 0.5},
+    }
     numerics = {"end": 1e5, "method": "rk4", "step": PERIOD}
     case = {"fluid": FLUID, "nodes": nodes, "links": links, "numerics": numerics}
-    return case | {"output": {"probes": ["tower.level"], "every": numerics["end"]}, "controls": controls}
+    return case | {
+        "output": {"probes": ["tower.level"], "every": numerics["end"]},
+        "controls": controls,
+    }
 
 
 def controller_cost(turns: int) -> tuple[float, float]:
     """Time of a sample of a PI in the case, and in Python with `advance` [us]."""
-    block = {"type": "pi", "input": "tower.level", "setpoint": 4.5, "gain": 0.8, "integral_time": 120.0}
-    own = build(load(tower({"hold": block | {"limits": [0.0, 1.0], "period": PERIOD, "initial": 0.25}})))
+    block = {
+        "type": "pi",
+        "input": "tower.level",
+        "setpoint": 4.5,
+        "gain": 0.8,
+        "integral_time": 120.0,
+    }
+    own = build(
+        load(tower({"hold": block | {"limits": [0.0, 1.0], "period": PERIOD, "initial": 0.25}}))
+    )
     free = build(load(tower({})))
 
     loop = ReusedLoop(own, {}).start(initial_state(own))
@@ -131,14 +158,20 @@ def main() -> None:
     """Print the tables."""
     quick = parser(__doc__).parse_args().quick
     steps, turns = (20, 5) if quick else (20, 200)
-    peers = [peer_module(name, wheel) for name, wheel in (("pythonfmu", "PythonFMU"), ("fmpy", "FMPy"))]
+    peers = [
+        peer_module(name, wheel) for name, wheel in (("pythonfmu", "PythonFMU"), ("fmpy", "FMPy"))
+    ]
     print("us a step of 1 ms, beside the solver\n")
-    print("| case | solver | `advance` | `advance` with an input | FMU in FMPy | goal |\n|---|---|---|---|---|---|")
+    print(
+        "| case | solver | `advance` | `advance` with an input | FMU in FMPy | goal |\n|---|---|---|---|---|---|"
+    )
     for name, held in CASES.items():
         case = load(name)
         model = build(case)
         own = least(solving(model, {}), steps, turns)
-        bare, held_cost = (least(advancing(model, inputs), steps, turns) - own for inputs in ({}, held))
+        bare, held_cost = (
+            least(advancing(model, inputs), steps, turns) - own for inputs in ({}, held)
+        )
         text = f"| {name} | {own:.0f} | {bare:.0f} | {held_cost:.0f} "
         if None in peers:
             print(f"{text}| - | - |")
@@ -147,7 +180,9 @@ def main() -> None:
             cost = least(hosted(case, held, Path(folder)), steps, turns) - own
         print(f"{text}| {cost:.0f} | at most {GOAL:g}: {'met' if cost <= GOAL else 'missed'} |")
     in_case, in_python = controller_cost(turns)
-    print(f"\na sample of a PI, with its step: {in_case:.2f} us in the case, {in_python:.0f} us in Python")
+    print(
+        f"\na sample of a PI, with its step: {in_case:.2f} us in the case, {in_python:.0f} us in Python"
+    )
 
 
 if __name__ == "__main__":

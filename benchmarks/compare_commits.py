@@ -44,7 +44,10 @@ HERE = Path(__file__).resolve().parent
 VARIANTS: dict[str, list[dict]] = {
     "valve-closure": [{"numerics.pipe_model": "delay-line"}, {"numerics.method": "rk4"}],
     "streeter-nine-pipes": [{"numerics.pipe_model": "auto"}],
-    "pump-trip": [{"numerics.pipe_model": "auto"}, {"numerics.pipe_model": "auto", "numerics.method": "trapezoid"}],
+    "pump-trip": [
+        {"numerics.pipe_model": "auto"},
+        {"numerics.pipe_model": "auto", "numerics.method": "trapezoid"},
+    ],
     "check-valve-slam": [{"numerics.pipe_model": "delay-line"}],
     "digital-pressure": [{"numerics.pipe_model": "delay-line"}],
     "three-way-junction": [{"numerics.pipe_model": "delay-line"}],
@@ -70,7 +73,11 @@ class Side:
         extract(commit, self.tree)
         cache = {"FVSOLVE_CACHE": str(folder / "cache")} if fresh else {}
         known = {key: value for key, value in os.environ.items() if key != "FVSOLVE_PARTS"}
-        known |= {"PYTHONPATH": str(self.tree), "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"} | cache
+        known |= {
+            "PYTHONPATH": str(self.tree),
+            "MPLBACKEND": "Agg",
+            "OPENBLAS_NUM_THREADS": "1",
+        } | cache
         start = f"import sys; sys.path.append({str(HERE)!r}); import dump_cases; dump_cases.main()"
         self.command = [sys.executable, "-P", "-c", start, str(self.tree), str(written)]
         self.known, self.process, self.seconds = known, None, 0.0
@@ -85,11 +92,22 @@ class Side:
         begun, out = time.perf_counter(), self.folder / "dump"
         if self.process is None:
             self.process = subprocess.Popen(
-                self.command, env=self.known, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                self.command,
+                env=self.known,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
                 stderr=open(self.folder / "errors", "w", encoding="utf-8"),
-            )  # fmt: skip
+            )
         try:
-            print(self.cases[name], out, json.dumps(changed), sep="\t", file=self.process.stdin, flush=True)
+            print(
+                self.cases[name],
+                out,
+                json.dumps(changed),
+                sep="\t",
+                file=self.process.stdin,
+                flush=True,
+            )
             answer = self.process.stdout.readline()
         except BrokenPipeError:
             answer = ""
@@ -97,7 +115,12 @@ class Side:
         if answer:
             return pickle.loads(out.read_bytes())
         code, self.process = self.process.wait(), None
-        last = (self.folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()[-1:]
+        last = (
+            (self.folder / "errors")
+            .read_text(encoding="utf-8", errors="replace")
+            .strip()
+            .splitlines()[-1:]
+        )
         return f"the process of {self.commit} ended with {code}: {' '.join(last)}"
 
     def close(self) -> None:
@@ -109,7 +132,9 @@ class Side:
 
 def extract(commit: str, tree: Path) -> None:
     """Extract the package and the cases of a commit."""
-    packed = subprocess.run(["git", "archive", commit, *PARTS], cwd=HERE.parent, capture_output=True, check=True)
+    packed = subprocess.run(
+        ["git", "archive", commit, *PARTS], cwd=HERE.parent, capture_output=True, check=True
+    )
     with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
         archive.extractall(tree, filter="data")
 
@@ -123,17 +148,23 @@ def revision(name: str) -> str:
     return found.stdout.strip()
 
 
-def pairs(old: Side, new: Side, names: Names, asked: list[str]) -> list[tuple[str | None, str | None]]:
+def pairs(
+    old: Side, new: Side, names: Names, asked: list[str]
+) -> list[tuple[str | None, str | None]]:
     """Names of each case in both commits, None where a commit lacks the case.
 
     Raises ValueError if a given name is unknown.
     """
     unknown = [name for name in asked if name not in old.cases]
     if unknown:
-        raise ValueError(f"{old.commit} has no case {', '.join(unknown)}; expected some of {', '.join(old.cases)}")
+        raise ValueError(
+            f"{old.commit} has no case {', '.join(unknown)}; expected some of {', '.join(old.cases)}"
+        )
     found = []
     for name in asked or old.cases:
-        found.append((name, next((one for (one,) in names.places((name,)) if one in new.cases), None)))
+        found.append(
+            (name, next((one for (one,) in names.places((name,)) if one in new.cases), None))
+        )
     left = set(new.cases) - {other for _, other in found}
     return found + ([] if asked else [(None, name) for name in sorted(left)])
 
@@ -156,7 +187,10 @@ def compared(old: Side, new: Side, names: Names, run: tuple) -> tuple[bool, str]
     found, took = compare(*dumps, names), f"{old.seconds:.1f} s and {new.seconds:.1f} s"
     if not found:
         fault = f", both {dumps[0]['fault',]}" if ("fault",) in dumps[0] else ""
-        return True, f"{said}: equal{fault}, {count(dumps[0])} values in {len(dumps[0])} places, {took}"
+        return (
+            True,
+            f"{said}: equal{fault}, {count(dumps[0])} values in {len(dumps[0])} places, {took}",
+        )
     places = f"differs in {len(found)} of {len(dumps[0])} places, {took}: "
     return False, f"{said}: {places}{'; '.join(map(str, found[:SHOWN]))}"
 
@@ -165,8 +199,12 @@ def main() -> int:
     parser = measure.parser(__doc__)
     parser.add_argument("old", nargs="?", default="HEAD", help="old commit (default HEAD)")
     parser.add_argument("new", nargs="?", default="HEAD", help="new commit (default HEAD)")
-    parser.add_argument("--map", type=Path, help="file of renamed words: KIND, OLD and NEW name, separated by tabs")
-    parser.add_argument("--cases", default="", help="names of cases of OLD, separated by commas (default all)")
+    parser.add_argument(
+        "--map", type=Path, help="file of renamed words: KIND, OLD and NEW name, separated by tabs"
+    )
+    parser.add_argument(
+        "--cases", default="", help="names of cases of OLD, separated by commas (default all)"
+    )
     given, begun = parser.parse_args(), time.perf_counter()
     if given.quick and not (HERE.parent / ".git").exists():
         print(f"there is no git repository: {measure.SKIPPED}")
@@ -185,8 +223,13 @@ def main() -> int:
         except (ValueError, OSError) as error:
             print(error, file=sys.stderr)
             return 2
-        runs = [(*pair, changed) for pair in cases for changed in ({}, *VARIANTS.get(pair[0] or "", []))]
-        print(f"{sides[0].commit} and {sides[1].commit}, {len(cases)} cases, {len(runs)} runs", flush=True)
+        runs = [
+            (*pair, changed) for pair in cases for changed in ({}, *VARIANTS.get(pair[0] or "", []))
+        ]
+        print(
+            f"{sides[0].commit} and {sides[1].commit}, {len(cases)} cases, {len(runs)} runs",
+            flush=True,
+        )
         equal = 0
         try:
             for run in runs:

@@ -49,7 +49,11 @@ class Names:
         self.python: list[tuple[str, str]] = []
         self.used: set[str] = set()
         self.known: dict[str, list[str]] = {}
-        faults = [fault for number, line in enumerate(lines or [], 1) if (fault := self._add(number, line))]
+        faults = [
+            fault
+            for number, line in enumerate(lines or [], 1)
+            if (fault := self._add(number, line))
+        ]
         if faults:
             raise ValueError("\n".join(faults))
 
@@ -82,7 +86,9 @@ class Names:
         """Spellings of a name of Python or of a key: the name, then all names that the map connects with it."""
         if name in self.known:
             return self.known[name]
-        pairs = self.python + [(a[-1], b[-1]) for entries in self.words.values() for a, b in entries]
+        pairs = self.python + [
+            (a[-1], b[-1]) for entries in self.words.values() for a, b in entries
+        ]
         self.known[name] = found = [name]
         for one in found:  # the list grows in the loop
             pairs_of = [b for a, b in pairs if a == one] + [a for a, b in pairs if b == one]
@@ -116,7 +122,11 @@ class Names:
         old = [word for part in words for word in part]
         new = self.renamed(old)
         changed = [k for k in range(len(old)) if old[k] != new[k]]
-        sides = itertools.product((True, False), repeat=len(changed)) if len(changed) <= MANY else _ends(len(changed))
+        sides = (
+            itertools.product((True, False), repeat=len(changed))
+            if len(changed) <= MANY
+            else _ends(len(changed))
+        )
         for taken in sides:
             now = list(old)
             for k, take in zip(changed, taken, strict=True):
@@ -142,7 +152,9 @@ def compare(old: Dump, new: Dump, names: Names) -> list[Difference]:
     pairs, left = _paired(old, new, names)
     found = []
     for place, other in pairs.items():
-        shown = "/".join(place) if other in (None, place) else f"{'/'.join(place)} ({'/'.join(other)})"
+        shown = (
+            "/".join(place) if other in (None, place) else f"{'/'.join(place)} ({'/'.join(other)})"
+        )
         if other is None:
             found.append(Difference(shown, _shown(old[place]), "nothing"))
         elif (values := _different(place, old[place], new[other], names)) is not None:
@@ -171,7 +183,9 @@ def _paired(old: Dump, new: Dump, names: Names) -> tuple[dict, list]:
     return {place: pairs.get(place) for place in old}, list(free)
 
 
-def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tuple[str, str, str] | None:
+def _different(
+    place: tuple[str, ...], old: Any, new: Any, names: Names
+) -> tuple[str, str, str] | None:
     """Position at which two values of a place differ, and both values as text; None if they are equal."""
     if type(old) is not type(new):
         return "", _shown(old), _shown(new)
@@ -187,7 +201,9 @@ def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tupl
 def _different_texts(place, old: str, new: str, names: Names) -> tuple[str, str, str] | None:
     """Position and text of the first line that differs; None for equal texts and for prose."""
     known = [set(names.spellings(key)) for key in PROSE]
-    if any(place[-1] in key for key in known) and not any(one in place for one in names.spellings(LABELS)):
+    if any(place[-1] in key for key in known) and not any(
+        one in place for one in names.spellings(LABELS)
+    ):
         return None
     if place[-1] in names.spellings(REASON):
         old, new = old.partition(":")[0], new.partition(":")[0]

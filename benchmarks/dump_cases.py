@@ -45,8 +45,10 @@ class Named:
         for spelling in spellings:
             if hasattr(self.one, spelling):
                 return getattr(self.one, spelling)
-        raise AttributeError(f"{type(self.one).__name__} {getattr(self.one, '__name__', '')} has no {name} "
-                             f"(spellings: {', '.join(spellings)}); state its new name in the map")  # fmt: skip
+        raise AttributeError(
+            f"{type(self.one).__name__} {getattr(self.one, '__name__', '')} has no {name} "
+            f"(spellings: {', '.join(spellings)}); state its new name in the map"
+        )
 
 
 def dump(path: Path, changed: dict, names: Names, fvsolve) -> Dump:
@@ -62,11 +64,19 @@ def dump(path: Path, changed: dict, names: Names, fvsolve) -> Dump:
     start = api.initial_state(model)
     found |= state_values("start", model, start, names)
     with tempfile.TemporaryDirectory(prefix="fvsolve-dump-") as folder:
-        silent = next(one for one in names.spellings("pictures") if one in inspect.signature(api.run).parameters)
+        silent = next(
+            one
+            for one in names.spellings("pictures")
+            if one in inspect.signature(api.run).parameters
+        )
         api.run(model, None, Path(folder) / "run", **{silent: False})
         found |= directory(Path(folder) / "run", names)
     times = [(one,) for one in names.spellings("t")]
-    end = next(value for (file, *key), value in found.items() if file.endswith(".json") and tuple(key) in times)
+    end = next(
+        value
+        for (file, *key), value in found.items()
+        if file.endswith(".json") and tuple(key) in times
+    )
     begin = Named(start, names).t
     try:
         part = api.advance(model, start, begin + PART * (end - begin))
@@ -88,13 +98,19 @@ def shorter(path: Path, names: Names) -> dict:
         return {}
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     section = next(one for one in names.spellings("numerics") if one in table)
-    return {f"{section}.{next(one for one in names.spellings('end') if one in table[section])}": end}
+    return {
+        f"{section}.{next(one for one in names.spellings('end') if one in table[section])}": end
+    }
 
 
 def state_values(label: str, model, state, names: Names) -> Dump:
     """Values of a state: time, vector, memory, right-hand side by vector and by state, and all probes."""
     own, of = Named(state, names), Named(model, names)
-    found = {(label, "t"): float(own.t), (label, "y"): own.y.copy(), (label, "memory"): flat(own.memory)}
+    found = {
+        (label, "t"): float(own.t),
+        (label, "y"): own.y.copy(),
+        (label, "memory"): flat(own.memory),
+    }
     found |= rates(label, model, own.t, own.y, names)
     return found | {(label, "rates by memory"): of.rhs(state), (label, "probes"): of.observe(state)}
 
@@ -104,7 +120,11 @@ def flat(memory) -> np.ndarray:
     if not isinstance(memory, dict):
         return memory.copy()
     size = [np.array([float(memory["past"].size)])] if "past" in memory else []
-    return np.concatenate([array.ravel() for array in memory.values()] + size) if memory else np.zeros(0)
+    return (
+        np.concatenate([array.ravel() for array in memory.values()] + size)
+        if memory
+        else np.zeros(0)
+    )
 
 
 def rates(label: str, model, t: float, y, names: Names) -> Dump:
@@ -120,7 +140,9 @@ def directory(folder: Path, names: Names) -> Dump:
     for path in sorted(folder.rglob("*")):
         if path.is_file() and path.suffix in readers and path.name not in UNREAD:
             place = path.relative_to(folder).as_posix()
-            found |= {(place, *inner): value for inner, value in readers[path.suffix](path, names).items()}
+            found |= {
+                (place, *inner): value for inner, value in readers[path.suffix](path, names).items()
+            }
     return found | {("files",): "\n".join(sorted({one[0] for one in found if "." in one[0]}))}
 
 
@@ -174,17 +196,25 @@ def frame(path: Path, names: Names) -> Dump:
     found: Dump = {("points",): mesh.points}
     for k, block in enumerate(mesh.cells):
         found[f"cells {k}", block.type] = block.data
-        found |= {(f"cells {k}", name): np.asarray(values[k]) for name, values in mesh.cell_data.items()}
+        found |= {
+            (f"cells {k}", name): np.asarray(values[k]) for name, values in mesh.cell_data.items()
+        }
     found |= {("points", name): np.asarray(values) for name, values in mesh.point_data.items()}
     text = path.read_text(encoding="utf-8")
-    units = re.findall(r'Name="([^"]*)"[^>]*>[^<]*<InformationKey name="UNITS_LABEL"[^>]*>([^<]*)<', text)
+    units = re.findall(
+        r'Name="([^"]*)"[^>]*>[^<]*<InformationKey name="UNITS_LABEL"[^>]*>([^<]*)<', text
+    )
     return found | {("units", name): unit for name, unit in units}
 
 
 def series(path: Path, names: Names) -> Dump:
     """Times and files of the frames of a PVD file."""
     root = ElementTree.parse(path).getroot()
-    return {(str(k), key): text for k, one in enumerate(root.iter("DataSet")) for key, text in one.attrib.items()}
+    return {
+        (str(k), key): text
+        for k, one in enumerate(root.iter("DataSet"))
+        for key, text in one.attrib.items()
+    }
 
 
 def main() -> None:

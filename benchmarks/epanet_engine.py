@@ -18,7 +18,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
-LIBRARIES = {"2.2": ("wntr", "libepanet22.so"), "2.3": ("epanet", "libepanet2.so")}  # package, name of its library
+# package, name of its library
+LIBRARIES = {"2.2": ("wntr", "libepanet22.so"), "2.3": ("epanet", "libepanet2.so")}
 FOOT, GALLON, IMPERIAL_GALLON, DAY = 0.3048, 3.785411784e-3, 4.54609e-3, 86400.0
 FLOW_UNITS = (  # [m3/s], by EPANET's codes: CFS, GPM, MGD, IMGD, AFD, LPS, LPM, MLD, CMH, CMD, CMS
     FOOT**3, GALLON / 60.0, 1e6 * GALLON / DAY, 1e6 * IMPERIAL_GALLON / DAY, 43560.0 * FOOT**3 / DAY,
@@ -37,19 +38,27 @@ DEMAND, HEAD, MOST_LEVEL, LEAST_LEVEL, OVERFLOWS, ELEVATION, FLOW, STATUS = (
     11,
 )  # of EN_getnodevalue, EN_getlinkvalue
 JUNCTION, TANK, PUMP, CONSTANT_POWER = 0, 2, 2, 0  # kinds of nodes, links, pumps
-DIRECTED = (0, PUMP, 3, 4)  # links that water passes from their first node alone: check valves, pumps, PRV, PSV
+# links that water passes from their first node alone: check valves, pumps, PRV, PSV
+DIRECTED = (0, PUMP, 3, 4)
 TRIALS, ACCURACY = 0, 1  # of EN_setoption
 DURATION, HYDRAULIC_STEP, REPORT_STEP, REPORT_START, RULE_STEP = 0, 1, 5, 6, 7  # of EN_settimeparam
 NEW_FLOWS = 10  # EN_initH: no file of results, first guess of flows
-ACCURACIES, MOST_TRIALS, DAY_ACCURACY = (1e-8, 1e-7, 1e-6, 1e-5, None), 200, 1e-5  # None is that of the file
+# None is that of the file
+ACCURACIES, MOST_TRIALS, DAY_ACCURACY = (1e-8, 1e-7, 1e-6, 1e-5, None), 200, 1e-5
 WARNINGS = {
-    1: "unbalanced", 2: "unstable", 3: "disconnected", 4: "pump beyond its curve", 5: "valve without effect",
+    1: "unbalanced",
+    2: "unstable",
+    3: "disconnected",
+    4: "pump beyond its curve",
+    5: "valve without effect",
     6: "negative pressures",
-}  # fmt: skip
+}
 CUT_OFF, FAR = "demand cut off", "heads beyond 100 km"  # warnings of our own
-UNSOLVED = ("unbalanced", "unstable", CUT_OFF, FAR)  # warnings without a solution that a network could have
+# warnings without a solution that a network could have
+UNSOLVED = ("unbalanced", "unstable", CUT_OFF, FAR)
 FARTHEST = 1e5  # greatest head of a network [m]
-STALLED = 1e-6  # flow below which a pump of constant power gives no head to the nodes behind it [m3/s]
+# flow below which a pump of constant power gives no head to the nodes behind it [m3/s]
+STALLED = 1e-6
 AT_LIMIT = 1e-3  # distance of a tank's level from its limit that EPANET takes for none [m]
 NO_DEMAND = 1e-9  # smaller outflows are rounding [m3/s]
 
@@ -151,12 +160,16 @@ class Project:
         self.nodes = [self.name("EN_getnodeid", k + 1) for k in range(nodes)]
         self.links = [self.name("EN_getlinkid", k + 1) for k in range(links)]
         self.kinds = np.array([self.integer("EN_getnodetype", k + 1) for k in range(nodes)])
-        self.tanks = [name for name, kind in zip(self.nodes, self.kinds, strict=True) if kind == TANK]
+        self.tanks = [
+            name for name, kind in zip(self.nodes, self.kinds, strict=True) if kind == TANK
+        ]
         self.ends = np.array([self.ends_of(k + 1) for k in range(links)]).reshape(-1, 2) - 1
         kinds = np.array([self.integer("EN_getlinktype", k + 1) for k in range(links)], dtype=int)
         self.directed = np.isin(kinds, DIRECTED)
         pumps = np.flatnonzero(kinds == PUMP).tolist()
-        self.constant = [k for k in pumps if self.integer("EN_getpumptype", k + 1) == CONSTANT_POWER]
+        self.constant = [
+            k for k in pumps if self.integer("EN_getpumptype", k + 1) == CONSTANT_POWER
+        ]
 
     def ends_of(self, link: int) -> tuple[int, int]:
         """Indices of both nodes of a link, from 1."""
@@ -184,8 +197,12 @@ class Project:
         start, end = self.ends[opened].T
         both = ~self.directed[opened]
         count, sources = len(self.nodes), np.flatnonzero(self.kinds != JUNCTION)
-        rows = np.concatenate((start, end[both], np.full(sources.size, count)))  # the last node feeds all sources
-        graph = coo_array((np.ones(rows.size), (rows, np.concatenate((end, start[both], sources)))), 2 * (count + 1,))
+        # the last node feeds all sources
+        rows = np.concatenate((start, end[both], np.full(sources.size, count)))
+        graph = coo_array(
+            (np.ones(rows.size), (rows, np.concatenate((end, start[both], sources)))),
+            2 * (count + 1,),
+        )
         reached = np.zeros(count + 1, dtype=bool)
         reached[breadth_first_order(graph.tocsr(), count, return_predecessors=False)] = True
         return ~reached[:count]
@@ -193,7 +210,10 @@ class Project:
     def limits(self) -> np.ndarray:
         """Heads between which tanks exchange water : float64[2, nodes] [m]; without limit at other nodes."""
         bottoms = self.values("EN_getnodevalue", len(self.nodes), ELEVATION)
-        levels = [self.values("EN_getnodevalue", len(self.nodes), code) for code in (LEAST_LEVEL, MOST_LEVEL)]
+        levels = [
+            self.values("EN_getnodevalue", len(self.nodes), code)
+            for code in (LEAST_LEVEL, MOST_LEVEL)
+        ]
         limits = self.foot * (bottoms + levels) + [[AT_LIMIT], [-AT_LIMIT]]
         overflows = self.values("EN_getnodevalue", len(self.nodes), OVERFLOWS) > 0.0
         limits[0, self.kinds != TANK], limits[1, (self.kinds != TANK) | overflows] = -np.inf, np.inf
@@ -291,14 +311,19 @@ def day(path: Path, version: str, step: int = 10, rows: int = 150, end: int = 86
                 for text in absurd:
                     warnings.setdefault(text, float(now))
                 inflow = project.demands()
-                crosses = ((values <= least) & (inflow < -STALLED)) | ((values >= most) & (inflow > STALLED))
+                crosses = ((values <= least) & (inflow < -STALLED)) | (
+                    (values >= most) & (inflow > STALLED)
+                )
                 crossed |= set(np.flatnonzero(crosses).tolist())
                 kept.append((now, values, alone | bool(absurd)))
             began = process_time()
             left, _ = project.seconds("EN_nextH")
             cpu += process_time() - began
-        if not kept:  # EPANET stops where it does not converge, unless the file has `UNBALANCED CONTINUE`
-            raise EpanetError(f"EPANET stops at {now} s, before the first row of the day: {', '.join(warnings)}")
+        # EPANET stops where it does not converge, unless the file has `UNBALANCED CONTINUE`
+        if not kept:
+            raise EpanetError(
+                f"EPANET stops at {now} s, before the first row of the day: {', '.join(warnings)}"
+            )
         columns = [np.array(column) for column in zip(*kept, strict=True)]
         names = [project.nodes[i] for i in sorted(crossed)]
         return Day(*columns, project.nodes, project.tanks, names, cpu, float(now), steps, warnings)

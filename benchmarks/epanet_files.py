@@ -33,12 +33,15 @@ import epanet_engine
 import numpy as np
 from measure import SKIPPED, agree, parser
 
-CLOSE, NEAR, SHARE = 1e-3, 1e-2, 0.01  # differences of heads [m], and of flows over the largest flow
+# differences of heads [m], and of flows over the largest flow
+CLOSE, NEAR, SHARE = 1e-3, 1e-2, 0.01
 TINY_FLOW = 1e-5  # a smaller largest flow is no measure: closed links of EPANET leak 3e-8 [m3/s]
 DRY = ("dry",)  # marks of a run that explain a difference: EPANET shuts the links of an empty tank
-CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"  # times between which the largest demand stops [s], end of the run
+# times between which the largest demand stops [s], end of the run
+CLOSURE, CLOSURE_END = (1.0, 5.0), "15 s"
 ROWS, GRACE = 150, 60.0  # interval of rows of a day [s]; time after a limit to end in order [s]
-STEPS = (10, 2)  # of EPANET over a day [s]; the second where the first differs: EPANET delays switches by a step
+# of EPANET over a day [s]; the second where the first differs: EPANET delays switches by a step
+STEPS = (10, 2)
 HARD = {"EPANET day": 1200.0}  # time limits of stages that have no option [s]
 
 Row = dict[str, Any]
@@ -47,7 +50,9 @@ Row = dict[str, Any]
 # Judgement -----------------------------------------------------------------------------------------------------------
 
 
-def worst(ours: dict[str, float], theirs: dict[str, float], left_out: tuple[str, ...] | list[str] = ()) -> Row:
+def worst(
+    ours: dict[str, float], theirs: dict[str, float], left_out: tuple[str, ...] | list[str] = ()
+) -> Row:
     """Greatest difference of two tables of values, with its name and both values; a value that is missing is infinite.
 
     left_out : names that are not compared
@@ -68,7 +73,11 @@ def worst_in_rows(times: np.ndarray, apart: np.ndarray, names: list[str]) -> Row
         return {"difference": 0.0, "name": "", "time": 0.0}
     apart = np.where(np.isfinite(apart), apart, np.inf)
     row, column = np.unravel_index(np.argmax(apart), apart.shape)
-    return {"difference": float(apart[row, column]), "name": names[column], "time": float(times[row])}
+    return {
+        "difference": float(apart[row, column]),
+        "name": names[column],
+        "time": float(times[row]),
+    }
 
 
 def lasting(apart: np.ndarray) -> np.ndarray:
@@ -129,8 +138,11 @@ def is_near(day: Row, most: float = NEAR) -> bool:
 def day_unsolved(day: Row) -> list[str]:
     """Reasons, with times, why EPANET's values of a day are not those that a network could have."""
     found = day.get("epanet_warnings", {})
-    return [f"EPANET: {text} from {time / 3600.0:.2f} h" for text, time in found.items()
-            if text in epanet_engine.UNSOLVED]  # fmt: skip
+    return [
+        f"EPANET: {text} from {time / 3600.0:.2f} h"
+        for text, time in found.items()
+        if text in epanet_engine.UNSOLVED
+    ]
 
 
 def counts(rows: list[Row], files: int) -> dict[str, int]:
@@ -139,27 +151,40 @@ def counts(rows: list[Row], files: int) -> dict[str, int]:
     runs = [row for row in rows if row["epanet"] == "ok"]
     refused = [row for row in runs if verdict(row) == "refused by us"]
     found = {
-        "files found": files, "distinct files": len(rows), "EPANET runs": len(runs),
-        "left out": words["left out"], "imported": sum(row.get("import") == "ok" for row in runs),
+        "files found": files,
+        "distinct files": len(rows),
+        "EPANET runs": len(runs),
+        "left out": words["left out"],
+        "imported": sum(row.get("import") == "ok" for row in runs),
         "imported, its case refused": sum(row.get("import") == "ok" for row in refused),
         "within 1 mm": words["1 mm"],
-        "within 1 cm": words["1 mm"] + words["1 cm"], "above, with named cause": words["named"],
-        "silent": words["silent"], "refused by us": words["refused by us"],
+        "within 1 cm": words["1 mm"] + words["1 cm"],
+        "above, with named cause": words["named"],
+        "silent": words["silent"],
+        "refused by us": words["refused by us"],
         "of these, without a solution of EPANET": sum(bool(unsolved(row)) for row in refused),
         "refused by EPANET": words["refused by EPANET"],
-        "refused by EPANET, imported": sum(row["epanet"] != "ok" and row.get("import") == "ok" for row in rows),
-    }  # fmt: skip
+        "refused by EPANET, imported": sum(
+            row["epanet"] != "ok" and row.get("import") == "ok" for row in rows
+        ),
+    }
     days = [row["day"] for row in rows if "day" in row]
     if days:
         words = Counter(day_verdict(day) for day in days)
         ended = [day for day in days if day["ok"]]
         found |= {
-            "days": len(days), "days to their end": len(ended), "days within 1 mm": words["1 mm"],
-            "days within 1 cm": words["1 mm"] + words["1 cm"], "days above, with named cause": words["named"],
-            "days silent": words["silent"], "days that stop": words["stopped"],
+            "days": len(days),
+            "days to their end": len(ended),
+            "days within 1 mm": words["1 mm"],
+            "days within 1 cm": words["1 mm"] + words["1 cm"],
+            "days above, with named cause": words["named"],
+            "days silent": words["silent"],
+            "days that stop": words["stopped"],
             "days refused by us": words["refused by us"],
-            "days within 3 times EPANET's CPU": sum(day["cpu"] <= 3.0 * day["epanet_cpu"] for day in ended),
-        }  # fmt: skip
+            "days within 3 times EPANET's CPU": sum(
+                day["cpu"] <= 3.0 * day["epanet_cpu"] for day in ended
+            ),
+        }
     closures = [row["closure"] for row in rows if "closure" in row]
     if closures:
         found |= {"closures": len(closures), "closures ok": sum(item == "ok" for item in closures)}
@@ -212,8 +237,14 @@ def examine(path: Path, options: Any, record: Record) -> None:
     except epanet_engine.EpanetError as error:
         row["epanet"] = str(error)
     else:
-        row |= {"epanet": "ok", "nodes": len(theirs.heads), "links": len(theirs.flows), "dead": theirs.dead,
-                "warnings": theirs.warnings, "accuracy": theirs.accuracy}  # fmt: skip
+        row |= {
+            "epanet": "ok",
+            "nodes": len(theirs.heads),
+            "links": len(theirs.flows),
+            "dead": theirs.dead,
+            "warnings": theirs.warnings,
+            "accuracy": theirs.accuracy,
+        }
         if options.limit_nodes and row["nodes"] > options.limit_nodes:
             row["left_out"] = f"more than {options.limit_nodes} nodes"
             return
@@ -255,7 +286,9 @@ def compare_start(imported: Any, case: dict, theirs: epanet_engine.Start, record
     import fvsolve
 
     nodes, links = imported.nodes, imported.links
-    probes = [f"nodes.{name}.head" for name in nodes.values()] + [f"links.{name}.flow" for name in links.values()]
+    probes = [f"nodes.{name}.head" for name in nodes.values()] + [
+        f"links.{name}.flow" for name in links.values()
+    ]
     given = fvsolve.load({**case, "output": {"probes": probes}})
     model = timed(record, "start", lambda: fvsolve.build(given))
     values = model.observe(fvsolve.initial_state(model)).tolist()
@@ -263,7 +296,9 @@ def compare_start(imported: Any, case: dict, theirs: epanet_engine.Start, record
     largest = max(map(abs, theirs.flows.values()), default=0.0)
     flow["share"] = flow["difference"] / max(largest, TINY_FLOW)
     record.row["flow"] = flow
-    record.row["head"] = worst(dict(zip(nodes, values[: len(nodes)], strict=True)), theirs.heads, theirs.dead)
+    record.row["head"] = worst(
+        dict(zip(nodes, values[: len(nodes)], strict=True)), theirs.heads, theirs.dead
+    )
 
 
 def within(limit: float) -> Callable[[float, float, int], None]:
@@ -282,7 +317,11 @@ def closure(case: dict, limit: float) -> str:
     import fvsolve
     from fvsolve.errors import FvsolveError
 
-    demands = {name: float(str(part["demand"]).split()[0]) for name, part in case["nodes"].items() if "demand" in part}
+    demands = {
+        name: float(str(part["demand"]).split()[0])
+        for name, part in case["nodes"].items()
+        if "demand" in part
+    }
     name = max(demands, key=demands.get, default="")
     if not name or demands[name] <= 0.0:
         return "no demand"
@@ -316,7 +355,10 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
         imported = timed(record, "day import", lambda: imported_network(path, day=True))
         day |= {"notes": imported.notes, "causes": imported.causes}
         case = tomllib.loads(imported.text)
-        case["output"] = {"every": float(ROWS), "probes": [f"nodes.{name}.head" for name in imported.nodes.values()]}
+        case["output"] = {
+            "every": float(ROWS),
+            "probes": [f"nodes.{name}.head" for name in imported.nodes.values()],
+        }
         record.stage("day")
         fvsolve.run(case, {"numerics.end": 1.0}, progress=within(options.day_limit))  # compiles
         began = process_time()
@@ -329,13 +371,21 @@ def examine_day(path: Path, options: Any, record: Record) -> None:
     steps = {key: summary[key] for key in ("steps", "seconds", "seconds_setup") if key in summary}
     day |= {"ok": run.ok, "reason": run.reason, "end": float(run.seconds[-1]), **steps}
     day["marks"] = [f"{mark['text']} at {mark['time'] / 3600.0:.2f} h" for mark in summary["marks"]]
-    day["causes"] += [text for mark, text in zip(summary["marks"], day["marks"], strict=True) if mark["what"] in DRY]
+    day["causes"] += [
+        text
+        for mark, text in zip(summary["marks"], day["marks"], strict=True)
+        if mark["what"] in DRY
+    ]
     day |= {"step": STEPS[0], **compare_day(run, imported.nodes, theirs)}
     if run.ok and not is_near(day) and not day_unsolved(day):
         record.stage("EPANET day")
         day |= {"step": STEPS[1], "at_first_step": [day["level"], day["head"]]}
-        day |= compare_day(run, imported.nodes, epanet_engine.day(path, options.version, STEPS[1], ROWS))
-        day["causes"] = day["causes"] + late_switches(day["at_first_step"][0]["difference"], day["level"]["difference"])
+        day |= compare_day(
+            run, imported.nodes, epanet_engine.day(path, options.version, STEPS[1], ROWS)
+        )
+        day["causes"] = day["causes"] + late_switches(
+            day["at_first_step"][0]["difference"], day["level"]["difference"]
+        )
     day["causes"] = day["causes"] + switches_at_limits(summary["events"])
     if day["level"]["difference"] <= NEAR:  # a cycle at a limit keeps the levels
         day["causes"] = day["causes"] + cycling_tanks(summary["events"])
@@ -353,7 +403,11 @@ def compare_day(run: Any, nodes: dict[str, str], theirs: epanet_engine.Day) -> R
     tank = np.isin(theirs.names, theirs.tanks)
     heads = np.where(theirs.dead[rows], 0.0, apart)
     level = worst_in_rows(times, apart[:, tank], theirs.tanks)
-    return {"level": level, "head": worst_in_rows(times, lasting(heads), theirs.names), "rows": len(rows)}
+    return {
+        "level": level,
+        "head": worst_in_rows(times, lasting(heads), theirs.names),
+        "rows": len(rows),
+    }
 
 
 def child(path: Path, options: Any, record: Record) -> None:
@@ -383,7 +437,9 @@ class Examination:
         self.path, self.options, self.record = path, options, record
         self.stage, self.since, self.late = "EPANET", monotonic(), False
         record.stage(self.stage)
-        self.process = multiprocessing.get_context("fork").Process(target=child, args=(path, options, record))
+        self.process = multiprocessing.get_context("fork").Process(
+            target=child, args=(path, options, record)
+        )
         self.process.start()
 
     def ended(self) -> bool:
@@ -430,14 +486,20 @@ def examined(paths: list[Path], options: Any, show: Callable[[Path, Row], None])
 def limit_of(stage: str, options: Any) -> float:
     """Time limit of a stage [s]; runs end themselves in order before it."""
     limit = HARD.get(stage, options.day_limit if stage.startswith("day") else options.limit)
-    return {"day": 2.0 * limit, "closure": limit}.get(stage, limit) + (GRACE if stage in ("day", "closure") else 0.0)
+    return {"day": 2.0 * limit, "closure": limit}.get(stage, limit) + (
+        GRACE if stage in ("day", "closure") else 0.0
+    )
 
 
 def with_fate(row: Row, late: bool, code: int | None, options: Any) -> Row:
     """Row of a process that has ended; late : True if it was killed, code : its exit status"""
     stage = row.pop("stage")
     if stage != "end":
-        text = f"no end within {limit_of(stage, options):g} s" if late else f"crash, exit status {code}"
+        text = (
+            f"no end within {limit_of(stage, options):g} s"
+            if late
+            else f"crash, exit status {code}"
+        )
         set_error(row, stage, f"{stage}: {text}")
     return row
 
@@ -456,7 +518,9 @@ def line(name: str, row: Row) -> str:
     if "head" in row:
         head, flow = row["head"], row["flow"]
         words.append(f"{length(head['difference'])} {head['name']:12.12}")
-        words.append(f"{1e3 * flow['difference']:9.4f} {100.0 * flow['share']:8.4f}% {flow['name']:12.12}")
+        words.append(
+            f"{1e3 * flow['difference']:9.4f} {100.0 * flow['share']:8.4f}% {flow['name']:12.12}"
+        )
         words.append(f"{len(row['dead']):4}")
     extra = [", ".join(row.get("warnings", [])), reason(row).replace("\n", " ")]
     return " ".join([*words, " | ".join(text for text in extra if text)[:220]])
@@ -467,11 +531,21 @@ def day_line(day: Row) -> str:
     words = [f"    day: {day_verdict(day):13}"]
     if "level" in day:
         level, head = day["level"], day["head"]
-        words.append(f"level {length(level['difference'])} m {level['name']:12.12} at {level['time'] / 3600.0:5.2f} h,")
-        words.append(f"head {length(head['difference'])} m {head['name']:12.12} at {head['time'] / 3600.0:5.2f} h,")
-        words.append(f"CPU {day['cpu']:.2f} s, {day['steps']} steps; EPANET {day['epanet_cpu']:.2f} s;")
+        words.append(
+            f"level {length(level['difference'])} m {level['name']:12.12} at {level['time'] / 3600.0:5.2f} h,"
+        )
+        words.append(
+            f"head {length(head['difference'])} m {head['name']:12.12} at {head['time'] / 3600.0:5.2f} h,"
+        )
+        words.append(
+            f"CPU {day['cpu']:.2f} s, {day['steps']} steps; EPANET {day['epanet_cpu']:.2f} s;"
+        )
         words += [f"EPANET with steps of {day['step']} s;"] if day["step"] != STEPS[0] else []
-    told = "" if day["ok"] else day.get("error") or f"{day.get('reason')} at {day.get('end', 0.0) / 3600.0:.2f} h"
+    told = (
+        ""
+        if day["ok"]
+        else day.get("error") or f"{day.get('reason')} at {day.get('end', 0.0) / 3600.0:.2f} h"
+    )
     parts = [told, *day_unsolved(day), *day.get("causes", [])]
     return " ".join([*words, " | ".join(part.replace("\n", " ") for part in parts if part)[:300]])
 
@@ -486,10 +560,15 @@ def files_of(places: list[Path]) -> list[tuple[str, Path]]:
     """Files of folders, each with its name in the table; one of equal names gets its folder."""
     found = []
     for place in places:
-        inside = sorted(path for path in place.rglob("*") if path.suffix.lower() == ".inp" and path.is_file())
+        inside = sorted(
+            path for path in place.rglob("*") if path.suffix.lower() == ".inp" and path.is_file()
+        )
         found += [place] if place.is_file() else inside
     names = Counter(path.name for path in found)
-    return [(path.name if names[path.name] == 1 else f"{path.parent.name}/{path.name}", path) for path in found]
+    return [
+        (path.name if names[path.name] == 1 else f"{path.parent.name}/{path.name}", path)
+        for path in found
+    ]
 
 
 def distinct(files: list[tuple[str, Path]]) -> list[tuple[str, Path]]:
@@ -554,15 +633,35 @@ def small_files(folder: Path) -> None:
 def main() -> None:
     """Print the table of the given files."""
     options = parser(__doc__)
-    options.add_argument("paths", nargs="*", type=Path, metavar="PATH", help="folders or files (default none)")
+    options.add_argument(
+        "paths", nargs="*", type=Path, metavar="PATH", help="folders or files (default none)"
+    )
     options.add_argument("--day", action="store_true", help="also a day of each network")
-    options.add_argument("--closure", action="store_true", help="also a closure of the largest demand in 4 s")
-    options.add_argument("--version", choices=[*epanet_engine.LIBRARIES], help="of EPANET (default the first found)")
-    options.add_argument("--jobs", type=int, default=1, metavar="N", help="files at a time (default 1)")
-    options.add_argument("--limit-nodes", type=int, default=0, metavar="N", help="most nodes (default no limit)")
-    options.add_argument("--limit", type=float, default=120.0, metavar="S", help="time of a stage [s] (default 120)")
-    options.add_argument("--day-limit", type=float, default=300.0, metavar="S", help="time of a day [s] (default 300)")
-    options.add_argument("--json", type=Path, metavar="FILE", help="file of all rows (default none)")
+    options.add_argument(
+        "--closure", action="store_true", help="also a closure of the largest demand in 4 s"
+    )
+    options.add_argument(
+        "--version", choices=[*epanet_engine.LIBRARIES], help="of EPANET (default the first found)"
+    )
+    options.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="files at a time (default 1)"
+    )
+    options.add_argument(
+        "--limit-nodes", type=int, default=0, metavar="N", help="most nodes (default no limit)"
+    )
+    options.add_argument(
+        "--limit", type=float, default=120.0, metavar="S", help="time of a stage [s] (default 120)"
+    )
+    options.add_argument(
+        "--day-limit",
+        type=float,
+        default=300.0,
+        metavar="S",
+        help="time of a day [s] (default 300)",
+    )
+    options.add_argument(
+        "--json", type=Path, metavar="FILE", help="file of all rows (default none)"
+    )
     options = options.parse_args()
     installed = [version for version in epanet_engine.LIBRARIES if epanet_engine.library(version)]
     if not installed or (options.version and options.version not in installed):
@@ -572,7 +671,8 @@ def main() -> None:
     options.day, options.closure = options.day or options.quick, options.closure or options.quick
     with tempfile.TemporaryDirectory() as folder:
         small_files(Path(folder))
-        record = Record(Path(folder) / "small.json")  # imports and compiles, before processes are forked
+        # imports and compiles, before processes are forked
+        record = Record(Path(folder) / "small.json")
         examine(Path(folder) / "small.inp", options, record)
         rows = table([Path(folder)] if options.quick else options.paths, options)
     if options.quick:

@@ -45,7 +45,12 @@ class Network:
 
     def admittance(self, node):
         """Sum of g A/a of the pipe ends at a node [m2/s]."""
-        return sum(self.gravity * p.area / p.wave_speed for p in self.pipes for end in (p.from_, p.to) if end == node)
+        return sum(
+            self.gravity * p.area / p.wave_speed
+            for p in self.pipes
+            for end in (p.from_, p.to)
+            if end == node
+        )
 
     @property
     def jump(self):
@@ -117,7 +122,9 @@ def impulse_response(network):
     zero = np.zeros(1, np.int64)
     if network.gate in pulses:
         pulses[network.gate].append((np.zeros(1), np.full(1, first)))
-    waves = {(i, 1 - side): (zero + (1 << 7 * i), np.full(1, first)) for i, side in ends[network.gate]}
+    waves = {
+        (i, 1 - side): (zero + (1 << 7 * i), np.full(1, first)) for i, side in ends[network.gate]
+    }
     while waves:
         onward = {}
         for node, here in ends.items():
@@ -140,7 +147,10 @@ def impulse_response(network):
             for i, side in here:
                 keep = delay + travel[i] <= network.end
                 if keep.any():
-                    onward[i, 1 - side] = names[keep] + (1 << 7 * i), (head - amplitude[i, side])[keep]
+                    onward[i, 1 - side] = (
+                        names[keep] + (1 << 7 * i),
+                        (head - amplitude[i, side])[keep],
+                    )
         waves = onward
     return {probe: _ascending(parts) for probe, parts in pulses.items()}
 
@@ -166,7 +176,9 @@ def exact_heads(network, closure, times, response=None):
         total = np.concatenate([[0.0], np.cumsum(weight)])
         whole = np.searchsorted(delay, times - closure.finish, side="right")
         some = np.searchsorted(delay, times - closure.begin, side="right")
-        rise = _superpose(code, closure.start, closure.width, times, delay, weight, total, whole, some)
+        rise = _superpose(
+            code, closure.start, closure.width, times, delay, weight, total, whole, some
+        )
         heads[probe] = network.head + network.flow * rise
     return heads
 

@@ -22,7 +22,8 @@ from scipy.optimize import root
 GRAVITY, AMBIENT, DENSITY = 9.80665, 50e6, 1000.0  # no pressure comes near the vapour pressure
 MOST_PIPES = 7
 LARGEST = 64  # greatest division of the time unit
-ACCURATE = 2e-4  # relative to the range of a signal: uncertainty below which the grid is not refined again
+# relative to the range of a signal: uncertainty below which the grid is not refined again
+ACCURATE = 2e-4
 CV_CONSTANT = 0.61  # discharge coefficient of valves
 DEMAND, VALVE = 0, 1
 
@@ -99,7 +100,10 @@ class Pipe:
         model, number = self.friction
         if model == "none":
             return {"model": "none"}
-        return {"model": model, "coefficient" if model in ("hazen-williams", "chezy-manning") else "factor": number}
+        return {
+            "model": model,
+            "coefficient" if model in ("hazen-williams", "chezy-manning") else "factor": number,
+        }
 
 
 @dataclass
@@ -120,7 +124,8 @@ class Network:
     valves: dict[int, tuple[float, Schedule, float]] = field(default_factory=dict)
     checks: dict[tuple[int, int], float] = field(default_factory=dict)
     vessels: dict[int, tuple[float, float, float, float]] = field(default_factory=dict)
-    places: list[tuple[int, int]] = field(default_factory=list)  # (pipe, time units from `start`): head there
+    # (pipe, time units from `start`): head there
+    places: list[tuple[int, int]] = field(default_factory=list)
 
 
 # generator -----------------------------------------------------------------------------------------------------------
@@ -143,7 +148,9 @@ def draw(rng: np.random.Generator) -> Network:
     count = int(rng.integers(1, MOST_PIPES + 1))
     unit = float(f"{10.0 ** rng.uniform(-2.3, -1.2):.2g}")
     lossless = rng.random() < 0.2
-    network = Network(unit, 0, float(rng.uniform(30.0, 120.0)), [0.0, *rng.uniform(-20.0, 20.0, count)], [])
+    network = Network(
+        unit, 0, float(rng.uniform(30.0, 120.0)), [0.0, *rng.uniform(-20.0, 20.0, count)], []
+    )
     size = float(rng.uniform(0.1, 0.5))
     wall = int(rng.choice([6, 15, 40]))  # greatest number of time units of a pipe
     ends = [0]
@@ -161,12 +168,21 @@ def draw(rng: np.random.Generator) -> Network:
         if rng.random() < 0.4:
             a, b = b, a
         network.pipes.append(
-            Pipe(a, b, int(rng.integers(2, wall + 1)), diameter, float(rng.integers(30, 140) * 10), friction)
+            Pipe(
+                a,
+                b,
+                int(rng.integers(2, wall + 1)),
+                diameter,
+                float(rng.integers(30, 140) * 10),
+                friction,
+            )
         )
         ends.append(k + 1)
     if not lossless and count > 2 and rng.random() < 0.2:
         a, b = rng.choice(np.arange(1, count + 1), 2, replace=False)
-        network.pipes.append(Pipe(int(a), int(b), int(rng.integers(2, wall + 1)), size, 1000.0, random_friction(rng)))
+        network.pipes.append(
+            Pipe(int(a), int(b), int(rng.integers(2, wall + 1)), size, 1000.0, random_friction(rng))
+        )
     longest = max(pipe.units for pipe in network.pipes)
     network.end = int(rng.uniform(3.0, 10.0) * longest) + 10
     add_inputs(rng, network, size)
@@ -184,19 +200,32 @@ def random_friction(rng: np.random.Generator) -> tuple[str, float]:
 def add_inputs(rng: np.random.Generator, network: Network, size: float) -> None:
     """Add valves and demands at the ends of the network and at some nodes between, and accumulators."""
     joined = [node for pipe in network.pipes for node in (pipe.start, pipe.end)]
-    inner = [node for node in range(1, len(network.elevations)) if not any(node in pair for pair in network.checks)]
+    inner = [
+        node
+        for node in range(1, len(network.elevations))
+        if not any(node in pair for pair in network.checks)
+    ]
     area = 0.25 * math.pi * size**2
     for node in inner:
         leaf = joined.count(node) == 1
         draw_one = rng.random()
         if draw_one < (0.45 if leaf else 0.05):
             share = float(rng.uniform(0.02, 0.4))
-            network.valves[node] = area * share, opening(rng, network.end), float(rng.uniform(0.0, network.head))
+            network.valves[node] = (
+                area * share,
+                opening(rng, network.end),
+                float(rng.uniform(0.0, network.head)),
+            )
         elif draw_one < (0.85 if leaf else 0.3):
             network.demands[node] = demand(rng, network.end, area)
         elif not leaf and draw_one < 0.4 and not network.vessels:
             gas = area * 10.0 ** float(rng.uniform(1.0, 3.5))
-            network.vessels[node] = gas, 0.2 * area, float(rng.uniform(0.5, 4.0)), float(rng.uniform(0.5, 4.0))
+            network.vessels[node] = (
+                gas,
+                0.2 * area,
+                float(rng.uniform(0.5, 4.0)),
+                float(rng.uniform(0.5, 4.0)),
+            )
     if not any(schedule.kind != "constant" for schedule in inputs(network)):
         node = network.pipes[-1].end or network.pipes[-1].start
         network.demands.pop(node, None)
@@ -238,34 +267,77 @@ def change(rng: np.random.Generator, end: int, value: Any, scale: float) -> Sche
         values = [scale * one for one in (first, last, third)]
         return Schedule("pulse", (start, start + duration, back, *values))
     amplitude = abs(first - last) / 2.0
-    return Schedule("sine", (scale * (min(first, last) + amplitude), scale * amplitude, 10.0 ** rng.uniform(0.8, 2.0)))
+    return Schedule(
+        "sine",
+        (scale * (min(first, last) + amplitude), scale * amplitude, 10.0 ** rng.uniform(0.8, 2.0)),
+    )
 
 
 def case_of(network: Network) -> dict[str, Any]:
     """Nodes, links and fluid of the case file of a network, without `numerics` and `output`."""
     unit, names = network.unit, [node_name(k) for k in range(len(network.elevations))]
-    nodes: dict[str, Any] = {name: {"type": "junction", "elevation": float(z)}
-                             for name, z in zip(names, network.elevations, strict=True)}  # fmt: skip
+    nodes: dict[str, Any] = {
+        name: {"type": "junction", "elevation": float(z)}
+        for name, z in zip(names, network.elevations, strict=True)
+    }
     nodes["lake"] = {"type": "reservoir", "head": network.head, "elevation": 0.0}
     links: dict[str, Any] = {}
     for k, pipe in enumerate(network.pipes):
-        links[f"p{k}"] = {"type": "pipe", "from": names[pipe.start], "to": names[pipe.end],
-                          "length": pipe.length(unit), "diameter": pipe.diameter, "wave_speed": pipe.speed,
-                          "friction": pipe.friction_keys()}  # fmt: skip
+        links[f"p{k}"] = {
+            "type": "pipe",
+            "from": names[pipe.start],
+            "to": names[pipe.end],
+            "length": pipe.length(unit),
+            "diameter": pipe.diameter,
+            "wave_speed": pipe.speed,
+            "friction": pipe.friction_keys(),
+        }
     for node, schedule in network.demands.items():
         nodes[names[node]]["demand"] = schedule.keys(unit)
     for node, (area, schedule, head) in network.valves.items():
-        nodes[f"out{node}"] = {"type": "reservoir", "head": head, "elevation": network.elevations[node]}
-        links[f"v{node}"] = {"type": "valve", "from": names[node], "to": f"out{node}", "area": area,
-                             "discharge_coefficient": CV_CONSTANT, "opening": schedule.keys(unit)}  # fmt: skip
+        nodes[f"out{node}"] = {
+            "type": "reservoir",
+            "head": head,
+            "elevation": network.elevations[node],
+        }
+        links[f"v{node}"] = {
+            "type": "valve",
+            "from": names[node],
+            "to": f"out{node}",
+            "area": area,
+            "discharge_coefficient": CV_CONSTANT,
+            "opening": schedule.keys(unit),
+        }
     for (before, behind), area in network.checks.items():
-        links[f"c{before}"] = {"type": "check-valve", "from": names[before], "to": names[behind], "area": area,
-                               "discharge_coefficient": CV_CONSTANT}  # fmt: skip
+        links[f"c{before}"] = {
+            "type": "check-valve",
+            "from": names[before],
+            "to": names[behind],
+            "area": area,
+            "discharge_coefficient": CV_CONSTANT,
+        }
     for node, (gas, area, loss_in, loss_out) in network.vessels.items():
         connection = {"area": area, "loss_in": loss_in, "loss_out": loss_out}
-        nodes[names[node]] |= {"type": "accumulator", "volume": 3.0 * gas, "gas_volume": gas, "connection": connection}
-    fluid = {"name": "user", "density": DENSITY, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 0.0}
-    return {"schema": 1, "ambient_pressure": AMBIENT, "fluid": fluid, "nodes": nodes, "links": links}
+        nodes[names[node]] |= {
+            "type": "accumulator",
+            "volume": 3.0 * gas,
+            "gas_volume": gas,
+            "connection": connection,
+        }
+    fluid = {
+        "name": "user",
+        "density": DENSITY,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 0.0,
+    }
+    return {
+        "schema": 1,
+        "ambient_pressure": AMBIENT,
+        "fluid": fluid,
+        "nodes": nodes,
+        "links": links,
+    }
 
 
 def node_name(node: int) -> str:
@@ -276,7 +348,11 @@ def probes_of(network: Network) -> list[str]:
     """Probes in the order of `Solution.extremes`: heads of nodes, flows into pipes, heads at places."""
     heads = [f"{node_name(k)}.head" for k in range(1, len(network.elevations))]
     flows = [f"p{k}.flow@0" for k in range(len(network.pipes))]
-    return [*heads, *flows, *(f"p{k}.head@{at / network.pipes[k].units!r}" for k, at in network.places)]
+    return [
+        *heads,
+        *flows,
+        *(f"p{k}.head@{at / network.pipes[k].units!r}" for k, at in network.places),
+    ]
 
 
 # steady state --------------------------------------------------------------------------------------------------------
@@ -299,7 +375,11 @@ def steady_state(network: Network) -> tuple[np.ndarray, np.ndarray]:
             balance[pipe.start] -= q
             balance[pipe.end] += q
         for ((before, behind), size), q in zip(checks, through[: len(checks)], strict=True):
-            rows.append(heads[before] - heads[behind] - q * abs(q) / (2.0 * GRAVITY * (CV_CONSTANT * size) ** 2))
+            rows.append(
+                heads[before]
+                - heads[behind]
+                - q * abs(q) / (2.0 * GRAVITY * (CV_CONSTANT * size) ** 2)
+            )
             balance[before] -= q
             balance[behind] += q
         for (node, (size, schedule, beyond)), q in zip(valves, through[len(checks) :], strict=True):
@@ -313,7 +393,9 @@ def steady_state(network: Network) -> tuple[np.ndarray, np.ndarray]:
         balance[0] = heads[0] - network.head
         return np.array([*rows, *balance])
 
-    start = np.concatenate([-np.arange(many) * 0.3, np.full(len(pipes) + len(checks) + len(valves), 0.3)])
+    start = np.concatenate(
+        [-np.arange(many) * 0.3, np.full(len(pipes) + len(checks) + len(valves), 0.3)]
+    )
     found = root(residual, start, method="hybr", options={"maxfev": 4000})
     found = root(residual, found.x, method="lm", options={"xtol": 1e-15, "ftol": 1e-15})
     if np.max(np.abs(residual(found.x))) > 1e-8:
@@ -358,11 +440,18 @@ def solution(network: Network, largest: int = LARGEST) -> Solution:
         off, span = np.abs(fine - coarse), np.ptp(fine, axis=1, keepdims=True)
         uncertain = np.maximum(off, last)
         if division >= largest or np.all(uncertain <= ACCURATE * span + 1e-9):
-            return Solution(fine, np.maximum(uncertain, np.minimum(0.125 * bends, ACCURATE * span)), division, shut)
+            return Solution(
+                fine,
+                np.maximum(uncertain, np.minimum(0.125 * bends, ACCURATE * span)),
+                division,
+                shut,
+            )
         coarse, last = fine, off
 
 
-def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int) -> tuple[np.ndarray, int, np.ndarray]:
+def march(
+    network: Network, heads: np.ndarray, flows: np.ndarray, division: int
+) -> tuple[np.ndarray, int, np.ndarray]:
     """Extremes of all probes with steps of the time unit over `division`, number of closures, and second differences.
 
     The second differences are those of the values in time around each extreme.
@@ -392,20 +481,41 @@ def march(network: Network, heads: np.ndarray, flows: np.ndarray, division: int)
     beyond = np.zeros(many)
     for node, (_, _, head) in network.valves.items():
         beyond[node] = head
-    pairs = np.array([[*pair, CV_CONSTANT * area * math.sqrt(2.0 * GRAVITY)]
-                      for pair, area in network.checks.items()]).reshape(-1, 3)  # fmt: skip
+    pairs = np.array(
+        [
+            [*pair, CV_CONSTANT * area * math.sqrt(2.0 * GRAVITY)]
+            for pair, area in network.checks.items()
+        ]
+    ).reshape(-1, 3)
     vessels = np.zeros((many, 5))
     for node, (gas, area, loss_in, loss_out) in network.vessels.items():
         pressure = AMBIENT + DENSITY * GRAVITY * (heads[node] - network.elevations[node])
         losses = [loss / (2.0 * GRAVITY * area**2) for loss in (loss_in, loss_out)]
         vessels[node] = pressure, gas, *losses, network.elevations[node]
     places = np.array([first[k] + at * division for k, at in network.places], int)
-    return characteristics(H, Q, first, rows, ends, dt, steps, network.head, drawn, opened, jumps, beyond, pairs,
-                           vessels, places)  # fmt: skip
+    return characteristics(
+        H,
+        Q,
+        first,
+        rows,
+        ends,
+        dt,
+        steps,
+        network.head,
+        drawn,
+        opened,
+        jumps,
+        beyond,
+        pairs,
+        vessels,
+        places,
+    )
 
 
 @numba.njit(cache=False, error_model="numpy")
-def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jumps, beyond, pairs, vessels, places):
+def characteristics(
+    H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jumps, beyond, pairs, vessels, places
+):
     """Extremes of heads of nodes (without the lake), flows into pipes, heads at places; closures; bends of `march`.
 
     H, Q : heads [m] and flows [m3/s] at all points of all pipes at the start; rows : impedance a / (g A), loss
@@ -432,12 +542,18 @@ def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jum
                 new_H[i + 1] = H[i] + B * Q[i]
                 new_Q[i + 1] = B + R * abs(Q[i]) ** (n - 1.0) if R > 0.0 else B
             for i in range(first[k] + 1, first[k + 1] - 1):
-                back, slope = H[i + 1] - B * Q[i + 1], B + (R * abs(Q[i + 1]) ** (n - 1.0) if R > 0.0 else 0.0)
+                back, slope = (
+                    H[i + 1] - B * Q[i + 1],
+                    B + (R * abs(Q[i + 1]) ** (n - 1.0) if R > 0.0 else 0.0),
+                )
                 flow = (new_H[i] - back) / (new_Q[i] + slope)
                 new_H[i] = new_H[i] - new_Q[i] * flow
                 new_Q[i] = flow
             i = first[k]
-            back, slope = H[i + 1] - B * Q[i + 1], B + (R * abs(Q[i + 1]) ** (n - 1.0) if R > 0.0 else 0.0)
+            back, slope = (
+                H[i + 1] - B * Q[i + 1],
+                B + (R * abs(Q[i + 1]) ** (n - 1.0) if R > 0.0 else 0.0),
+            )
             new_H[i], new_Q[i] = back, slope  # of the end at `start`, until its node is known
             last = first[k + 1] - 1
             effort[ends[k, 0]] += back / slope
@@ -452,7 +568,9 @@ def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jum
                 if opened[side, step, node] > 0.0:
                     flow = orifice(heads[node] - beyond[node], Z, opened[side, step, node])
                 elif vessels[node, 1] > 0.0:
-                    flow = vessel_flow(heads[node], Z, vessels[node], volume[node], inflow[node], dt)
+                    flow = vessel_flow(
+                        heads[node], Z, vessels[node], volume[node], inflow[node], dt
+                    )
                 through[node] = flow
                 heads[node] -= Z * flow
             heads[0] = lake
@@ -463,7 +581,9 @@ def characteristics(H, Q, first, rows, ends, dt, steps, lake, drawn, opened, jum
                     closures += 1
                 is_open[k] = drop > 0.0
                 if is_open[k]:
-                    flow = orifice(drop, 1.0 / admittance[before] + 1.0 / admittance[behind], pairs[k, 2])
+                    flow = orifice(
+                        drop, 1.0 / admittance[before] + 1.0 / admittance[behind], pairs[k, 2]
+                    )
                     heads[before] -= flow / admittance[before]
                     heads[behind] += flow / admittance[behind]
             if side == 0:  # values before a jump

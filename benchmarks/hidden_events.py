@@ -21,16 +21,43 @@ from measure import parser
 import fvsolve
 from fvsolve.errors import FvsolveError
 
-FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": "2.2 GPa", "viscosity": "1 mPa s",
-         "vapor_pressure": "0 Pa", "law": "linear"}  # fmt: skip
+FLUID = {
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": "2.2 GPa",
+    "viscosity": "1 mPa s",
+    "vapor_pressure": "0 Pa",
+    "law": "linear",
+}
 GRAVITY, AMBIENT = 9.80665, 101325.0
-ADAPTIVE = ("bogacki-shampine", "dormand-prince", "verner-7", "tr-bdf2", "esdirk-4", "radau-iia-5", "rodas-4",
-            "rodas-5p", "auto")  # fmt: skip
-GIVEN = ("euler", "heun", "rk4", "ssp-rk3", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-3", "lobatto-iiic-4")
+ADAPTIVE = (
+    "bogacki-shampine",
+    "dormand-prince",
+    "verner-7",
+    "tr-bdf2",
+    "esdirk-4",
+    "radau-iia-5",
+    "rodas-4",
+    "rodas-5p",
+    "auto",
+)
+GIVEN = (
+    "euler",
+    "heun",
+    "rk4",
+    "ssp-rk3",
+    "implicit-euler",
+    "trapezoid",
+    "gauss-4",
+    "radau-iia-3",
+    "lobatto-iiic-4",
+)
 METHODS = (*ADAPTIVE, *GIVEN)
 VALVE = {"type": "valve", "area": "0.1 m2"}
 EXACT, PARABOLA, FIRST = 0, 1, 2
-ACCURACY = {"euler": PARABOLA, "implicit-euler": FIRST} | dict.fromkeys(GIVEN[1:4] + GIVEN[5:], PARABOLA)
+ACCURACY = {"euler": PARABOLA, "implicit-euler": FIRST} | dict.fromkeys(
+    GIVEN[1:4] + GIVEN[5:], PARABOLA
+)
 
 
 class Drive:
@@ -49,12 +76,16 @@ class Drive:
         self.margin = 10.0 ** rng.uniform(-3.0, -1.0)
         if self.accuracy == EXACT and rng.random() < 0.5:
             w = 0.5 * math.pi / self.peak
-            self.rate, self.value = f"{rise * w!r}*cos({w!r}*t)", f"{base!r} + {rise!r}*sin({w!r}*t)"
+            self.rate, self.value = (
+                f"{rise * w!r}*cos({w!r}*t)",
+                f"{base!r} + {rise!r}*sin({w!r}*t)",
+            )
         else:
             first = 2.0 * rise / self.peak
             self.rate = f"{first!r}*(1 - t/{self.peak!r})"
             self.value = f"{base!r} + {first!r}*t*(1 - t/{2 * self.peak!r})"
-        if self.accuracy == FIRST:  # a step of the implicit Euler method is short by the fall of the rate within it
+        # a step of the implicit Euler method is short by the fall of the rate within it
+        if self.accuracy == FIRST:
             self.steps += 3.0
             self.margin += 1.2 / self.steps
 
@@ -71,10 +102,12 @@ def filled_tank(rng: np.random.Generator, falls: bool = False) -> tuple[dict[str
     factor, level = (-area, (1.0 - drive.margin) * rise) if falls else (area, drive.base)
     return {
         "fluid": FLUID,
-        "nodes": {"src": {"type": "inflow", "flow": f"{factor!r}*({drive.rate})"},
-                  "pot": {"type": "tank", "area": area, "level": level}},
+        "nodes": {
+            "src": {"type": "inflow", "flow": f"{factor!r}*({drive.rate})"},
+            "pot": {"type": "tank", "area": area, "level": level},
+        },
         "links": {"fill": VALVE | {"from": "src", "to": "pot"}},
-    }, drive  # fmt: skip
+    }, drive
 
 
 def block(case: dict[str, Any], **keys: Any) -> dict[str, Any]:
@@ -91,14 +124,20 @@ def bottom_pressure(level: float) -> float:
 
 def relay(rng):
     case, drive = filled_tank(rng)
-    return block(case, type="relay", input="pot.level", on=drive.threshold, off=drive.base * 0.5, initial=0), drive
+    return block(
+        case, type="relay", input="pot.level", on=drive.threshold, off=drive.base * 0.5, initial=0
+    ), drive
 
 
 def latch(rng):
     case, drive = filled_tank(rng)
     scene = block(case, type="latch", set="controls.a", reset="controls.z", initial=0)
     scale = 0.5 / drive.threshold
-    scene["controls"]["a"] = {"type": "function", "inputs": {"x": "pot.level"}, "formula": f"{scale!r}*x"}
+    scene["controls"]["a"] = {
+        "type": "function",
+        "inputs": {"x": "pot.level"},
+        "formula": f"{scale!r}*x",
+    }
     scene["controls"]["z"] = {"type": "function", "inputs": {"x": "pot.level"}, "formula": "0*x"}
     return scene, drive
 
@@ -106,30 +145,46 @@ def latch(rng):
 def limit_of_a_block(rng):
     case, drive = filled_tank(rng)
     top = drive.threshold
-    return block(case, type="function", inputs={"x": "pot.level"}, formula="x", limits=[0.0, top]), drive
+    return block(
+        case, type="function", inputs={"x": "pot.level"}, formula="x", limits=[0.0, top]
+    ), drive
 
 
 def rupture_disc(rng):
     case, drive = filled_tank(rng)
-    case["links"]["disc"] = {"type": "rupture-disc", "from": "pot", "area": "1e-4 m2",
-                             "burst_pressure": bottom_pressure(drive.threshold)}  # fmt: skip
+    case["links"]["disc"] = {
+        "type": "rupture-disc",
+        "from": "pot",
+        "area": "1e-4 m2",
+        "burst_pressure": bottom_pressure(drive.threshold),
+    }
     return case, drive
 
 
 def surge_anticipating(rng):
     case, drive = filled_tank(rng)
-    case["links"]["valve"] = {"type": "surge-anticipating", "from": "pot", "area": "1e-5 m2",
-                              "high_set": AMBIENT + bottom_pressure(drive.threshold), "opening_time": drive.end,
-                              "closing_time": drive.end}  # fmt: skip
+    case["links"]["valve"] = {
+        "type": "surge-anticipating",
+        "from": "pot",
+        "area": "1e-5 m2",
+        "high_set": AMBIENT + bottom_pressure(drive.threshold),
+        "opening_time": drive.end,
+        "closing_time": drive.end,
+    }
     return case, drive
 
 
 def relief_valve(rng):
     case, drive = filled_tank(rng)
     case["nodes"]["out"] = {"type": "reservoir", "pressure": AMBIENT}
-    case["links"]["valve"] = {"type": "relief-valve", "from": "pot", "to": "out", "area": "1e-6 m2",
-                              "set_pressure": AMBIENT + bottom_pressure(drive.threshold),
-                              "overpressure": bottom_pressure(drive.rise)}  # fmt: skip
+    case["links"]["valve"] = {
+        "type": "relief-valve",
+        "from": "pot",
+        "to": "out",
+        "area": "1e-6 m2",
+        "set_pressure": AMBIENT + bottom_pressure(drive.threshold),
+        "overpressure": bottom_pressure(drive.rise),
+    }
     return case, drive
 
 
@@ -176,34 +231,73 @@ def end_stop(rng):
     rise = 10.0 ** rng.uniform(-2.0, 0.0)
     drive, mass = Drive(rng, 0.0, rise), 10.0 ** rng.uniform(-1.0, 2.0)
     speed, braking = 2.0 * rise / drive.peak, 2.0 * rise / drive.peak**2
-    return {"fluid": FLUID,
-            "nodes": {"ground": {"type": "frame"},
-                      "m": {"type": "mass", "mass": mass, "initial_velocity": speed}},
-            "links": {"weight": {"type": "force", "to": "m", "force": -braking * mass},
-                      "stop": {"type": "end-stop", "from": "ground", "to": "m", "maximum": drive.threshold,
-                               "stiffness": mass / drive.peak**2}}}, drive  # fmt: skip
+    return {
+        "fluid": FLUID,
+        "nodes": {
+            "ground": {"type": "frame"},
+            "m": {"type": "mass", "mass": mass, "initial_velocity": speed},
+        },
+        "links": {
+            "weight": {"type": "force", "to": "m", "force": -braking * mass},
+            "stop": {
+                "type": "end-stop",
+                "from": "ground",
+                "to": "m",
+                "maximum": drive.threshold,
+                "stiffness": mass / drive.peak**2,
+            },
+        },
+    }, drive
 
 
 def diode(rng):
     """Capacitor charged by a current; the diode conducts to a battery at its greatest voltage."""
     drive, capacity = Drive(rng, 10.0, 10.0), 10.0 ** rng.uniform(-3.0, 0.0)
-    return {"nodes": {"c": {"type": "terminal"}, "b": {"type": "terminal"}, "gnd": {"type": "ground"}},
-            "links": {"i": {"type": "current-source", "from": "gnd", "to": "c",
-                            "current": f"{capacity!r}*({drive.rate})"},
-                      "cap": {"type": "capacitor", "from": "c", "to": "gnd", "capacitance": capacity,
-                              "initial_voltage": drive.base},
-                      "bat": {"type": "voltage-source", "from": "gnd", "to": "b", "voltage": drive.threshold},
-                      "d": {"type": "diode", "from": "c", "to": "b",
-                            "resistance": drive.peak / capacity * 1e3}}}, drive  # fmt: skip
+    return {
+        "nodes": {"c": {"type": "terminal"}, "b": {"type": "terminal"}, "gnd": {"type": "ground"}},
+        "links": {
+            "i": {
+                "type": "current-source",
+                "from": "gnd",
+                "to": "c",
+                "current": f"{capacity!r}*({drive.rate})",
+            },
+            "cap": {
+                "type": "capacitor",
+                "from": "c",
+                "to": "gnd",
+                "capacitance": capacity,
+                "initial_voltage": drive.base,
+            },
+            "bat": {"type": "voltage-source", "from": "gnd", "to": "b", "voltage": drive.threshold},
+            "d": {
+                "type": "diode",
+                "from": "c",
+                "to": "b",
+                "resistance": drive.peak / capacity * 1e3,
+            },
+        },
+    }, drive
 
 
 def clutch(rng):
     """Shaft that sticks to a housing until the torque exceeds that at rest."""
     drive = Drive(rng, 1.0, 10.0)
-    return {"nodes": {"wheel": {"type": "shaft", "inertia": 1.0, "initial_speed": 0.0}, "fixed": {"type": "housing"}},
-            "links": {"drive": {"type": "torque", "to": "wheel", "torque": drive.value},
-                      "brake": {"type": "bearing", "from": "fixed", "to": "wheel",
-                                "friction_torque": drive.threshold}}}, drive  # fmt: skip
+    return {
+        "nodes": {
+            "wheel": {"type": "shaft", "inertia": 1.0, "initial_speed": 0.0},
+            "fixed": {"type": "housing"},
+        },
+        "links": {
+            "drive": {"type": "torque", "to": "wheel", "torque": drive.value},
+            "brake": {
+                "type": "bearing",
+                "from": "fixed",
+                "to": "wheel",
+                "friction_torque": drive.threshold,
+            },
+        },
+    }, drive
 
 
 def by_event(result, drive) -> bool:
@@ -232,14 +326,22 @@ def by_force(result, drive) -> bool:
 
 
 KINDS: dict[str, tuple[Callable, Callable]] = {
-    "relay": (relay, by_event), "latch": (latch, by_event),
-    "limit of a block": (limit_of_a_block, by_event), "rupture disc": (rupture_disc, by_event),
-    "surge-anticipating": (surge_anticipating, by_event), "relief valve": (relief_valve, by_event),
-    "counterbalance": (counterbalance, by_event), "check valve": (check_valve, by_event),
-    "closing check valve": (closing_check_valve, by_event), "pilot check": (pilot_check, by_event),
-    "spilling": (spilling, by_spilling), "dry": (dry, by_mark), "end-stop": (end_stop, by_force),
-    "diode": (diode, by_event), "clutch": (clutch, by_event),
-}  # fmt: skip
+    "relay": (relay, by_event),
+    "latch": (latch, by_event),
+    "limit of a block": (limit_of_a_block, by_event),
+    "rupture disc": (rupture_disc, by_event),
+    "surge-anticipating": (surge_anticipating, by_event),
+    "relief valve": (relief_valve, by_event),
+    "counterbalance": (counterbalance, by_event),
+    "check valve": (check_valve, by_event),
+    "closing check valve": (closing_check_valve, by_event),
+    "pilot check": (pilot_check, by_event),
+    "spilling": (spilling, by_spilling),
+    "dry": (dry, by_mark),
+    "end-stop": (end_stop, by_force),
+    "diode": (diode, by_event),
+    "clutch": (clutch, by_event),
+}
 
 
 def scene(kind: str, method: str, rng: np.random.Generator) -> tuple[dict[str, Any], Drive]:
@@ -259,7 +361,9 @@ def scene(kind: str, method: str, rng: np.random.Generator) -> tuple[dict[str, A
 def main() -> None:
     """Print for each kind of event how many events were missed, of how many."""
     options = parser(__doc__)
-    options.add_argument("count", type=int, nargs="?", default=4, help="scenes of each kind and method")
+    options.add_argument(
+        "count", type=int, nargs="?", default=4, help="scenes of each kind and method"
+    )
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--kinds", default=",".join(KINDS))
     options.add_argument("--methods", default=",".join(METHODS))
@@ -282,9 +386,16 @@ def main() -> None:
                 if not KINDS[kind][1](result, drive):
                     missed[kind] += 1
                     by_method[method] += 1
-                    print(f"  missed: {kind}, {method}, {seed}, {result.summary['steps']} steps, {result.reason}")
-        print(f"{kind:20} {missed[kind]:4} missed, {failed[kind]:3} refused, of {total[kind]:4}", flush=True)
-    print(f"{'all':20} {sum(missed.values()):4} missed, {sum(failed.values()):3} refused, of {sum(total.values()):4}")
+                    print(
+                        f"  missed: {kind}, {method}, {seed}, {result.summary['steps']} steps, {result.reason}"
+                    )
+        print(
+            f"{kind:20} {missed[kind]:4} missed, {failed[kind]:3} refused, of {total[kind]:4}",
+            flush=True,
+        )
+    print(
+        f"{'all':20} {sum(missed.values()):4} missed, {sum(failed.values()):3} refused, of {sum(total.values()):4}"
+    )
     print("missed by method:", dict(by_method))
 
 

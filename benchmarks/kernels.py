@@ -27,7 +27,8 @@ from fvsolve.core.solve import initial_state
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
-TRIAD_BYTES = 24  # per element: two reads, one write (the line fetched before writing is not counted)
+# per element: two reads, one write (the line fetched before writing is not counted)
+TRIAD_BYTES = 24
 BUDGET = 0.2  # time of one measurement [s]
 
 
@@ -65,7 +66,9 @@ def schemes() -> list[Subject]:
     return subjects
 
 
-def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable[[int], Callable[[int], None]]:
+def stepping(
+    scheme: str, limiter: str, method: str, courant: float
+) -> Callable[[int], Callable[[int], None]]:
     """Function that prepares fvsolve's time loop on one pipe."""
 
     def prepare(cells: int) -> Callable[[int], None]:
@@ -119,7 +122,9 @@ def triad(a, b, c, s, times):
     return a[0]
 
 
-def rate(advance: Callable[[int], object], elements: int, repeats: int = 5, budget: float = BUDGET) -> float:
+def rate(
+    advance: Callable[[int], object], elements: int, repeats: int = 5, budget: float = BUDGET
+) -> float:
     """Elements per second, the best of `repeats` measurements, which together take about `budget` [s]."""
     advance(1)
     times, wall = 1, 0.0
@@ -147,12 +152,16 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("cells", nargs="*", type=int, help=f"numbers of cells (default {SIZES})")
     given = options.parse_args()
-    sizes, budget = given.cells or (SIZES[:1] if given.quick else SIZES), 0.01 if given.quick else BUDGET
+    sizes, budget = (
+        given.cells or (SIZES[:1] if given.quick else SIZES),
+        0.01 if given.quick else BUDGET,
+    )
     reached = {cells: bandwidth(2 * cells, budget) for cells in sizes}
     print("| million per second |" + "".join(f" {cells:.0e} cells |" for cells in sizes))
     print("|---|" + "---|" * len(sizes))
     cells_of_triad = (
-        f" {reached[cells] / TRIAD_BYTES / 1e6:.0f} ({reached[cells] / 1e9:.0f} GB/s) |" for cells in sizes
+        f" {reached[cells] / TRIAD_BYTES / 1e6:.0f} ({reached[cells] / 1e9:.0f} GB/s) |"
+        for cells in sizes
     )
     print("| triad, elements (twice the cells) |" + "".join(cells_of_triad))
     for subject in schemes() + of_pyclaw():

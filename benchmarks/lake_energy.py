@@ -75,17 +75,37 @@ def march(rates, fluid, floats, integers, y, spare, none, end, work):
     one, first, second, band = spare[0], spare[1], spare[2], (0, n)
     while t < end:
         rate = rates(
-            fluid, floats, integers, none, (y[0], y[1], y[2]), none, none, work, (first[0], first[1], first[2]), band,
-            None, None,
-        )  # fmt: skip
+            fluid,
+            floats,
+            integers,
+            none,
+            (y[0], y[1], y[2]),
+            none,
+            none,
+            work,
+            (first[0], first[1], first[2]),
+            band,
+            None,
+            None,
+        )
         step = COURANT / rate
         for q in range(3):
             for i in range(n):
                 one[q, i] = y[q, i] + step * first[q, i]
         rates(
-            fluid, floats, integers, none, (one[0], one[1], one[2]), none, none, work,
-            (second[0], second[1], second[2]), band, None, None,
-        )  # fmt: skip
+            fluid,
+            floats,
+            integers,
+            none,
+            (one[0], one[1], one[2]),
+            none,
+            none,
+            work,
+            (second[0], second[1], second[2]),
+            band,
+            None,
+            None,
+        )
         for q in range(3):
             for i in range(n):
                 y[q, i] += 0.5 * step * (first[q, i] + second[q, i])
@@ -102,9 +122,15 @@ def march_liquid(liquid, floats, integers, y, spare, none, end, work):
     march(mesh_rates, liquid, floats, integers, y, spare, none, end, work)
 
 
-def greatest_energy(advance, module, fluid, lowered, start: np.ndarray, end: float, energy) -> float:
+def greatest_energy(
+    advance, module, fluid, lowered, start: np.ndarray, end: float, energy
+) -> float:
     """Greatest energy at 30 times of a run, over that at the start; infinite if a number is not finite."""
-    y, spare, work = start.copy(), np.zeros((3, *start.shape)), np.zeros(work_size(module, lowered[1]))
+    y, spare, work = (
+        start.copy(),
+        np.zeros((3, *start.shape)),
+        np.zeros(work_size(module, lowered[1])),
+    )
     first = most = energy(y)
     for _ in range(30):
         advance(fluid, *lowered, y, spare, np.zeros(0), end / 30.0, work)
@@ -115,7 +141,9 @@ def greatest_energy(advance, module, fluid, lowered, start: np.ndarray, end: flo
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--beds", type=int, default=40, help="number of beds, 40")
-    options.add_argument("--end", type=float, default=3000.0, help="time of a run of water [s], 3000")
+    options.add_argument(
+        "--end", type=float, default=3000.0, help="time of a run of water [s], 3000"
+    )
     options.add_argument("--seed", type=int, default=0, help="first random number, 0")
     given = options.parse_args()
     if given.quick:
@@ -134,26 +162,45 @@ def main() -> None:
             area = mesh.area
 
             def of_water(y, depth=depth, area=area):
-                return float(0.5 * area @ (G * y[0] ** 2 + (y[1] ** 2 + y[2] ** 2) / (depth + y[0])))
+                return float(
+                    0.5 * area @ (G * y[0] ** 2 + (y[1] ** 2 + y[2] ** 2) / (depth + y[0]))
+                )
 
             def of_liquid(y, area=area):
                 return float(area @ ((C * y[0]) ** 2 + y[1] ** 2 + y[2] ** 2))
 
             for name, (scheme, wide) in SCHEMES.items():
                 most, plan = min(wide, surface_mesh.MOST_OVERSHOOT), np.stack([depth, 0.0 * depth])
-                water = surface_mesh.MeshWater(G, scheme, most, plan, surface_mesh.kerbs_of(mesh, -depth), None)
+                water = surface_mesh.MeshWater(
+                    G, scheme, most, plan, surface_mesh.kerbs_of(mesh, -depth), None
+                )
                 liquid = LiquidScheme(C, 1000.0, None, False, scheme, 0, 0.0, wide)
                 ratios = {
                     "water": greatest_energy(
-                        march_water, surface_mesh, water, (floats, integers), start, given.end, of_water
+                        march_water,
+                        surface_mesh,
+                        water,
+                        (floats, integers),
+                        start,
+                        given.end,
+                        of_water,
                     ),
                     "liquid": greatest_energy(
-                        march_liquid, liquid_mesh, liquid, (bounded, integers), noise, 0.3 * given.end, of_liquid
+                        march_liquid,
+                        liquid_mesh,
+                        liquid,
+                        (bounded, integers),
+                        noise,
+                        0.3 * given.end,
+                        of_liquid,
                     ),
                 }
                 for kind, ratio in ratios.items():
                     worst[f"{kind}, {name}"] = max(worst.get(f"{kind}, {name}", 0.0), ratio)
-            print(f"bed {bed}: {depth.size} cells, greatest energy so far {max(worst.values()):.6f}", flush=True)
+            print(
+                f"bed {bed}: {depth.size} cells, greatest energy so far {max(worst.values()):.6f}",
+                flush=True,
+            )
     for name, ratio in sorted(worst.items()):
         print(f"{name:24s} {ratio:.6f}  {'meets' if ratio <= BAR else 'misses'} the bar of {BAR}")
 

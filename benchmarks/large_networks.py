@@ -41,9 +41,11 @@ NETWORKS = Path(wntr.__file__).parent / "library" / "networks" if wntr else None
 SPEED, GRAVITY = 4720 * 0.3048, 9.80665
 BEGIN, STOP, EVERY = 0.5, 0.2, 0.05  # start and duration of the event, interval of rows [s]
 ENDS = {"Net3": 6.0, "ky4": 4.0}
-FINE, FEW, MORE = 2.5e-3, 1.0, 0.1  # travel time of cells of the reference, and between places of envelopes [s]
+# travel time of cells of the reference, and between places of envelopes [s]
+FINE, FEW, MORE = 2.5e-3, 1.0, 0.1
 TODAY = (0.01, 0.025)  # travel times of cells [s]
-STEPS, PEER = (0.0025, 0.01, 0.0165, 0.02, 0.025, 0.05), (0.0025, 0.01)  # steps of delay lines and of rthym-moc [s]
+# steps of delay lines and of rthym-moc [s]
+STEPS, PEER = (0.0025, 0.01, 0.0165, 0.02, 0.025, 0.05), (0.0025, 0.01)
 ACCURACY = 5e-3  # `delay_tolerance`: half the default, at little cost
 ERROR, THIRTIETH, HUNDREDTH, QUARTER = 1.5e-2, 30.0, 100.0, 4.0
 REPEATS = 5
@@ -63,22 +65,40 @@ class Row:
 
 def town(name, shortest=0.0):
     """Case of an EPANET network that records the heads of all junctions."""
-    table = tomllib.loads(import_network(NETWORKS / f"{name}.inp", wave_speed=SPEED, shortest=shortest).text)
+    table = tomllib.loads(
+        import_network(NETWORKS / f"{name}.inp", wave_speed=SPEED, shortest=shortest).text
+    )
     junctions = [node for node, part in table["nodes"].items() if part["type"] == "junction"]
-    table["output"] = {"every": EVERY, "fields": 0, "probes": [f"nodes.{node}.head" for node in junctions]}
+    table["output"] = {
+        "every": EVERY,
+        "fields": 0,
+        "probes": [f"nodes.{node}.head" for node in junctions],
+    }
     return table
 
 
 def stopped(name, shortest=0.0):
     """Case in which the largest demand stops, and Joukowsky's jump [m]."""
     table = town(name, shortest)
-    drawn = {node: 1e-3 * float(part["demand"].split()[0]) for node, part in table["nodes"].items() if "demand" in part}
+    drawn = {
+        node: 1e-3 * float(part["demand"].split()[0])
+        for node, part in table["nodes"].items()
+        if "demand" in part
+    }
     most = max(drawn, key=drawn.get)
     s = np.linspace(0.0, 1.0, 41)
     left = drawn[most] * (1.0 - s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
-    table["nodes"][most]["demand"] = {"time": (BEGIN + STOP * s).tolist(), "value": left.tolist(), "kind": "smooth"}
+    table["nodes"][most]["demand"] = {
+        "time": (BEGIN + STOP * s).tolist(),
+        "value": left.tolist(),
+        "kind": "smooth",
+    }
     table["numerics"]["end"] = ENDS[name]
-    bores = [p["diameter"] for p in table["links"].values() if p["type"] == "pipe" and most in (p["from"], p["to"])]
+    bores = [
+        p["diameter"]
+        for p in table["links"].values()
+        if p["type"] == "pipe" and most in (p["from"], p["to"])
+    ]
     areas = sum(np.pi / 4 * (1e-3 * float(bore.split()[0])) ** 2 for bore in bores)
     return table, SPEED * drawn[most] / areas / GRAVITY
 
@@ -97,20 +117,30 @@ def solved(table, repeats=None, **numerics):
     The heads are float64[times, nodes] [m].
     """
     case = load({**table, "numerics": table["numerics"] | numerics})
-    model, cpu, whole, repeats = build(case), np.inf, np.inf, REPEATS if repeats is None else repeats
+    model, cpu, whole, repeats = (
+        build(case),
+        np.inf,
+        np.inf,
+        REPEATS if repeats is None else repeats,
+    )
     for turn in range(repeats + 1):  # the first run may compile
         wall, busy = perf_counter(), process_time()
         result = fvsolve.run(model)
         wall, busy = perf_counter() - wall, process_time() - busy
         if turn or not repeats:
-            cpu = min(cpu, result.summary["seconds"] * min(1.0, busy / wall))  # without other processes
+            # without other processes
+            cpu = min(cpu, result.summary["seconds"] * min(1.0, busy / wall))
             whole = min(whole, busy)
     if result.reason != "finished":
         raise SystemExit(f"{case.title}: {result.reason}")
     t, times = np.asarray(result.t), EVERY * np.arange(round(case.numerics.end / EVERY) + 1)
     last = np.append(np.diff(t) > 0.0, True)
     heads = np.array([np.asarray(result[probe])[last] for probe in table["output"]["probes"]]).T
-    return cpu / case.numerics.end, whole / case.numerics.end, heads[np.searchsorted(t[last], times - 1e-9)]
+    return (
+        cpu / case.numerics.end,
+        whole / case.numerics.end,
+        heads[np.searchsorted(t[last], times - 1e-9)],
+    )
 
 
 def bent(table, step):
@@ -127,9 +157,17 @@ def bent(table, step):
 
 def reference(table):
     """Heads with fine cells [m], read from the temporary folder if an earlier run stored them."""
-    numerics = {"scheme": "upwind5", "method": "rk4", "pipe_model": "finite-volume", "cell_time": FINE}
+    numerics = {
+        "scheme": "upwind5",
+        "method": "rk4",
+        "pipe_model": "finite-volume",
+        "cell_time": FINE,
+    }
     said = json.dumps([table, numerics, fvsolve.__version__], sort_keys=True, default=str)
-    kept = Path(tempfile.gettempdir()) / f"fvsolve-reference-{hashlib.sha256(said.encode()).hexdigest()[:16]}.npy"
+    kept = (
+        Path(tempfile.gettempdir())
+        / f"fvsolve-reference-{hashlib.sha256(said.encode()).hexdigest()[:16]}.npy"
+    )
     if not kept.exists():
         np.save(kept, solved(table, 0, **numerics)[2])
     return np.load(kept)
@@ -139,7 +177,9 @@ def peer(name, step, end):
     """CPU time of rthym-moc per simulated second [s]."""
     with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder, chdir(folder):
         warnings.simplefilter("ignore")
-        solver = rthym_moc.load_inp(str(NETWORKS / f"{name}.inp"), stub_length_ft=SPEED / 0.3048 * step)
+        solver = rthym_moc.load_inp(
+            str(NETWORKS / f"{name}.inp"), stub_length_ft=SPEED / 0.3048 * step
+        )
     best = np.inf
     for _ in range(REPEATS):
         begun = process_time()
@@ -157,22 +197,41 @@ def event(name, scene, title):
 
     def row(what, cpu, whole, heads):
         off = (heads - exact) / jump
-        one = found[what] = Row(what, cpu, whole, np.abs(off).max(), np.sqrt((off**2).mean(axis=1)).max())
-        print(f"  {what:40} {cpu:10.3g} {whole:10.3g} {one.greatest:10.2g} {one.rms:10.2g}", flush=True)
+        one = found[what] = Row(
+            what, cpu, whole, np.abs(off).max(), np.sqrt((off**2).mean(axis=1)).max()
+        )
+        print(
+            f"  {what:40} {cpu:10.3g} {whole:10.3g} {one.greatest:10.2g} {one.rms:10.2g}",
+            flush=True,
+        )
         agree(f"greatest error of {what} in jumps", one.greatest, 0.5)
 
     found = {}
     print(f"  {'':40} {'CPU/s [s]':>10} {'whole':>10} {'greatest':>10} {'rms':>10}")
     for time in TODAY:
         coarse = scene(name, shortest=0.25 * SPEED * time)[0]
-        cells = solved(coarse, 2, scheme="upwind5", method="rk4", pipe_model="finite-volume", cell_time=time)
+        cells = solved(
+            coarse, 2, scheme="upwind5", method="rk4", pipe_model="finite-volume", cell_time=time
+        )
         row(today(time), *cells)
     for step in STEPS:
         row(delay(step), *delayed(table, step, FEW))
     row("10 ms, envelopes each 0.1 s of travel", *delayed(table, 0.01, MORE))
     for step in PEER if rthym_moc else ():
-        cut = solved(bent(table, step), 0, scheme="upwind", method="euler", pipe_model="finite-volume", courant=1.0)[2]
-        row(f"rthym-moc, steps of {1e3 * step:g} ms", peer(name, step, table["numerics"]["end"]), np.nan, cut)
+        cut = solved(
+            bent(table, step),
+            0,
+            scheme="upwind",
+            method="euler",
+            pipe_model="finite-volume",
+            courant=1.0,
+        )[2]
+        row(
+            f"rthym-moc, steps of {1e3 * step:g} ms",
+            peer(name, step, table["numerics"]["end"]),
+            np.nan,
+            cut,
+        )
     verdict(found)
 
 
@@ -182,7 +241,13 @@ def delayed(table, step, places, repeats=None):
     Places of envelopes are a travel time of `places` [s] apart.
     """
     return solved(
-        table, repeats, pipe_model="delay-line", method="euler", step=step, cell_time=places, delay_tolerance=ACCURACY
+        table,
+        repeats,
+        pipe_model="delay-line",
+        method="euler",
+        step=step,
+        cell_time=places,
+        delay_tolerance=ACCURACY,
     )
 
 
@@ -221,7 +286,9 @@ def net6():
     begun = process_time()
     build(load(table))
     print(f"\nNet6, 20 s of 10 ms steps: read and built in {process_time() - begun:.2f} s of CPU")
-    print(f"  fvsolve, delay lines {20.0 * delayed(table, 0.01, FEW, repeats=2)[0]:8.2f} s of CPU (goal 1)")
+    print(
+        f"  fvsolve, delay lines {20.0 * delayed(table, 0.01, FEW, repeats=2)[0]:8.2f} s of CPU (goal 1)"
+    )
     if rthym_moc:
         print(f"  rthym-moc            {20.0 * peer('Net6', 0.01, 20.0):8.2f} s")
 
@@ -235,14 +302,22 @@ def lattice(side, lakes=16, pipe_model="delay-line"):
 
     def join(a, b):
         links[f"p{len(links)}"] = {
-            "type": "pipe", "from": a, "to": b, "length": float(rng.uniform(30, 300)), "wave_speed": 1200.0,
+            "type": "pipe",
+            "from": a,
+            "to": b,
+            "length": float(rng.uniform(30, 300)),
+            "wave_speed": 1200.0,
             "diameter": float(rng.choice([0.1, 0.15, 0.2, 0.3, 0.4])),
             "friction": {"model": "hazen-williams", "coefficient": 110.0},
-        }  # fmt: skip
+        }
 
     for i in range(side):
         for j in range(side):
-            nodes[f"n{i}-{j}"] = {"type": "junction", "elevation": float(rng.uniform(0, 20)), "demand": 1e-3}
+            nodes[f"n{i}-{j}"] = {
+                "type": "junction",
+                "elevation": float(rng.uniform(0, 20)),
+                "demand": 1e-3,
+            }
             if j:
                 join(f"n{i}-{j - 1}", f"n{i}-{j}")
             if i:
@@ -255,8 +330,15 @@ def lattice(side, lakes=16, pipe_model="delay-line"):
     numerics = {"end": 10.0, "cell_time": 0.01, "pipe_model": pipe_model}
     output = {"every": EVERY, "fields": 0, "probes": [f"nodes.{middle}.head"]}
     fluid = {"name": "Water", "law": "linear", "temperature": "20 degC"}
-    return {"schema": 1, "title": "streets", "fluid": fluid, "nodes": nodes, "links": links, "numerics": numerics,
-            "output": output}  # fmt: skip
+    return {
+        "schema": 1,
+        "title": "streets",
+        "fluid": fluid,
+        "nodes": nodes,
+        "links": links,
+        "numerics": numerics,
+        "output": output,
+    }
 
 
 def grid():
@@ -269,7 +351,11 @@ def grid():
             spent = []
             for _ in range(min(4, REPEATS)):
                 before = children()
-                subprocess.run([sys.executable, "-m", "fvsolve", "check", str(file)], check=True, capture_output=True)
+                subprocess.run(
+                    [sys.executable, "-m", "fvsolve", "check", str(file)],
+                    check=True,
+                    capture_output=True,
+                )
                 spent.append(children() - before)
             model, runs = build(case), []
             for _ in range(min(3, REPEATS)):
@@ -277,7 +363,8 @@ def grid():
                 fvsolve.run(model)
                 runs.append(process_time() - begun)
             print(
-                f"  {line:13} check {min(spent):6.2f} s of CPU (goal 2), run {min(runs):7.3f} s (goal 10)", flush=True
+                f"  {line:13} check {min(spent):6.2f} s of CPU (goal 2), run {min(runs):7.3f} s (goal 10)",
+                flush=True,
             )
 
 
@@ -303,7 +390,9 @@ def main():
     global ENDS, FINE, TODAY, STEPS, PEER, REPEATS, SIDE, LINES
     options = parser(__doc__)
     options.add_argument(
-        "what", nargs="*", help=f"tables: {', '.join(SCENES)} (default all, with --quick net3 and grid)"
+        "what",
+        nargs="*",
+        help=f"tables: {', '.join(SCENES)} (default all, with --quick net3 and grid)",
     )
     given = options.parse_args()
     if given.quick:

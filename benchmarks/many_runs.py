@@ -17,13 +17,25 @@ from fvsolve.studies.sweep_batches import BatchedRows
 from fvsolve.studies.sweep_row import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
-CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
-LINE = {"links.main.cells": 20, "numerics.pipe_model": "delay-line", "numerics.method": "euler", "output.fields": 0}
-DELAYS = (0.01, 0.05)  # steps of delay lines [s]; the errors of the second are near those of 20 cells
+CELLS = {
+    "links.main.cells": 20,
+    "numerics.scheme": "upwind5",
+    "numerics.method": "rk4",
+    "output.fields": 0,
+}
+LINE = {
+    "links.main.cells": 20,
+    "numerics.pipe_model": "delay-line",
+    "numerics.method": "euler",
+    "output.fields": 0,
+}
+# steps of delay lines [s]; the errors of the second are near those of 20 cells
+DELAYS = (0.01, 0.05)
 LIMITS = {  # of closures
-    "limits.high": {"on": "pipes", "maximum": "16 barg"}, "limits.low": {"on": "pipes", "minimum": "vacuum"},
+    "limits.high": {"on": "pipes", "maximum": "16 barg"},
+    "limits.low": {"on": "pipes", "minimum": "vacuum"},
     "limits.gate": {"on": "gate", "quantity": "head", "maximum": "90 m"},
-}  # fmt: skip
+}
 FINE, PROBE = 2000, "gate.pressure"  # cells of the reference run, and probe of the errors
 TIMES, RUNS, REPEATS = 200, 2000, 20
 
@@ -63,7 +75,10 @@ def cost_in_batches(base: dict, values=area) -> float:
 def told(name: str, seconds: float, goal: float | None = None) -> None:
     """Print a line of the table."""
     wanted = "" if goal is None else f"  (goal {goal:.0f})"
-    print(f"{name:44} {1e3 * seconds:8.2f} ms {1.0 / seconds:8.0f} a second and core{wanted}", flush=True)
+    print(
+        f"{name:44} {1e3 * seconds:8.2f} ms {1.0 / seconds:8.0f} a second and core{wanted}",
+        flush=True,
+    )
 
 
 def errors(result, fine) -> tuple[float, float]:
@@ -77,11 +92,15 @@ def by(base: dict, name: str, goal: float | None, fine) -> None:
     """Print the cost of each way to run a scenario with these overrides."""
     model, rows = build(load(CASE, base)), RowMaker(CASE, base)
     result = min((run(model) for _ in range(REPEATS)), key=lambda one: one.summary["seconds"])
-    fresh, varied = (one.si(PROBE) for one in (run(CASE, base | area(0)), run(vary(model, area(0)))))
+    fresh, varied = (
+        one.si(PROBE) for one in (run(CASE, base | area(0)), run(vary(model, area(0))))
+    )
     agree("a fresh run beside one in place [Pa]", np.abs(fresh - varied).max(), 1e-3)
     steps, seconds = result.summary["steps"], result.summary["seconds"]
     off = " and ".join(f"{one:.1e}" for one in errors(result, fine))
-    print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them; error of the jump, rms and of the peak: {off}")
+    print(
+        f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them; error of the jump, rms and of the peak: {off}"
+    )
     told("  fresh: run(case, set)", cost(lambda values: run(CASE, base | values)))
     told("  in place: run(vary(model, set))", cost(lambda values: run(vary(model, values))))
     told("  of which vary(model, set)", cost(lambda values: vary(model, values)))
@@ -137,7 +156,12 @@ def main() -> None:
     fine = run(build(load(CASE, CELLS | {"links.main.cells": FINE})))
     by(CELLS, "20 cells, upwind5 and rk4", GOAL, fine)
     for step in DELAYS:
-        by(LINE | {"numerics.step": step}, f"delay line, steps of {1e3 * step:.0f} ms", 2 * GOAL, fine)
+        by(
+            LINE | {"numerics.step": step},
+            f"delay line, steps of {1e3 * step:.0f} ms",
+            2 * GOAL,
+            fine,
+        )
         closures(step)
 
 

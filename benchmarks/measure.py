@@ -13,7 +13,8 @@ from types import ModuleType
 
 import numpy as np
 
-QUICK, SKIPPED = "a quick run: its figures are no measurement", "rows skipped"  # quick.py reads these
+# quick.py reads these
+QUICK, SKIPPED = "a quick run: its figures are no measurement", "rows skipped"
 SLOW = 2.0  # a longer run is not repeated, and no finer run follows [s]
 
 
@@ -29,7 +30,11 @@ def parser(about: str) -> argparse.ArgumentParser:
     """Parser of a script with the docstring `about`; it has the option `--quick`."""
     made = argparse.ArgumentParser(description=about.splitlines()[0])
     made.add_argument(
-        "--quick", action=Quick, nargs=0, default=False, help="small sizes and few repeats: 5 s if compiled"
+        "--quick",
+        action=Quick,
+        nargs=0,
+        default=False,
+        help="small sizes and few repeats: 5 s if compiled",
     )
     return made
 
@@ -40,7 +45,11 @@ def peer_module(name: str, wheel: str) -> ModuleType | None:
         return import_module(name)
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]
-        how = "is not installed" if missing else f"does not import ({str(error).partition(chr(10))[0]})"
+        how = (
+            "is not installed"
+            if missing
+            else f"does not import ({str(error).partition(chr(10))[0]})"
+        )
         print(f"{wheel} {how}: {SKIPPED}", flush=True)
         return None
 
@@ -84,7 +93,9 @@ def best(function: Callable[[], object], budget: float, most: int = 300) -> floa
     return min(walls)
 
 
-def chart(solvers, settings, distance: Callable, budget: float, rounds: int = 3, enough: float = 0.0) -> dict:
+def chart(
+    solvers, settings, distance: Callable, budget: float, rounds: int = 3, enough: float = 0.0
+) -> dict:
     """Run all solvers at their settings, print the runs, and return them by name of the solver.
 
     settings : sequence for all solvers, or a dict by name; distance : error of a solution
@@ -122,10 +133,16 @@ def first(solver: Solver, setting, distance: Callable) -> Run | str:
 
 def table(name: str, runs: dict[float, Run | str]) -> None:
     """Print the runs of one solver."""
-    print(f"  {name}\n    {'setting':>9} {'error':>9} {'wall ms':>9} {'steps':>7} {'calls of f':>10}")
+    print(
+        f"  {name}\n    {'setting':>9} {'error':>9} {'wall ms':>9} {'steps':>7} {'calls of f':>10}"
+    )
     for setting, r in runs.items():
         label = f"{setting:9.0e}" if setting < 0.1 else f"{setting:9.2f}"
-        told = r if isinstance(r, str) else f"{r.error:9.1e} {r.wall * 1e3:9.3f} {r.steps:7.0f} {r.calls:10.0f}"
+        told = (
+            r
+            if isinstance(r, str)
+            else f"{r.error:9.1e} {r.wall * 1e3:9.3f} {r.steps:7.0f} {r.calls:10.0f}"
+        )
         print(f"    {label} {told}", flush=True)
 
 

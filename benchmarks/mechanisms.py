@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -78,7 +79,12 @@ def rates(bodies: dict):
         for _ in range(calls):
             call_rhs(at, 0.0, y, dydt, out, handle)
 
-    return slate, lambda: rhs(0.0, y, dydt, out, handle), lambda calls: many(calls, y, dydt, out, handle), dydt
+    return (
+        slate,
+        lambda: rhs(0.0, y, dydt, out, handle),
+        lambda calls: many(calls, y, dydt, out, handle),
+        dydt,
+    )
 
 
 def beside(call, peer) -> tuple[float, float]:
@@ -91,18 +97,26 @@ def speed() -> None:
     """Print the times of accelerations of chains."""
     from reference.bodies import pinocchio_of
 
-    print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
+    print(
+        f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}"
+    )
     for many in SIZES:
         bodies = chain(many)
         slate, call, loop, dydt = rates(bodies)
         pin, peer, data, q, v, _ = pinocchio_of(bodies, 9.80665)
         tau = np.zeros(peer.nv)
         loop(10)
-        off = np.abs(dydt[1::2] - pin.aba(peer, data, q, v, tau)).max() / max(np.abs(data.ddq).max(), 10.0)
+        off = np.abs(dydt[1::2] - pin.aba(peer, data, q, v, tau)).max() / max(
+            np.abs(data.ddq).max(), 10.0
+        )
         agree(f"accelerations of {many} bodies beside pinocchio's", off, 1e-11)
         inside = min(taken(lambda: loop(CALLS)) for _ in range(ROUNDS)) / CALLS  # noqa: B023
-        own, peers = beside(lambda: calls(call), lambda: calls(lambda: pin.aba(peer, data, q, v, tau)))  # noqa: B023
-        print(f"{many:6d} {inside:10.2f} {own:12.2f} {peers:20.2f} {inside / peers:13.2f} {own / peers:6.2f}")
+        own, peers = beside(
+            partial(calls, call), partial(calls, partial(pin.aba, peer, data, q, v, tau))
+        )
+        print(
+            f"{many:6d} {inside:10.2f} {own:12.2f} {peers:20.2f} {inside / peers:13.2f} {own / peers:6.2f}"
+        )
 
 
 def solved(case: dict) -> tuple[np.ndarray, float]:
@@ -132,7 +146,9 @@ def chains() -> None:
         mine, other = own(steps)[0], peers_bodies.chain_in_mujoco(steps)[0]
         a, b = beside(lambda: own(steps)[1], lambda: peers_bodies.chain_in_mujoco(steps)[1])  # noqa: B023
         wrong, peers = np.abs(mine - ours).max(), np.abs(other - theirs).max()
-        print(f"{steps:6d} {wrong:9.1e} {1e6 * a / steps:10.2f} {peers:13.1e} {1e6 * b / steps:10.2f} {a / b:17.2f}")
+        print(
+            f"{steps:6d} {wrong:9.1e} {1e6 * a / steps:10.2f} {peers:13.1e} {1e6 * b / steps:10.2f} {a / b:17.2f}"
+        )
     apart = np.abs(ours - theirs).max()
     print(f"both at their finest, {FINEST} steps: angles {apart:.0e} rad apart")
     agree("angles of the chain beside MuJoCo's [rad]", apart, 1e-4)
@@ -147,11 +163,19 @@ def arms() -> None:
 
     found = [
         at_error(name, solve, *settings)
-        for (name, settings), solve in zip(ARM.items(), (own, peers_bodies.arm_in_exudyn), strict=True)
+        for (name, settings), solve in zip(
+            ARM.items(), (own, peers_bodies.arm_in_exudyn), strict=True
+        )
     ]
     (time, angles), (other, theirs) = found
-    print(f"at {CLOSE:g} rad {1e3 * time:.2f} and {1e3 * other:.2f} ms, ratio {time / other:.2f} (goal 0.2)")
-    agree("angle of the arm at the end beside exudyn's", abs(angles[-1] - theirs[-1]) / np.ptp(angles), 0.1)
+    print(
+        f"at {CLOSE:g} rad {1e3 * time:.2f} and {1e3 * other:.2f} ms, ratio {time / other:.2f} (goal 0.2)"
+    )
+    agree(
+        "angle of the arm at the end beside exudyn's",
+        abs(angles[-1] - theirs[-1]) / np.ptp(angles),
+        0.1,
+    )
 
 
 def at_error(name: str, solve, settings, finest) -> tuple[float, np.ndarray]:
@@ -174,13 +198,20 @@ def compiling() -> None:
     from reference.bodies import bodies, pendulum
     from reference.scenes import scene
 
-    masses = scene({"a": {"type": "mass", "mass": 1.0}, "b": {"type": "frame"}},
-                   {"s": {"type": "spring", "from": "b", "to": "a", "stiffness": 1.0}}, 1.0, {})  # fmt: skip
+    masses = scene(
+        {"a": {"type": "mass", "mass": 1.0}, "b": {"type": "frame"}},
+        {"s": {"type": "spring", "from": "b", "to": "a", "stiffness": 1.0}},
+        1.0,
+        {},
+    )
     for name, case in (("two masses", masses), ("a pendulum", bodies({"arm": pendulum()}, 1.0))):
         with tempfile.TemporaryDirectory() as folder:
             began = perf_counter()
-            subprocess.run([sys.executable, "-c", WHOLE.format(case=case)], check=True,
-                           env=os.environ | {"FVSOLVE_CACHE": folder})  # fmt: skip
+            subprocess.run(
+                [sys.executable, "-c", WHOLE.format(case=case)],
+                check=True,
+                env=os.environ | {"FVSOLVE_CACHE": folder},
+            )
             print(f"{name}: {perf_counter() - began:.1f} s from an empty cache to the first rates")
 
 
@@ -195,7 +226,9 @@ def main() -> None:
     """Print the selected tables, by default all but `compile`."""
     global SIZES, CALLS, ROUNDS, STEPS, FINEST, ARM
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help=f"tables: {', '.join(TABLES)}, compile (default all but compile)")
+    options.add_argument(
+        "what", nargs="*", help=f"tables: {', '.join(TABLES)}, compile (default all but compile)"
+    )
     given = options.parse_args()
     if given.quick:
         SIZES, CALLS, ROUNDS, STEPS, FINEST = (6,), 100, 1, (500,), 1000

@@ -20,7 +20,13 @@ from fvsolve.core.solve import initial_state
 GOAL = 1.2
 BODY = {"type": "body", "mass": 1e5, "inertia": [1e5, 1e5, 1e5]}
 SWING = {"mean": 0, "amplitude": 0.02, "period": 3.0}
-WATER = {"name": "user", "density": 1e3, "bulk_modulus": 2e9, "viscosity": 1e-3, "vapor_pressure": 2e3}
+WATER = {
+    "name": "user",
+    "density": 1e3,
+    "bulk_modulus": 2e9,
+    "viscosity": 1e-3,
+    "vapor_pressure": 2e3,
+}
 WALL = {"patches": {"lid": {"side": "east", "travel": SWING}}}
 TRAVELS = {"kind": "prismatic", "axis": [1, 0, 0], "travel": SWING}
 TURNS = {"kind": "revolute", "axis": [1, 0, 1], "angle": SWING}
@@ -35,11 +41,23 @@ SCENES = {  # keys of the basin, joint of its body
 
 
 HUMP = "exp(-(x - 5)^2 - (y - 5)^2)"
-LIQUID = {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "start": {"pressure": f"1e6 + 1e5*{HUMP}"}}
+LIQUID = {
+    "physics": "liquid",
+    "pressure": 1e6,
+    "thickness": 1.0,
+    "start": {"pressure": f"1e6 + 1e5*{HUMP}"},
+}
 SURFACE = {"level": 1.0, "start": {"level": f"1 + 0.1*{HUMP}"}}
 
 
-def model_of(cells: int, keys: dict, joint: dict | None, scheme: str, law: str = "", shape: dict | None = None):
+def model_of(
+    cells: int,
+    keys: dict,
+    joint: dict | None,
+    scheme: str,
+    law: str = "",
+    shape: dict | None = None,
+):
     """Model of a square basin with a hump of water, or of a liquid if a law is given.
 
     shape : keys of a mesh in place of a grid
@@ -49,7 +67,14 @@ def model_of(cells: int, keys: dict, joint: dict | None, scheme: str, law: str =
     nodes = {"basin": basin} | ({"body": {**BODY, "joint": joint}} if joint else {})
     numerics = {"end": 1.0, "scheme": scheme}
     return build(
-        load({"schema": 1, "fluid": WATER | ({"law": law} if law else {}), "nodes": nodes, "numerics": numerics})
+        load(
+            {
+                "schema": 1,
+                "fluid": WATER | ({"law": law} if law else {}),
+                "nodes": nodes,
+                "numerics": numerics,
+            }
+        )
     )
 
 
@@ -73,7 +98,11 @@ def main() -> None:
     quick = parser(__doc__).parse_args().quick
     print(machine("numpy", "numba"))
     rounds, sizes, side = (2, (16,), 16) if quick else (25, (64, 256), 128)
-    few = {name: SCENES[name] for name in ("stands still", "wall along x moves", "body is free")} if quick else SCENES
+    few = (
+        {name: SCENES[name] for name in ("stands still", "wall along x moves", "body is free")}
+        if quick
+        else SCENES
+    )
     for scheme in ("muscl",) if quick else ("upwind", "muscl", "upwind5"):
         for cells in sizes:
             table(f"{scheme}, {cells} x {cells} cells", few, rounds, cells, scheme)

@@ -57,9 +57,13 @@ def main() -> None:
     tanks = wntr.network.WaterNetworkModel(str(NET)).tank_name_list
     known = toolkit_run.run(NET, tanks, [], STEP, DAY)
     epanet = time.process_time() - began
-    apart = max(np.abs(day[f"nodes.{tank}.level"] - known.level(tank, day.t)).max() for tank in tanks)
+    apart = max(
+        np.abs(day[f"nodes.{tank}.level"] - known.level(tank, day.t)).max() for tank in tanks
+    )
     print(f"{days} days: {result.reason}, {result.summary['steps']} steps, {spent:.1f} s of CPU")
-    print(f"EPANET, step {STEP} s: {epanet:.2f} s for a day, so {epanet * days:.0f} s; levels differ by {apart:.2g} m")
+    print(
+        f"EPANET, step {STEP} s: {epanet:.2f} s for a day, so {epanet * days:.0f} s; levels differ by {apart:.2g} m"
+    )
 
 
 if __name__ == "__main__":

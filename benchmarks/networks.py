@@ -56,10 +56,16 @@ def demand(network, closure):
     if closure.kind == "instant":
         return {"time": [0.0, closure.start], "value": [network.flow, 0.0], "kind": "step"}
     times = np.linspace(closure.begin, closure.finish, 513)  # interpolation error 3e-7 of the flow
-    return {"time": times.tolist(), "value": (network.flow * closure.open(times)).tolist(), "kind": "smooth"}
+    return {
+        "time": times.tolist(),
+        "value": (network.flow * closure.open(times)).tolist(),
+        "kind": "smooth",
+    }
 
 
-def case(network, closure, cell_time, every, scheme="upwind5", method="rk4", courant=0.9, **numerics):
+def case(
+    network, closure, cell_time, every, scheme="upwind5", method="rk4", courant=0.9, **numerics
+):
     """Case of a network with cells of about `cell_time` [s] of travel and rows each `every` [s]."""
     nodes = {p: {"type": "junction"} for pipe in network.pipes for p in (pipe.from_, pipe.to)}
     nodes |= {name: {"type": "reservoir", "head": network.head} for name in network.reservoirs}
@@ -84,7 +90,13 @@ def case(network, closure, cell_time, every, scheme="upwind5", method="rk4", cou
         "fluid": dict(WATER),
         "nodes": nodes,
         "links": links,
-        "numerics": {"end": network.end, "scheme": scheme, "method": method, "courant": courant, **numerics},
+        "numerics": {
+            "end": network.end,
+            "scheme": scheme,
+            "method": method,
+            "courant": courant,
+            **numerics,
+        },
         "output": {"every": every, "fields": 0, "probes": [f"{p}.head" for p in network.probes]},
     }
 

@@ -43,17 +43,29 @@ class Row(NamedTuple):
 
 def rows_of(name: str, said: dict, fine: dict) -> list[Row]:
     """Rows of the peaks and expectations of a case and of a finer run."""
-    rows = [Row(f"{name} {side} {probe}", peak[side]["error"], peak[side]["value"], fine["extremes"][probe][side])
-            for probe, peak in said["peaks"].items() for side in SIDES]  # fmt: skip
-    return rows + [Row(f"{name} {one['text']}", one["error"], one["found"], other["found"])
-                   for one, other in zip(said["expectations"], fine["expectations"], strict=True)]  # fmt: skip
+    rows = [
+        Row(
+            f"{name} {side} {probe}",
+            peak[side]["error"],
+            peak[side]["value"],
+            fine["extremes"][probe][side],
+        )
+        for probe, peak in said["peaks"].items()
+        for side in SIDES
+    ]
+    return rows + [
+        Row(f"{name} {one['text']}", one["error"], one["found"], other["found"])
+        for one, other in zip(said["expectations"], fine["expectations"], strict=True)
+    ]
 
 
 def of_shipped(name: str) -> list[Row]:
     case = load(name)
     times = 2.0 if case.meshes else 4.0
     said = peak_errors(run(case, set=QUIET), case)
-    fine = run(case, set=refined_keys(case, times) | QUIET | {"output.every": case.output.every / times}).summary
+    fine = run(
+        case, set=refined_keys(case, times) | QUIET | {"output.every": case.output.every / times}
+    ).summary
     return rows_of(name, said, fine)
 
 
@@ -63,12 +75,22 @@ def of_main(seed: int) -> tuple[list[Row], list[Row], list[str]]:
     parts = {name: whole(run(case, pictures=False), name) for name in ("end", "j", "a", "b")}
     case = load(random_main(seed) | {"limits": limits_near(parts, seed)})
     said = peak_errors(run(case, pictures=False), case)
-    fine = run(case, set=refined_keys(case, 8.0) | {"output.every": case.output.every / 8.0}, pictures=False).summary
+    fine = run(
+        case,
+        set=refined_keys(case, 8.0) | {"output.every": case.output.every / 8.0},
+        pictures=False,
+    ).summary
     limits = list(zip(said["verdicts"], fine["verdicts"], strict=True))
-    rows = [Row(f"{seed} {one['name']}", one["error"], one["value"], other["value"]) for one, other in limits]
-    turned = [f"{seed} {one['name']}: {one['state']}, margin {one['margin']:.4g} within {one['error']}, "
-              f"by the finer run {other['margin']:.4g}"
-              for one, other in limits if one["state"] == "holds" and other["margin"] < 0.0]  # fmt: skip
+    rows = [
+        Row(f"{seed} {one['name']}", one["error"], one["value"], other["value"])
+        for one, other in limits
+    ]
+    turned = [
+        f"{seed} {one['name']}: {one['state']}, margin {one['margin']:.4g} within {one['error']}, "
+        f"by the finer run {other['margin']:.4g}"
+        for one, other in limits
+        if one["state"] == "holds" and other["margin"] < 0.0
+    ]
     return rows_of(str(seed), said, fine), rows, turned
 
 
@@ -88,9 +110,13 @@ def tell(rows: list[Row], what: str) -> int:
     for row in misses:
         print(f"outside: {row.name}: off by {row.off:.3g}, band {row.band:.3g} of {row.value:.4g}")
     wide = [row.band / row.off for row in known if row.off > RELATIVE_FLOOR * abs(row.value)]
-    quarters = " ".join(f"{one:.3g}" for one in np.quantile(wide, [0.25, 0.5, 0.75])) if wide else "-"
+    quarters = (
+        " ".join(f"{one:.3g}" for one in np.quantile(wide, [0.25, 0.5, 0.75])) if wide else "-"
+    )
     share = 100.0 * len(misses) / max(len(known), 1)
-    print(f"{what}: {len(rows)}, {len(rows) - len(known)} without a band, {len(misses)} outside ({share:.2g} %)")
+    print(
+        f"{what}: {len(rows)}, {len(rows) - len(known)} without a band, {len(misses)} outside ({share:.2g} %)"
+    )
     print(f"  band over difference, quarters and median: {quarters}")
     return len(misses)
 
@@ -99,7 +125,11 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("cases", nargs="*", metavar="CASE", help="shipped cases (default all)")
     options.add_argument(
-        "--random", type=int, default=0, metavar="N", help="number of random mains in place of the cases (default 0)"
+        "--random",
+        type=int,
+        default=0,
+        metavar="N",
+        help="number of random mains in place of the cases (default 0)",
     )
     options.add_argument("--seed", type=int, default=0, help="seed of the first main (default 0)")
     asked, began, outside = options.parse_args(), time.process_time(), 0
@@ -117,7 +147,10 @@ def main() -> None:
         print(f"verdicts turned: {len(turned)}", *turned, sep="\n  ")
     if asked.cases or not asked.random:
         names = asked.cases or list(shipped.names())
-        outside += tell([row for name in names for row in of_shipped(name)], f"peaks and claims of {len(names)} cases")
+        outside += tell(
+            [row for name in names for row in of_shipped(name)],
+            f"peaks and claims of {len(names)} cases",
+        )
     print(f"{time.process_time() - began:.0f} s of processor time")
     if asked.quick:
         agree("peaks, limits and claims outside their band", outside, 0)

@@ -64,9 +64,13 @@ def network_solver(network, closure, dt, flows):
     solver = rthym_moc.MOCSolver()
     for name in dict.fromkeys(end for p in network.pipes for end in (p.from_, p.to)):
         kind = "PressureBoundary" if name in network.reservoirs else "Junction"
-        solver.add_node(node(name, kind, network.head, network.flow if name == network.gate else 0.0))
+        solver.add_node(
+            node(name, kind, network.head, network.flow if name == network.gate else 0.0)
+        )
     for p in network.pipes:
-        solver.add_pipe(pipe(p.name, p.from_, p.to, p.length, p.diameter, p.wave_speed, flows[p.name]))
+        solver.add_pipe(
+            pipe(p.name, p.from_, p.to, p.length, p.diameter, p.wave_speed, flows[p.name])
+        )
     times = np.arange(int(closure.finish / dt) + 4) * dt
     demand = network.flow * closure.open(times) / GPM
     solver.set_demand_schedule(network.gate, np.column_stack([times - dt, demand]).tolist())
@@ -93,7 +97,8 @@ def heads(network, closure, dt, repeats=1):
     solver = network_solver(faint, closure, dt, steady_flows(faint))
     cpu, results = timed(solver, network.end, dt, repeats)
     found = {
-        p: network.head + (np.asarray(results["node_head"][p]) * FOOT - network.head) / FAINT for p in network.probes
+        p: network.head + (np.asarray(results["node_head"][p]) * FOOT - network.head) / FAINT
+        for p in network.probes
     }
     return cpu, np.asarray(results["time"]), found
 
@@ -124,7 +129,9 @@ def uniform_pipe(uniform, nodes, steps, repeats=1, friction=None):
     solver = rthym_moc.MOCSolver()
     solver.add_node(node("lake", "PressureBoundary", uniform.head))
     solver.add_node(node("gate", "Junction", uniform.head, uniform.flow))
-    p = pipe("main", "lake", "gate", uniform.length, uniform.diameter, uniform.wave_speed, uniform.flow)
+    p = pipe(
+        "main", "lake", "gate", uniform.length, uniform.diameter, uniform.wave_speed, uniform.flow
+    )
     p.roughness = hazen_williams(uniform)
     solver.add_pipe(p)
     shut = [(-dt, uniform.flow / GPM), (uniform.duration - dt, 0.0)]

@@ -13,10 +13,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 LINK = {"length": 1.0, "mass": 1.0, "across": 1.0 / 12.0, "along": 1e-3}
 CHAIN, CHAIN_END, GRAVITY = (1.2, 0.5, -0.4), 5.0, 9.80665  # [rad], [s]
 ARM_END, ROWS = 1.0, 200
-MASS, LONG, SWUNG = 120.0, 1.0, 120.0 / 12.0  # arm: mass [kg], length [m], moment of inertia about its centre [kg m2]
+# arm: mass [kg], length [m], moment of inertia about its centre [kg m2]
+MASS, LONG, SWUNG = 120.0, 1.0, 120.0 / 12.0
 FOOT, EYE = -0.25, 0.25  # ends of the cylinder: below the pivot, and along the arm [m]
 AREAS, DEAD, STROKE, BETA = (1e-3, 6e-4), (2e-4, 2e-4), 0.2, 1.2e9
-SUPPLY, RETURN, BACK = 2e7, 1e5, 6e5  # gauge pressures of the pump, of the tank, and of chamber B at the start [Pa]
+# gauge pressures of the pump, of the tank, and of chamber B at the start [Pa]
+SUPPLY, RETURN, BACK = 2e7, 1e5, 6e5
 FLOW = 1e-4 / np.sqrt(1e5) * 0.1  # coefficient of an open edge of the valve [m3/s/Pa^(1/2)]
 RHO, CD = 870.0, 0.61
 OPENS = ((0.1, 0.0), (0.12, 1.0), (0.5, 1.0), (0.52, 0.0))
@@ -47,7 +49,9 @@ def chain_in_mujoco(steps: int) -> tuple[np.ndarray, float]:
         '<body pos="0 0 {z}"><joint type="hinge" axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1" '
         f'diaginertia="{LINK["across"]!r} {LINK["across"]!r} {LINK["along"]!r}"/>'
     )
-    rods = "".join(rod.format(z=0 if k == 0 else -1) for k in range(len(CHAIN))) + "</body>" * len(CHAIN)
+    rods = "".join(rod.format(z=0 if k == 0 else -1) for k in range(len(CHAIN))) + "</body>" * len(
+        CHAIN
+    )
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="{CHAIN_END / steps!r}" integrator="RK4" gravity="0 0 {-GRAVITY}">'
         f'<flag contact="disable" constraint="disable"/></option><worldbody>{rods}</worldbody></mujoco>'
@@ -72,23 +76,46 @@ def arm_case(rtol: float) -> dict:
 
     hinge = {"kind": "revolute", "axis": [0, -1, 0]}
     nodes = {
-        "arm": body(MASS, [1.0, SWUNG, SWUNG], hinge, centre_of_mass=[LONG / 2, 0, 0], points={"eye": [EYE, 0, 0]}),
+        "arm": body(
+            MASS,
+            [1.0, SWUNG, SWUNG],
+            hinge,
+            centre_of_mass=[LONG / 2, 0, 0],
+            points={"eye": [EYE, 0, 0]},
+        ),
         "ground": {"type": "frame", "points": {"foot": [0, 0, FOOT]}},
-        "pump": reservoir(AMBIENT + SUPPLY), "tank": reservoir(AMBIENT + RETURN),
-    }  # fmt: skip
+        "pump": reservoir(AMBIENT + SUPPLY),
+        "tank": reservoir(AMBIENT + RETURN),
+    }
     lift = {
-        "type": "cylinder", "ports": {"case": "ground.foot", "rod": "arm.eye"}, "stroke": STROKE,
-        "closed_length": float(np.hypot(EYE, FOOT)), "area_A": AREAS[0], "area_B": AREAS[1],
-        "dead_volume_A": DEAD[0], "dead_volume_B": DEAD[1],
-        "initial_pressure_A": AMBIENT + held(), "initial_pressure_B": AMBIENT + BACK,
-    }  # fmt: skip
+        "type": "cylinder",
+        "ports": {"case": "ground.foot", "rod": "arm.eye"},
+        "stroke": STROKE,
+        "closed_length": float(np.hypot(EYE, FOOT)),
+        "area_A": AREAS[0],
+        "area_B": AREAS[1],
+        "dead_volume_A": DEAD[0],
+        "dead_volume_B": DEAD[1],
+        "initial_pressure_A": AMBIENT + held(),
+        "initial_pressure_B": AMBIENT + BACK,
+    }
     spool = {
-        "type": "spool-valve", "ports": {"P": "pump", "T": "tank", "A": "lift.A", "B": "lift.B"},
-        "discharge_coefficient": CD, "area": float(FLOW / CD * np.sqrt(RHO / 2.0)),
+        "type": "spool-valve",
+        "ports": {"P": "pump", "T": "tank", "A": "lift.A", "B": "lift.B"},
+        "discharge_coefficient": CD,
+        "area": float(FLOW / CD * np.sqrt(RHO / 2.0)),
         "position": {"time": [t for t, _ in OPENS], "value": [x for _, x in OPENS]},
-    }  # fmt: skip
-    oil = {"name": "user", "density": RHO, "bulk_modulus": BETA, "viscosity": 0.028, "vapor_pressure": 100.0}
-    case = bodies(nodes, ARM_END, ["arm.angle"], {"lift": lift, "spool": spool}, ARM_END / ROWS, rtol=rtol)
+    }
+    oil = {
+        "name": "user",
+        "density": RHO,
+        "bulk_modulus": BETA,
+        "viscosity": 0.028,
+        "vapor_pressure": 100.0,
+    }
+    case = bodies(
+        nodes, ARM_END, ["arm.angle"], {"lift": lift, "spool": spool}, ARM_END / ROWS, rtol=rtol
+    )
     case["output"]["fields"] = 0
     return case | {"fluid": oil}
 
@@ -104,26 +131,45 @@ def arm_in_exudyn(steps: int) -> tuple[np.ndarray, float]:
     warnings.simplefilter("ignore", DeprecationWarning)
     system, spent = exu.SystemContainer().AddSystem(), [0.0]
     node = system.AddNode(make.Rigid2D(referenceCoordinates=[LONG / 2, 0, 0]))
-    arm = system.AddObject(make.RigidBody2D(physicsMass=MASS, physicsInertia=SWUNG, nodeNumber=node))
+    arm = system.AddObject(
+        make.RigidBody2D(physicsMass=MASS, physicsInertia=SWUNG, nodeNumber=node)
+    )
     ground = system.AddObject(make.ObjectGround())
 
     def marker(body, x, y):
         return system.AddMarker(make.MarkerBodyPosition(bodyNumber=body, localPosition=[x, y, 0]))
 
-    system.AddObject(make.RevoluteJoint2D(markerNumbers=[marker(ground, 0, 0), marker(arm, -LONG / 2, 0)]))
+    system.AddObject(
+        make.RevoluteJoint2D(markerNumbers=[marker(ground, 0, 0), marker(arm, -LONG / 2, 0)])
+    )
     system.AddLoad(make.Force(markerNumber=marker(arm, 0, 0), loadVector=[0, -MASS * GRAVITY, 0]))
     oil = system.AddNode(
         make.NodeGenericODE1(
-            referenceCoordinates=[0, 0], initialCoordinates=[held(), BACK], numberOfODE1Coordinates=2
+            referenceCoordinates=[0, 0],
+            initialCoordinates=[held(), BACK],
+            numberOfODE1Coordinates=2,
         )
-    )  # fmt: skip
-    lift = system.AddObject(make.HydraulicActuatorSimple(
-        markerNumbers=[marker(ground, 0, FOOT), marker(arm, EYE - LONG / 2, 0)], nodeNumbers=[oil],
-        offsetLength=np.hypot(EYE, FOOT), strokeLength=STROKE, chamberCrossSection0=AREAS[0],
-        chamberCrossSection1=AREAS[1], hoseVolume0=DEAD[0], hoseVolume1=DEAD[1], valveOpening0=0,
-        valveOpening1=0, actuatorDamping=0, oilBulkModulus=BETA, nominalFlow=FLOW, systemPressure=SUPPLY,
-        tankPressure=RETURN, useChamberVolumeChange=True,
-    ))  # fmt: skip
+    )
+    lift = system.AddObject(
+        make.HydraulicActuatorSimple(
+            markerNumbers=[marker(ground, 0, FOOT), marker(arm, EYE - LONG / 2, 0)],
+            nodeNumbers=[oil],
+            offsetLength=np.hypot(EYE, FOOT),
+            strokeLength=STROKE,
+            chamberCrossSection0=AREAS[0],
+            chamberCrossSection1=AREAS[1],
+            hoseVolume0=DEAD[0],
+            hoseVolume1=DEAD[1],
+            valveOpening0=0,
+            valveOpening1=0,
+            actuatorDamping=0,
+            oilBulkModulus=BETA,
+            nominalFlow=FLOW,
+            systemPressure=SUPPLY,
+            tankPressure=RETURN,
+            useChamberVolumeChange=True,
+        )
+    )
 
     def turn_valve(system, t):
         began = process_time()
@@ -135,7 +181,9 @@ def arm_in_exudyn(steps: int) -> tuple[np.ndarray, float]:
 
     system.SetPreStepUserFunction(turn_valve)
     angle = exu.OutputVariableType.Coordinates
-    sensor = system.AddSensor(make.SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=angle))
+    sensor = system.AddSensor(
+        make.SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=angle)
+    )
     system.Assemble()
     settings = exu.SimulationSettings()
     settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, ARM_END

@@ -29,7 +29,8 @@ SHORTEST = 2.5e-3 * SPEED  # shortest pipe with cells [m]
 
 def rthym(dt):
     """CPU time [s], greatest and median drift of a head [m], and number of rows of rthym-moc."""
-    with warnings.catch_warnings(), TemporaryDirectory() as folder, chdir(folder):  # rthym-moc writes temp.inp and more
+    # rthym-moc writes temp.inp and more
+    with warnings.catch_warnings(), TemporaryDirectory() as folder, chdir(folder):
         warnings.simplefilter("ignore")
         solver = rthym_moc.load_inp(str(NET), stub_length_ft=4720 * dt)
     best = np.inf
@@ -37,7 +38,9 @@ def rthym(dt):
         start = process_time()
         found = solver.run(END, dt)
         best = min(best, process_time() - start)
-    heads = [np.asarray(head) for name, head in found["node_head"].items() if not name.startswith("_")]
+    heads = [
+        np.asarray(head) for name, head in found["node_head"].items() if not name.startswith("_")
+    ]
     drift = np.array([np.max(np.abs(head - head[0])) for head in heads]) * 0.3048
     return best, drift.max(), np.median(drift), len(found["time"])
 
@@ -47,7 +50,11 @@ def ours(shortest, **numerics):
     table = tomllib.loads(import_network(NET, wave_speed=SPEED, shortest=shortest).text)
     table["numerics"] |= {"end": END, **numerics}
     names = [name for name, node in table["nodes"].items() if node["type"] == "junction"]
-    table["output"] = {"every": 0.5, "fields": 0, "probes": [f"nodes.{name}.head" for name in names]}
+    table["output"] = {
+        "every": 0.5,
+        "fields": 0,
+        "probes": [f"nodes.{name}.head" for name in names],
+    }
     model = build(load(table))
     best = np.inf
     fvsolve.run(model)
@@ -55,7 +62,9 @@ def ours(shortest, **numerics):
         start = process_time()
         result = fvsolve.run(model)
         best = min(best, process_time() - start)
-    drift = np.array([np.max(np.abs(result[probe] - result[probe][0])) for probe in table["output"]["probes"]])
+    drift = np.array(
+        [np.max(np.abs(result[probe] - result[probe][0])) for probe in table["output"]["probes"]]
+    )
     return best, drift.max(), np.median(drift), result.summary["steps"], model.cells
 
 
@@ -64,7 +73,9 @@ def row(name, cpu, most, median, steps, cells=""):
 
     Drifts of fvsolve are millimetres, those of rthym-moc hundreds of metres.
     """
-    print(f"{name:36} {1e3 * END / steps:9.3g} {cpu:8.3f} {1e6 * cpu / steps:9.1f} {most:10.2g} {median:10.2g} {cells}")
+    print(
+        f"{name:36} {1e3 * END / steps:9.3g} {cpu:8.3f} {1e6 * cpu / steps:9.1f} {most:10.2g} {median:10.2g} {cells}"
+    )
     agree(f"drift of {name} [m]", most if name.startswith("fvsolve") else 0.0, 0.1)
 
 
@@ -75,10 +86,18 @@ def main():
         END, REPEATS, SETTINGS = 1.0, 1, SETTINGS[:1]
     if not wntr:
         return
-    print(f"{'':36} {'step [ms]':>9} {'CPU [s]':>8} {'us/step':>9} {'drift [m]':>10} {'median':>10} cells")
+    print(
+        f"{'':36} {'step [ms]':>9} {'CPU [s]':>8} {'us/step':>9} {'drift [m]':>10} {'median':>10} cells"
+    )
     for cell_time in (0.02,) if quick else (0.01, 0.02):
         for scheme, method in SETTINGS:
-            found = ours(SHORTEST, pipe_model="finite-volume", cell_time=cell_time, scheme=scheme, method=method)
+            found = ours(
+                SHORTEST,
+                pipe_model="finite-volume",
+                cell_time=cell_time,
+                scheme=scheme,
+                method=method,
+            )
             row(f"fvsolve {scheme} {method}, {1e3 * cell_time:g} ms cells", *found)
         if rthym_moc:
             row("rthym-moc at that step", *rthym(END / found[3]))

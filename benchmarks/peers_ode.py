@@ -15,7 +15,10 @@ from pointer import pointer
 from scipy import sparse
 from scipy.integrate import odeint, solve_ivp
 
-numbalsoda, sundae = peer_module("numbalsoda", "numbalsoda"), peer_module("sksundae.cvode", "scikit-sundae")
+numbalsoda, sundae = (
+    peer_module("numbalsoda", "numbalsoda"),
+    peer_module("sksundae.cvode", "scikit-sundae"),
+)
 MANY = 10**8  # greatest number of steps between two times
 
 
@@ -37,7 +40,11 @@ def peers(problem: Problem, quick: bool) -> list[Solver]:
     if quick:
         return [*numbalsodas(problem, "LSODA"), *cvodes(problem)[:1], scipy_ivp(problem, "Radau")]
     found = [*numbalsodas(problem, "LSODA"), *cvodes(problem)]
-    return found + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")] + [scipy_odeint(problem)]
+    return (
+        found
+        + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")]
+        + [scipy_odeint(problem)]
+    )
 
 
 # numbalsoda ---------------------------------------------------------------------------------------------------
@@ -104,7 +111,12 @@ def cvode_options(problem: Problem) -> dict:
     """Options of BDF with a dense matrix, or with a band if the problem has one."""
     if problem.band is None:
         return {"method": "BDF", "linsolver": "dense"}
-    return {"method": "BDF", "linsolver": "band", "lband": problem.band[0], "uband": problem.band[1]}
+    return {
+        "method": "BDF",
+        "linsolver": "band",
+        "lband": problem.band[0],
+        "uband": problem.band[1],
+    }
 
 
 def cvode(problem: Problem, name: str, options: dict) -> Solver:
@@ -171,7 +183,11 @@ def scipy_ivp(problem: Problem, method: str) -> Solver:
         options = {"lband": problem.band[0], "uband": problem.band[1]}
     elif problem.band and method in ("Radau", "BDF"):
         n, (low, up) = problem.y0.size, problem.band
-        options = {"jac_sparsity": sparse.diags([np.ones(n)] * (low + up + 1), range(-low, up + 1), shape=(n, n))}
+        options = {
+            "jac_sparsity": sparse.diags(
+                [np.ones(n)] * (low + up + 1), range(-low, up + 1), shape=(n, n)
+            )
+        }
     span = problem.t[[0, -1]]
     run = partial(solve_ivp, function, span, problem.y0, method, **options)
 
@@ -188,7 +204,9 @@ def scipy_ivp(problem: Problem, method: str) -> Solver:
 def scipy_odeint(problem: Problem) -> Solver:
     """Solver LSODA by odeint, without solve_ivp's Python code between steps."""
     options = {"ml": problem.band[0], "mu": problem.band[1]} if problem.band else {}
-    run = partial(odeint, returning(problem), problem.y0, problem.t, tfirst=True, mxstep=10**6, **options)
+    run = partial(
+        odeint, returning(problem), problem.y0, problem.t, tfirst=True, mxstep=10**6, **options
+    )
 
     def solve(tolerance):
         return run(rtol=tolerance, atol=tolerance)

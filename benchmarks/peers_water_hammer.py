@@ -34,7 +34,8 @@ UPWIND5 = dict(scheme="upwind5", method="rk4", courant=0.9)
 UPWIND = dict(scheme="upwind", method="euler", courant=1.0)
 MUSCL = dict(scheme="muscl", limiter="van-leer", method="ssp-rk3", courant=0.9)
 DELAY = [
-    dict(pipe_model="delay-line", method="euler", courant=1.0, delay_tolerance=share) for share in (1e-2, 2e-2, 5e-2)
+    dict(pipe_model="delay-line", method="euler", courant=1.0, delay_tolerance=share)
+    for share in (1e-2, 2e-2, 5e-2)
 ]
 SCHEMES = {  # closure: (numerics, cell times [s]), the best pair and one for comparison
     "smooth": ((UPWIND5, 0.04 / 2 ** (0.5 * np.arange(8))), (UPWIND, 0.01 / 2.0 ** np.arange(5))),
@@ -43,7 +44,9 @@ SCHEMES = {  # closure: (numerics, cell times [s]), the best pair and one for co
 }
 LINES = 0.16 / 2.0 ** np.arange(6)  # steps of delay lines [s]
 for closure in SCHEMES:
-    SCHEMES[closure] += tuple((numerics, LINES) for numerics in (DELAY if closure == "instant" else DELAY[:1]))
+    SCHEMES[closure] += tuple(
+        (numerics, LINES) for numerics in (DELAY if closure == "instant" else DELAY[:1])
+    )
 
 
 @dataclass
@@ -65,10 +68,12 @@ def solved(case, repeats):
         wall, busy = perf_counter(), process_time()
         result = fvsolve.run(case)
         wall, busy = perf_counter() - wall, process_time() - busy
-        if result.reason != "finished":  # not `ok`: with friction upwind grows at Courant 1, at an equal rate
+        # not `ok`: with friction upwind grows at Courant 1, at an equal rate
+        if result.reason != "finished":
             raise SystemExit(f"{case['title']}: {result.reason}")
         whole = min(whole, busy)
-        stepping = result.summary["seconds"] * min(1.0, busy / wall)  # without the time of other processes on this core
+        # without the time of other processes on this core
+        stepping = result.summary["seconds"] * min(1.0, busy / wall)
         if stepping < cpu:
             best, cpu = result, stepping
     return best, cpu, whole
@@ -80,16 +85,24 @@ def by_cells(network, closure, response, cell_time, **numerics):
     result, cpu, whole = solved(case, REPEATS if cell_time > 1e-3 else 3)
     last = np.append(np.diff(result.t) > 0, True)  # the row after a jump
     exact = exact_heads(network, closure, result.t[last], response)
-    found = np.array([np.abs(result[f"{p}.head"][last] - exact[p]) for p in network.probes]) / network.jump
+    found = (
+        np.array([np.abs(result[f"{p}.head"][last] - exact[p]) for p in network.probes])
+        / network.jump
+    )
     return Run(cell_time, result.summary["cells"], cpu, found.max(), found.mean(), whole)
 
 
 def by_characteristics(network, closure, response, dt):
     """Run of rthym-moc with steps of dt [s]."""
-    cpu, times, heads = peer_moc.heads(network, closure, dt, repeats=min(5, REPEATS) if dt > 4e-4 else 1)
+    cpu, times, heads = peer_moc.heads(
+        network, closure, dt, repeats=min(5, REPEATS) if dt > 4e-4 else 1
+    )
     stride = max(1, round(EVERY / dt))
     exact = exact_heads(network, closure, times[stride - 1 :: stride], response)
-    found = np.array([np.abs(heads[p][stride - 1 :: stride] - exact[p]) for p in network.probes]) / network.jump
+    found = (
+        np.array([np.abs(heads[p][stride - 1 :: stride] - exact[p]) for p in network.probes])
+        / network.jump
+    )
     cells = sum(max(1, round(p.travel / dt)) for p in network.pipes)
     return Run(dt, cells, cpu, found.max(), found.mean())
 
@@ -121,8 +134,12 @@ def verdict(name, own, peer):
     for target, goal in GOALS[name]:
         print(f"  error {target:.0e}, goal {goal}:")
         for title, ours, theirs in zip(("halved", "picked to fit"), own, peer, strict=True):
-            (a, how), (b, mark) = (price([(r.cpu, error(r)) for r in runs], target) for runs in (ours, theirs))
-            row = f"fvsolve {how or ' '}{a * 1e3:9.2f} ms, rthym-moc {mark or ' '}{b * 1e3:11.1f} ms"
+            (a, how), (b, mark) = (
+                price([(r.cpu, error(r)) for r in runs], target) for runs in (ours, theirs)
+            )
+            row = (
+                f"fvsolve {how or ' '}{a * 1e3:9.2f} ms, rthym-moc {mark or ' '}{b * 1e3:11.1f} ms"
+            )
             print(f"    {title:>13}: {row}, {b / a:9.1f} times less")
 
 
@@ -137,15 +154,26 @@ def network_table(network):
     for name, closure in CLOSURES.items():
         print(f"\n {network.name} pipes, {name} closure")
         theirs, ours = [[], []], [[], []]
-        for k, title in enumerate(("halved", f"picked within a factor {2**0.5:.1f} to fit the pipes best")):
+        for k, title in enumerate(
+            ("halved", f"picked within a factor {2**0.5:.1f} to fit the pipes best")
+        ):
             steps = [fitting_step(network, t) if k else t for t in PEER_STEPS[network.name] if peer]
-            theirs[k] = [by_characteristics(network, closure, response, t) for t in dict.fromkeys(steps)]
+            theirs[k] = [
+                by_characteristics(network, closure, response, t) for t in dict.fromkeys(steps)
+            ]
             if peer:
                 table(f"rthym-moc, steps {title}", theirs[k], "step")
             for numerics, times in SCHEMES[name]:
                 sizes = [fitting_step(network, t) if k else t for t in times]
-                runs = [by_cells(network, closure, response, t, **numerics) for t in dict.fromkeys(sizes)]
-                table(f"fvsolve, {' '.join(map(str, numerics.values()))}, cells {title}", runs, "cell time")
+                runs = [
+                    by_cells(network, closure, response, t, **numerics)
+                    for t in dict.fromkeys(sizes)
+                ]
+                table(
+                    f"fvsolve, {' '.join(map(str, numerics.values()))}, cells {title}",
+                    runs,
+                    "cell time",
+                )
                 ours[k] += runs
         agree("least of the mean errors [jumps]", min(run.mean for run in sum(ours, [])), 0.02)
         if peer:
@@ -160,14 +188,18 @@ def agreement(network, dt=1e-3):
         by_characteristics(whole, networks.CLOSURES[name], impulse_response(whole), dt).greatest
         for name in ("smooth", "ramp")
     )
-    print(f"  where every length is a whole number of steps, rthym-moc and exact.py differ by {worst:.1e} jumps")
+    print(
+        f"  where every length is a whole number of steps, rthym-moc and exact.py differ by {worst:.1e} jumps"
+    )
     agree("rthym-moc beside exact.py [jumps]", worst, 1e-3)
 
 
 def rate_table():
     """Print the node-steps per second of both programs on one pipe with friction at Courant 1."""
     print("\nOne pipe with friction, Courant 1, unsteady friction off")
-    print(f"  {'nodes':>6} {'steps':>8} {'rthym-moc':>12} {'fvsolve':>12} {'factor':>7} {'difference':>11}")
+    print(
+        f"  {'nodes':>6} {'steps':>8} {'rthym-moc':>12} {'fvsolve':>12} {'factor':>7} {'difference':>11}"
+    )
     for nodes, steps in RATES if peer_moc.rthym_moc else ():
         peer = peer_moc.uniform_pipe(networks.UNIFORM, nodes, steps, repeats=3)
         case = networks.uniform_case(networks.UNIFORM, nodes, steps)
@@ -179,20 +211,29 @@ def rate_table():
         row = f"{nodes:6d} {steps:8d} {theirs / 1e6:8.0f} M/s {ours / 1e6:8.0f} M/s {ours / theirs:7.2f}"
         print(f"  {row} {apart:11.1e}")
         agree("difference of the heads [jumps]", apart, 0.02)
-    print("  goal: 3 times from 1 000 nodes up. difference: mean of the heads at the gate, in jumps.")
+    print(
+        "  goal: 3 times from 1 000 nodes up. difference: mean of the heads at the gate, in jumps."
+    )
 
 
 def main():
     """Print the selected tables."""
     global RATES, REPEATS, CLOSURES, PEER_STEPS, SCHEMES
     options = parser(__doc__)
-    options.add_argument("what", nargs="*", help="tables: rate, three, nine (default all, with --quick rate and three)")
+    options.add_argument(
+        "what",
+        nargs="*",
+        help="tables: rate, three, nine (default all, with --quick rate and three)",
+    )
     given = options.parse_args()
     what = given.what or ["rate", "three", "nine"][: 2 if given.quick else None]
     if given.quick:
         RATES, REPEATS, CLOSURES = ((100, 2_000),), 1, {"smooth": CLOSURES["smooth"]}
         PEER_STEPS = {name: steps[1:3] for name, steps in PEER_STEPS.items()}
-        SCHEMES = {name: [(numerics, times[1:3]) for numerics, times in rows] for name, rows in SCHEMES.items()}
+        SCHEMES = {
+            name: [(numerics, times[1:3]) for numerics, times in rows]
+            for name, rows in SCHEMES.items()
+        }
     print(machine("numpy", "numba", "rthym-moc"))
     if "rate" in what:
         rate_table()

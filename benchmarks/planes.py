@@ -23,7 +23,9 @@ def main() -> None:
     """Print the selected tables."""
     options = parser(__doc__)
     options.add_argument(
-        "what", nargs="*", help=f"tables: {', '.join(TABLES)} (default all, with --quick all but start)"
+        "what",
+        nargs="*",
+        help=f"tables: {', '.join(TABLES)} (default all, with --quick all but start)",
     )
     given = options.parse_args()
     print(machine("numpy", "numba", "clawpack"))

@@ -20,10 +20,19 @@ from fvsolve.core.solve import initial_state
 from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 
 ROUNDS = 15  # in turns
-FLOOD = {"up": {"side": "west", "discharge": {"formula": "5 + sin(t)"}}, "down": {"side": "east", "stage": 1.0}}
-GREEN_AMPT = {"model": "green-ampt", "conductivity": "6.5 mm/h", "suction": "166.8 mm", "deficit": 0.34}
+FLOOD = {
+    "up": {"side": "west", "discharge": {"formula": "5 + sin(t)"}},
+    "down": {"side": "east", "stage": 1.0},
+}
+GREEN_AMPT = {
+    "model": "green-ampt",
+    "conductivity": "6.5 mm/h",
+    "suction": "166.8 mm",
+    "deficit": 0.34,
+}
 HORTON = {"model": "horton", "initial": "50 mm/h", "final": "5 mm/h", "decay": "2 1/h"}
-WALL = {"bund": {"line": [[5.0, -1.0], [5.0, 11.0]], "crest": 0.9}}  # 10 cm under water that oscillates
+# 10 cm under water that oscillates
+WALL = {"bund": {"line": [[5.0, -1.0], [5.0, 11.0]], "crest": 0.9}}
 SPRING = {"spring": {"at": [5.0, 5.0], "area": 0.01, "discharge": 0.01}}
 ADDED = {  # what is added -> keys of the basin, goal for the added cost [%], None without a goal
     "two driven sides": ({"patches": FLOOD}, 5),
@@ -57,28 +66,46 @@ def stepping(case: dict) -> Callable[[float], object]:
 def driven_table(quick: bool) -> None:
     """Print the cost of each addition, in turns with the same basin between walls, and peers on a driven flood."""
     cells, rounds = (32, 2) if quick else (256, ROUNDS)
-    cases = {"walls": water(cells)} | {name: water(cells, **keys) for name, (keys, _) in ADDED.items()}
+    cases = {"walls": water(cells)} | {
+        name: water(cells, **keys) for name, (keys, _) in ADDED.items()
+    }
     cases["maxima"]["output"]["maxima"] = ["pool"]
-    cases["a section"]["output"]["sections"] = {"cut": {"basin": "pool", "from": [5.0, 0.0], "to": [5.0, 10.0]}}
+    cases["a section"]["output"]["sections"] = {
+        "cut": {"basin": "pool", "from": [5.0, 0.0], "to": [5.0, 10.0]}
+    }
     cases["a section"]["output"]["probes"] = ["cut.flow"]
     cases["flood without friction"] = water(cells, patches=FLOOD, manning=None)
-    runs, found = {name: stepping(case) for name, case in cases.items()}, {name: [] for name in cases}
+    runs, found = (
+        {name: stepping(case) for name, case in cases.items()},
+        {name: [] for name in cases},
+    )
     for _ in range(rounds):
         for name, run in runs.items():
             found[name].append(rate(run, cells**2, 1, 0.1))
     best = {name: max(values) for name, values in found.items()}
-    print(f"\nCost of a step on {cells}^2 cells, muscl van-leer, SSP-RK2, against the same basin between walls")
+    print(
+        f"\nCost of a step on {cells}^2 cells, muscl van-leer, SSP-RK2, against the same basin between walls"
+    )
     for name, (_, goal) in ADDED.items():
         cost = 100.0 * (best["walls"] / best[name] - 1.0)
         verdict = f", goal {goal} %: {'met' if cost <= goal else 'missed'}" if goal else ""
         print(f"  {name}: {cost:+.1f} %{verdict}")
     flood, free = best["two driven sides"], best["flood without friction"]
-    print(f"  driven flood: {flood / 1e6:.1f} million cell-steps/s, without friction {free / 1e6:.1f}", flush=True)
+    print(
+        f"  driven flood: {flood / 1e6:.1f} million cell-steps/s, without friction {free / 1e6:.1f}",
+        flush=True,
+    )
     if speed := of_pyclaw(cells, rounds):
-        print(f"  PyClaw's augmented solver, without friction: {speed / 1e6:.2f} million cell-steps/s")
-        print(f"  fvsolve is {free / speed:.1f} times as fast, {against(TIMES_PYCLAW, free / speed)}")
+        print(
+            f"  PyClaw's augmented solver, without friction: {speed / 1e6:.2f} million cell-steps/s"
+        )
+        print(
+            f"  fvsolve is {free / speed:.1f} times as fast, {against(TIMES_PYCLAW, free / speed)}"
+        )
     if speed := of_anuga(cells):
-        print(f"  ANUGA DE1: {speed / 1e6:.2f} million cell-steps/s; fvsolve is {flood / speed:.1f} times as fast")
+        print(
+            f"  ANUGA DE1: {speed / 1e6:.2f} million cell-steps/s; fvsolve is {flood / speed:.1f} times as fast"
+        )
 
 
 def of_pyclaw(cells: int, repeats: int) -> float:
@@ -99,8 +126,14 @@ def of_pyclaw(cells: int, repeats: int) -> float:
         qbc[1, :num_ghost, :] = (5.0 + np.sin(t)) / SIZE
 
     solver = peer.classic("sw_aug_2D", True)
-    solver.bc_lower[0], solver.bc_upper[0], solver.user_bc_lower = peer.pyclaw.BC.custom, peer.pyclaw.BC.extrap, inflow
-    found = peer.solution("sw_aug_2D", cells, SIZE, q, bed, grav=9.81, dry_tolerance=1e-3, sea_level=0.0)
+    solver.bc_lower[0], solver.bc_upper[0], solver.user_bc_lower = (
+        peer.pyclaw.BC.custom,
+        peer.pyclaw.BC.extrap,
+        inflow,
+    )
+    found = peer.solution(
+        "sw_aug_2D", cells, SIZE, q, bed, grav=9.81, dry_tolerance=1e-3, sea_level=0.0
+    )
     return rate(peer.stepping(solver, found, 0.4 * SIZE / cells / 4.5), cells**2, repeats)
 
 
@@ -133,8 +166,13 @@ def of_anuga(cells: int) -> float:
     if not python or not Path(python).exists():
         print(f"ANUGA: FVSOLVE_ANUGA names no Python with anuga: {SKIPPED}", flush=True)
         return 0.0
-    done = subprocess.run([python, "-c", ANUGA, str(cells)], capture_output=True, text=True, check=False,
-                          env=os.environ | {"OMP_NUM_THREADS": "1"})  # fmt: skip
+    done = subprocess.run(
+        [python, "-c", ANUGA, str(cells)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )
     if done.returncode:
         print(f"ANUGA failed: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
         return 0.0

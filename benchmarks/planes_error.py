@@ -26,7 +26,8 @@ SLOW = 1.0  # CPU time above which a run is not repeated, and no finer run follo
 TARGETS = (1e-2, 1e-3, 1e-4)  # L1 error over the L1 norm of the field at the start
 GOAL = 4.0  # times less CPU time
 GRAVITY, SPEED = 9.80665, 1000.0  # [m/s2], wave speed of fvsolve's liquid [m/s]
-PERIOD, SPREAD, RADII = 1.0, 0.6, 2.0  # durations of the swirl [s], of the hump [s], of the pulse [radii]
+# durations of the swirl [s], of the hump [s], of the pulse [radii]
+PERIOD, SPREAD, RADII = 1.0, 0.6, 2.0
 SCHEMES = {
     "muscl, SSP-RK2": {"limiter": "monotonized-central", "courant": 0.9},
     "upwind5, RK4": {"scheme": "upwind5", "method": "rk4", "courant": 1.4},
@@ -66,7 +67,9 @@ class Problem:
         x = ((np.arange(cells)[:, None] + (nodes + 1) / 2) * self.size / cells).ravel()
         w = np.tile(weights / 2, cells)
         first, last = (
-            (field(*np.meshgrid(x, x)) * np.outer(w, w)).reshape(cells, 5, cells, 5).sum(axis=(1, 3))
+            (field(*np.meshgrid(x, x)) * np.outer(w, w))
+            .reshape(cells, 5, cells, 5)
+            .sum(axis=(1, 3))
             for field in (self.first, self.last)
         )
         return first, last
@@ -95,7 +98,8 @@ class Problem:
         if self.flux == "vc_advection_2D":
             aux = swirl_faces(cells, self.size)
             solver.before_step = turning(aux)
-            solver.dt_max = 1.8 / cells  # without a limit steps are arbitrary where the swirl is at rest
+            # without a limit steps are arbitrary where the swirl is at rest
+            solver.dt_max = 1.8 / cells
             if isinstance(solver, peer.pyclaw.SharpClawSolver2D):
                 solver.call_before_step_each_stage = solver.aux_time_dep = True
                 solver.dt_max = 2.45 / cells
@@ -126,7 +130,11 @@ def swirl() -> Problem:
         return np.exp(-((x - 0.35) ** 2 + (y - 0.5) ** 2) / 0.01)
 
     velocity = {"expression": "swirl", "period": PERIOD}
-    basin = {"physics": "transport", "velocity": velocity, "scalars": {"dye": "where(x < 0.5, 1, 0)"}}
+    basin = {
+        "physics": "transport",
+        "velocity": velocity,
+        "scalars": {"dye": "where(x < 0.5, 1, 0)"},
+    }
     return Problem("swirl", 1.0, (PERIOD, PERIOD), bump, bump, basin, "vc_advection_2D", {})
 
 
@@ -134,21 +142,42 @@ def hump() -> Problem:
     """Hump of 0.2 m that spreads on water 1 m deep."""
     level = radial(SPREAD)
     return Problem(
-        "hump of water", 12.0, (SPREAD, SPREAD), lambda x, y: 0.2 * gauss(np.hypot(x - 6, y - 6)),
-        lambda x, y: level(np.hypot(x - 6, y - 6)), {"level": 1.0}, "shallow_roe_with_efix_2D", {"grav": GRAVITY},
-        rest=1.0, usual=2.0,
-    )  # fmt: skip
+        "hump of water",
+        12.0,
+        (SPREAD, SPREAD),
+        lambda x, y: 0.2 * gauss(np.hypot(x - 6, y - 6)),
+        lambda x, y: level(np.hypot(x - 6, y - 6)),
+        {"level": 1.0},
+        "shallow_roe_with_efix_2D",
+        {"grav": GRAVITY},
+        rest=1.0,
+        usual=2.0,
+    )
 
 
 def pulse() -> Problem:
     """Round pulse of pressure that spreads, by Hankel's integral."""
     r = np.linspace(0.0, 9.0, 500)
-    found = quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(k * RADII) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[0]
-    shape, basin = CubicSpline(r, found), {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "wave_speed": SPEED}
+    found = quad_vec(
+        lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(k * RADII) * j0(k * r),
+        0.0,
+        16.0,
+        epsrel=1e-12,
+    )[0]
+    shape, basin = (
+        CubicSpline(r, found),
+        {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "wave_speed": SPEED},
+    )
     return Problem(
-        "pulse of pressure", 12.0, (RADII / SPEED, RADII), lambda x, y: gauss(np.hypot(x - 6, y - 6)),
-        lambda x, y: shape(np.hypot(x - 6, y - 6)), basin, "acoustics_2D", dict(rho=1.0, bulk=1.0, zz=1.0, cc=1.0),
-    )  # fmt: skip
+        "pulse of pressure",
+        12.0,
+        (RADII / SPEED, RADII),
+        lambda x, y: gauss(np.hypot(x - 6, y - 6)),
+        lambda x, y: shape(np.hypot(x - 6, y - 6)),
+        basin,
+        "acoustics_2D",
+        dict(rho=1.0, bulk=1.0, zz=1.0, cc=1.0),
+    )
 
 
 def gauss(r):
@@ -159,7 +188,10 @@ def gauss(r):
 def radial(end: float, points: int = 180, radius: float = 9.0) -> Callable:
     """Rise of the hump at time `end` as a function of distance: axisymmetric shallow water by Chebyshev polynomials."""
     k = np.arange(points)
-    x, c = np.cos(pi * k / (points - 1)), np.where((k == 0) | (k == points - 1), 2.0, 1.0) * (-1.0) ** k
+    x, c = (
+        np.cos(pi * k / (points - 1)),
+        np.where((k == 0) | (k == points - 1), 2.0, 1.0) * (-1.0) ** k,
+    )
     steps = x[:, None] - x + np.eye(points)
     d = np.outer(c, 1.0 / c) / steps
     d, r = (d - np.diag(d.sum(axis=1))) / radius, radius * x
@@ -173,7 +205,9 @@ def radial(end: float, points: int = 180, radius: float = 9.0) -> Callable:
         return np.concatenate([-(d @ q + q / r), push])
 
     start = np.concatenate([0.2 * gauss(r), np.zeros(points)])
-    found = solve_ivp(slopes, (0.0, end), start, method="DOP853", rtol=1e-10, atol=1e-12).y[:points, -1]
+    found = solve_ivp(slopes, (0.0, end), start, method="DOP853", rtol=1e-10, atol=1e-12).y[
+        :points, -1
+    ]
     s = np.linspace(0.0, 0.99 * radius, 1000)
     return CubicSpline(s, BarycentricInterpolator(r, found)(s))
 
@@ -198,17 +232,29 @@ def error_table(quick: bool) -> None:
     if quick:
         sizes, rounds, schemes, problems = SIZES[:2], 1, dict(list(SCHEMES.items())[:1]), (hump,)
     for problem in (one() for one in problems):
-        print(f"\n{problem.name}: CPU [ms], relative L1 error\n| |" + "".join(f" {n}^2 |" for n in sizes))
+        print(
+            f"\n{problem.name}: CPU [ms], relative L1 error\n| |"
+            + "".join(f" {n}^2 |" for n in sizes)
+        )
         print("|---|" + "---|" * len(sizes))
         charts = {}
-        solvers = {f"fvsolve {name}": functools.partial(problem.by_fvsolve, own) for name, own in schemes.items()}
+        solvers = {
+            f"fvsolve {name}": functools.partial(problem.by_fvsolve, own)
+            for name, own in schemes.items()
+        }
         for name, made in PEERS.items() if peer.pyclaw else ():
             solvers[f"PyClaw {name}"] = functools.partial(problem.by_pyclaw, made)
         for name, solve in solvers.items():
             charts[name] = runs(problem, solve, sizes, rounds)
-            row = "".join(f" {1e3 * spent:.3g}, {error:.1e} |" for spent, error in charts[name].values())
+            row = "".join(
+                f" {1e3 * spent:.3g}, {error:.1e} |" for spent, error in charts[name].values()
+            )
             print(f"| {name} |{row}", flush=True)
-            agree(f"least L1 error of {problem.name} by {name}", min(error for _, error in charts[name].values()), 0.3)
+            agree(
+                f"least L1 error of {problem.name} by {name}",
+                min(error for _, error in charts[name].values()),
+                0.3,
+            )
         verdict(charts)
 
 
@@ -217,7 +263,9 @@ def verdict(charts: dict) -> None:
     for target in TARGETS:
         costs = {name: price(list(chart.values()), target) for name, chart in charts.items()}
         best = {
-            program: min((cost[0], cost[1], name) for name, cost in costs.items() if name.startswith(program))
+            program: min(
+                (cost[0], cost[1], name) for name, cost in costs.items() if name.startswith(program)
+            )
             for program in dict.fromkeys(name.split()[0] for name in charts)
         }
         said = [f"{name}: {how}{1e3 * cost:.3g} ms" for cost, how, name in best.values()]

@@ -11,7 +11,8 @@ from importlib import import_module
 import numpy as np
 from measure import peer_module
 
-with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # its import opens a log in the folder
+# its import opens a log in the folder
+with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
     pyclaw = peer_module("clawpack.pyclaw", "clawpack")
     riemann = pyclaw and import_module("clawpack.riemann")
     if pyclaw:

@@ -16,19 +16,37 @@ BED = "0.3*sin(x)*cos(y)"
 HUMP = "exp(-((x - 5)**2 + (y - 5)**2))"
 BASINS = {
     "advection": {
-        "physics": "transport", "velocity": {"expression": "swirl", "size": SIZE}, "scalars": {"dye": HUMP},
+        "physics": "transport",
+        "velocity": {"expression": "swirl", "size": SIZE},
+        "scalars": {"dye": HUMP},
     },
     "free surface with bed": {"level": 1.0, "bed": BED, "start": {"level": f"1 + 0.2*{HUMP}"}},
-    "liquid": {"physics": "liquid", "pressure": 1e6, "thickness": 1.0, "start": {"pressure": f"1e6 + 1e5*{HUMP}"}},
-}  # fmt: skip
+    "liquid": {
+        "physics": "liquid",
+        "pressure": 1e6,
+        "thickness": 1.0,
+        "start": {"pressure": f"1e6 + 1e5*{HUMP}"},
+    },
+}
 
 
 def scene(basin: dict, end: float, **numerics) -> dict:
     """Case of a single basin between walls, by default with muscl, van Leer's limiter and SSP-RK2."""
-    used = {"end": end, "scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9} | numerics
+    used = {
+        "end": end,
+        "scheme": "muscl",
+        "limiter": "van-leer",
+        "method": "ssp-rk2",
+        "courant": 0.9,
+    } | numerics
     if used["scheme"] != "muscl":
         del used["limiter"]
-    made = {"schema": 1, "title": "a basin", "fluid": dict(WATER), "nodes": {"pool": {"type": "basin"} | basin}}
+    made = {
+        "schema": 1,
+        "title": "a basin",
+        "fluid": dict(WATER),
+        "nodes": {"pool": {"type": "basin"} | basin},
+    }
     scalars = {"scalars": {"dye": {"unit": "mg/l"}}} if "scalars" in basin else {}
     return made | scalars | {"numerics": used, "output": {"fields": 0}}
 

@@ -21,18 +21,25 @@ from fvsolve.core.solve.run_loop import NO_LIMIT, RunLoop
 SIZES = (64, 128, 256, 512, 1024)  # cells along a side
 LARGEST = {"triangles": 256, "PyClaw": 512}
 AT, WATER = 256, "free surface with bed"  # size of the goals; physics of `--quick` and of triangles
-GOALS = {"advection": 400.0, "free surface with bed": 80.0, "free surface, triangles": 25.0}  # [million/s]
+# [million/s]
+GOALS = {"advection": 400.0, "free surface with bed": 80.0, "free surface, triangles": 25.0}
 TIMES_PYCLAW, FLAT = 8.0, 1.3
 END = 1e6  # end that no run here reaches [s]
 PEERS = {  # PyClaw: Riemann solver, wave speed [m/s], data of the problem
     "advection": ("vc_advection_2D", 1.0, {}),
-    "free surface with bed": ("shallow_bathymetry_fwave_2D", 4.5, dict(grav=9.81, dry_tolerance=1e-3, sea_level=0.0)),
+    "free surface with bed": (
+        "shallow_bathymetry_fwave_2D",
+        4.5,
+        dict(grav=9.81, dry_tolerance=1e-3, sea_level=0.0),
+    ),
     "liquid": ("acoustics_2D", 1.0, dict(rho=1.0, bulk=1.0, zz=1.0, cc=1.0)),
 }
 COURANT = 0.4  # of PyClaw's steps; the cost of a step does not depend on it
 
 
-def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chunk: float = 0.02) -> float:
+def rate(
+    advance: Callable[[int], object], elements: int, repeats: int = 20, chunk: float = 0.02
+) -> float:
     """Elements per second of CPU time, best of `repeats`."""
     advance(1)
     times, spent = 1, 0.0
@@ -92,14 +99,20 @@ def speed_table(quick: bool) -> None:
     sizes, repeats, basins, table, each = SIZES, 30, BASINS, {}, {}
     if quick:
         sizes, repeats, basins = (32,), 3, {WATER: BASINS[WATER]}
-    print("\nMillion cell-steps/s (in brackets: evaluations of the right-hand side), muscl van-leer, SSP-RK2")
+    print(
+        "\nMillion cell-steps/s (in brackets: evaluations of the right-hand side), muscl van-leer, SSP-RK2"
+    )
     print("| cells |" + "".join(f" {n}^2 |" for n in sizes) + "\n|---|" + "---|" * len(sizes))
     moved = "".join(f" {bandwidth(n * n) / 1e9:.0f} |" for n in sizes)
     print(f"| triad on arrays of as many [GB/s] |{moved}", flush=True)
     with tempfile.TemporaryDirectory(prefix="fvsolve-planes-") as folder:
-        cases = {name: lambda n, b=basin: scene(square(n) | b, END) for name, basin in basins.items()}
+        cases = {
+            name: lambda n, b=basin: scene(square(n) | b, END) for name, basin in basins.items()
+        }
         water = BASINS[WATER]
-        cases["free surface, triangles"] = lambda n: scene(of_triangles(Path(folder) / f"{n}.msh", n) | water, END)
+        cases["free surface, triangles"] = lambda n: scene(
+            of_triangles(Path(folder) / f"{n}.msh", n) | water, END
+        )
         for name, case in cases.items():
             row = f"| {name} |"
             for n in sizes:
@@ -130,11 +143,16 @@ def verdict(table: dict, sizes) -> None:
         said = [f"{name} at {at}^2: {table[name, at] / 1e6:.0f} million/s"]
         if name in GOALS:
             said.append(against(GOALS[name], table[name, at] / 1e6))
-        peers = [table[name.replace(", triangles", " with bed"), at, split] for split in (True, False)
-                 if (name.replace(", triangles", " with bed"), at, split) in table]  # fmt: skip
+        peers = [
+            table[name.replace(", triangles", " with bed"), at, split]
+            for split in (True, False)
+            if (name.replace(", triangles", " with bed"), at, split) in table
+        ]
         if peers:
             factor = table[name, at] / max(peers)
             said.append(f"{factor:.1f} times PyClaw's quicker, {against(TIMES_PYCLAW, factor)}")
         spread = max(reached) / min(reached)
-        said.append(f"quickest over slowest size {spread:.2f}, goal {FLAT}: {'met' if spread <= FLAT else 'missed'}")
+        said.append(
+            f"quickest over slowest size {spread:.2f}, goal {FLAT}: {'met' if spread <= FLAT else 'missed'}"
+        )
         print("  " + "; ".join(said))

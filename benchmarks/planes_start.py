@@ -42,7 +42,9 @@ def case(kind: str, cells: int, folder: Path) -> dict:
 def start_table(quick: bool) -> None:
     """Print times of first and later runs, functions in the cache after a scene of a pipe, and bytes per cell."""
     print("\nStart-up, whole processes, wall (CPU) [s]")
-    print(f"| physics | cold | after | warm | compile | own, goal {GOAL:g} |\n|---|---|---|---|---|---|")
+    print(
+        f"| physics | cold | after | warm | compile | own, goal {GOAL:g} |\n|---|---|---|---|---|---|"
+    )
     with tempfile.TemporaryDirectory(prefix="fvsolve-planes-") as name:
         folder = Path(name)
         run = [sys.executable, "-m", "fvsolve", "run", "--force", "--out", str(folder / "out")]
@@ -50,28 +52,41 @@ def start_table(quick: bool) -> None:
             spent([*run, str(CASES / "two-tanks.toml")], folder / "tanks")
         kinds = ("free surface",) if quick else KINDS
         for k, kind in enumerate(kinds):
-            command, colds, afters = [sys.executable, __file__, "--memory", kind, str(SMALL), name], [], []
+            command, colds, afters = (
+                [sys.executable, __file__, "--memory", kind, str(SMALL), name],
+                [],
+                [],
+            )
             for i in range(1 if quick else 3):
                 colds.append(spent(command, cache(folder / f"{k}-{i}", quick)))
                 if not quick:
                     shutil.copytree(folder / "tanks", folder / f"{k}-{i}-after")
                     afters.append(spent(command, folder / f"{k}-{i}-after"))
-            warm = min(spent(command, cache(folder / f"{k}-0", quick)) for _ in range(1 if quick else 3))
+            warm = min(
+                spent(command, cache(folder / f"{k}-0", quick)) for _ in range(1 if quick else 3)
+            )
             cold, after = min(colds), min(afters or colds)
             times = " | ".join(f"{wall:.1f} ({cpu:.1f})" for wall, cpu in (cold, after, warm))
-            whole, own = (f"{one[0] - warm[0]:.1f} ({one[1] - warm[1]:.1f})" for one in (cold, after))
+            whole, own = (
+                f"{one[0] - warm[0]:.1f} ({one[1] - warm[1]:.1f})" for one in (cold, after)
+            )
             verdict = "met" if after[0] - warm[0] < GOAL else "missed"
             print(f"| {kind} | {times} | {whole} | {own}, {verdict} |", flush=True)
         if not quick:
             spent([*run, str(CASES / "valve-closure.toml")], folder / "pipe")
             files = list((folder / "pipe").rglob("*.nbi"))
-            strays = sorted({path.name.split("-")[0] for path in files if path.parent.name.startswith("plane_")})
-            print(f"\nOf {len(files)} functions that a scene of one pipe compiles, of the plane: {strays or 'none'}")
+            strays = sorted(
+                {path.name.split("-")[0] for path in files if path.parent.name.startswith("plane_")}
+            )
+            print(
+                f"\nOf {len(files)} functions that a scene of one pipe compiles, of the plane: {strays or 'none'}"
+            )
         print("\nMemory [bytes per cell]")
         for kind in kinds:
             cells = (2 * SMALL if quick else LARGE) // (2 if "triangles" in kind else 1)
             command = [sys.executable, __file__, "--memory", kind, str(cells), name]
-            for _ in range(1 + ("triangles" in kind)):  # a mesh needs more memory to make than to run
+            # a mesh needs more memory to make than to run
+            for _ in range(1 + ("triangles" in kind)):
                 told = subprocess.run(command, check=True, capture_output=True, text=True)
             print(f"  {kind}: {told.stdout.strip()}", flush=True)
 
@@ -112,7 +127,10 @@ def main() -> None:
     """Print the tables, or the memory of one run."""
     options = parser(__doc__)
     options.add_argument(
-        "--memory", nargs=3, metavar=("KIND", "CELLS", "FOLDER"), help="one run, whose memory is printed"
+        "--memory",
+        nargs=3,
+        metavar=("KIND", "CELLS", "FOLDER"),
+        help="one run, whose memory is printed",
     )
     given = options.parse_args()
     if given.memory:

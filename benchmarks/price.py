@@ -6,7 +6,9 @@ import numpy as np
 def front(runs):
     """Runs that are more accurate than all cheaper ones, cheapest first."""
     runs = sorted(runs)
-    return [(cost, error) for k, (cost, error) in enumerate(runs) if all(error < e for _, e in runs[:k])]
+    return [
+        (cost, error) for k, (cost, error) in enumerate(runs) if all(error < e for _, e in runs[:k])
+    ]
 
 
 def price(runs, target):

@@ -22,21 +22,34 @@ from measure import QUICK, SKIPPED
 
 HERE = Path(__file__).resolve().parent
 ALONE = os.environ | {"OPENBLAS_NUM_THREADS": "1"}  # two scripts share the cores
-EACH, ALL, LIMIT = 5.0, 180.0, 600.0  # CPU time of a script, wall time of all, wall time of a script [s]
+# CPU time of a script, wall time of all, wall time of a script [s]
+EACH, ALL, LIMIT = 5.0, 180.0, 600.0
 
 
 def scripts() -> list[Path]:
     """Paths of the scripts of this folder, except this one."""
     found = sorted(HERE.glob("*.py"))
-    return [path for path in found if '__name__ == "__main__"' in path.read_text() and path.name != "quick.py"]
+    return [
+        path
+        for path in found
+        if '__name__ == "__main__"' in path.read_text() and path.name != "quick.py"
+    ]
 
 
 def run(path: Path) -> bool:
     """Run a script and print its line, with its output if it failed; True if it passed."""
     began = perf_counter()
-    process = subprocess.Popen([sys.executable, path, "--quick"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                               stdin=subprocess.DEVNULL, text=True, start_new_session=True, env=ALONE)  # fmt: skip
-    stop = Timer(LIMIT, os.killpg, (process.pid, signal.SIGKILL))  # kills also the processes that it started
+    process = subprocess.Popen(
+        [sys.executable, path, "--quick"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+        env=ALONE,
+    )
+    # kills also the processes that it started
+    stop = Timer(LIMIT, os.killpg, (process.pid, signal.SIGKILL))
     stop.start()
     said = process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
@@ -56,7 +69,9 @@ def run(path: Path) -> bool:
 def main() -> None:
     """Run all scripts, or the given ones."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("names", nargs="*", metavar="NAME", help="names of scripts, without .py (default all)")
+    options.add_argument(
+        "names", nargs="*", metavar="NAME", help="names of scripts, without .py (default all)"
+    )
     names, began = options.parse_args().names, perf_counter()
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(run, [HERE / f"{name}.py" for name in names] or scripts()))

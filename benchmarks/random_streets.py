@@ -21,7 +21,13 @@ from measure import agree, parser
 from fvsolve.core.run import run
 from fvsolve.errors import FvsolveError
 
-FLUID = {"name": "user", "density": 1000.0, "bulk_modulus": "2.2 GPa", "viscosity": "1 mPa s", "law": "linear"}
+FLUID = {
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": "2.2 GPa",
+    "viscosity": "1 mPa s",
+    "law": "linear",
+}
 SCHEMES = ("muscl", "upwind", "muscl", "weno5")
 METHODS = (None, None, "ssp-rk3", "euler")
 SOILS = (
@@ -52,7 +58,9 @@ class Street(NamedTuple):
             return self.reason
         if not self.remainder <= LEDGER:
             return f"ledger {self.remainder:.2g}"
-        return f"{self.steps} steps for {self.still}" if self.steps > MORE_STEPS * self.still else ""
+        return (
+            f"{self.steps} steps for {self.still}" if self.steps > MORE_STEPS * self.still else ""
+        )
 
 
 def random_street(seed: int, folder: Path, rise: float = 0.0) -> dict[str, Any]:
@@ -60,44 +68,80 @@ def random_street(seed: int, folder: Path, rise: float = 0.0) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     long, wide = float(rng.uniform(20.0, 60.0)), float(rng.uniform(6.0, 12.0))
     slope, cross = rng.uniform(0.0, 0.02), rng.uniform(-0.03, 0.03)
-    noise, kx, ky = rng.choice([0.0, 0.005, 0.02, 0.05]), rng.uniform(1.0, 8.0), rng.uniform(1.0, 8.0)
-    bed = f"{BASE} + {slope}*({long}-x) + {cross}*(y-{0.5 * wide}) + {noise}*sin({kx}*x)*cos({ky}*y)"
-    street: dict[str, Any] = {"type": "basin", "elevation": 0.0, "bed": bed, "level": 0.0, "patches": {}}
+    noise, kx, ky = (
+        rng.choice([0.0, 0.005, 0.02, 0.05]),
+        rng.uniform(1.0, 8.0),
+        rng.uniform(1.0, 8.0),
+    )
+    bed = (
+        f"{BASE} + {slope}*({long}-x) + {cross}*(y-{0.5 * wide}) + {noise}*sin({kx}*x)*cos({ky}*y)"
+    )
+    street: dict[str, Any] = {
+        "type": "basin",
+        "elevation": 0.0,
+        "bed": bed,
+        "level": 0.0,
+        "patches": {},
+    }
     street["manning"] = float(rng.uniform(0.012, 0.04))
     size = float(rng.uniform(1.2, 2.5))
     if rng.random() < 0.4:
         street["mesh"] = triangles_of(rng, folder / f"{seed}.msh", long, wide, size)
     else:
-        street |= {"size": [long, wide], "cells": [max(6, round(long / size)), max(4, round(wide / size))]}
+        street |= {
+            "size": [long, wide],
+            "cells": [max(6, round(long / size)), max(4, round(wide / size))],
+        }
     rain = float(rng.choice([0.0, 30.0, 90.0, 200.0], p=[0.1, 0.3, 0.4, 0.2]))
     minutes = np.cumsum(rng.uniform(0.5, 4.0, 3))
-    street["rain"] = {"time": [0.0, *(60.0 * minutes)], "value": [0.0, rain / 3.6e6, rain / 3.6e6, 0.0]}
+    street["rain"] = {
+        "time": [0.0, *(60.0 * minutes)],
+        "value": [0.0, rain / 3.6e6, rain / 3.6e6, 0.0],
+    }
     if (soil := SOILS[int(rng.integers(len(SOILS)))]) is not None:
         street["infiltration"] = soil
     if rng.random() < 0.3 or rain == 0.0:
         street["start"] = {"level": BASE + 0.5 * slope * long + float(rng.uniform(-0.1, 0.15))}
     nodes: dict[str, Any] = {"street": street}
     links: dict[str, Any] = {}
-    river = {"type": "reservoir", "elevation": 7.0, "head": float(rng.choice([7.5, 9.5, BASE + 0.4]))}
+    river = {
+        "type": "reservoir",
+        "elevation": 7.0,
+        "head": float(rng.choice([7.5, 9.5, BASE + 0.4])),
+    }
     ends = ({"normal_slope": 0.01}, {"boundary": "critical"}, None)
     if "mesh" not in street and (end := ends[int(rng.integers(3))]) is not None:
         street["patches"]["end"] = {"side": "east"} | end
     count = int(rng.integers(1, 4))
     for k in range(count):  # each in its own part of the street
-        at = [float(long * (k + rng.uniform(0.35, 0.65)) / count), float(rng.uniform(1.0, wide - 1.0))]
+        at = [
+            float(long * (k + rng.uniform(0.35, 0.65)) / count),
+            float(rng.uniform(1.0, wide - 1.0)),
+        ]
         x, y = at
         height = BASE + slope * (long - x) + cross * (y - 0.5 * wide)
         add_gully(rng, f"{k}", at, height, rise, street, nodes, links)
     if any("river" in (link["from"], link["to"]) for link in links.values()):
         nodes["river"] = river
-    numerics = {"scheme": SCHEMES[seed % 4], "end": float(60.0 * (minutes[-1] + rng.uniform(5.0, 25.0)))}
+    numerics = {
+        "scheme": SCHEMES[seed % 4],
+        "end": float(60.0 * (minutes[-1] + rng.uniform(5.0, 25.0))),
+    }
     if (method := METHODS[int(rng.integers(4))]) is not None:
         numerics["method"] = method
-    return {"schema": 1, "fluid": FLUID, "nodes": nodes, "links": links, "numerics": numerics,
-            "output": {"every": 30.0, "fields": 0, "probes": ["street.volume", "m0.flow"]}}  # fmt: skip
+    return {
+        "schema": 1,
+        "fluid": FLUID,
+        "nodes": nodes,
+        "links": links,
+        "numerics": numerics,
+        "output": {"every": 30.0, "fields": 0, "probes": ["street.volume", "m0.flow"]},
+    }
 
 
-def triangles_of(rng: np.random.Generator, path: Path, long: float, wide: float, size: float) -> dict[str, Any]:
+def triangles_of(
+    rng: np.random.Generator, path: Path, long: float, wide: float, size: float
+) -> dict[str, Any]:
     """Mesh of a rectangle cut into triangles at random places : keys of `mesh`; its file is written to `path`."""
     import meshio
     from scipy.spatial import Delaunay
@@ -112,27 +156,50 @@ def triangles_of(rng: np.random.Generator, path: Path, long: float, wide: float,
     a, b, c = (points[cells[:, k]] for k in range(3))
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     cells = cells[area > 1e-6 * size * size]
-    tags = {f"gmsh:{kind}": [np.ones(len(cells), dtype=int)] for kind in ("physical", "geometrical")}
-    mesh = meshio.Mesh(np.column_stack([points, np.zeros(x.size)]), [("triangle", cells)], cell_data=tags)
+    tags = {
+        f"gmsh:{kind}": [np.ones(len(cells), dtype=int)] for kind in ("physical", "geometrical")
+    }
+    mesh = meshio.Mesh(
+        np.column_stack([points, np.zeros(x.size)]), [("triangle", cells)], cell_data=tags
+    )
     mesh.write(path, file_format="gmsh22", binary=False)
     return {"file": str(path)}
 
 
-def add_gully(rng, name: str, at: list[float], height: float, rise: float, street, nodes, links) -> None:
+def add_gully(
+    rng, name: str, at: list[float], height: float, rise: float, street, nodes, links
+) -> None:
     """Add a patch with a manhole above a shaft with a conduit, above the river, or above a closed shaft."""
     street["patches"][f"g{name}"] = {"at": at, "area": float(rng.choice([0.5, 1.0, 4.0]))}
     crest = height + float(rng.choice([-1.0, 1.0]) * rng.choice([0.0, 0.01, 0.05, 0.3, 1.0])) + rise
     below = ("shaft with conduit", "shaft with conduit", "river", "shaft")[int(rng.integers(4))]
     to = "river" if below == "river" else f"s{name}"
-    links[f"m{name}"] = {"type": "manhole", "from": f"street.g{name}", "to": to, "crest": crest,
-                         "area": float(rng.uniform(0.05, 0.5)), "perimeter": float(rng.uniform(0.8, 3.0))}  # fmt: skip
+    links[f"m{name}"] = {
+        "type": "manhole",
+        "from": f"street.g{name}",
+        "to": to,
+        "crest": crest,
+        "area": float(rng.uniform(0.05, 0.5)),
+        "perimeter": float(rng.uniform(0.8, 3.0)),
+    }
     if below != "river":
-        nodes[to] = {"type": "tank", "area": float(rng.uniform(0.3, 2.0)), "elevation": 7.5,
-                     "level": float(rng.choice([0.05, 1.0, 2.4]))}  # fmt: skip
+        nodes[to] = {
+            "type": "tank",
+            "area": float(rng.uniform(0.3, 2.0)),
+            "elevation": 7.5,
+            "level": float(rng.choice([0.05, 1.0, 2.4])),
+        }
     if below == "shaft with conduit":
-        links[f"p{name}"] = {"type": "conduit", "from": to, "to": "river", "diameter": float(rng.uniform(0.25, 0.6)),
-                             "length": float(rng.uniform(20.0, 80.0)), "inverts": [7.5, 7.2], "manning": 0.013,
-                             "cells": int(rng.integers(5, 16))}  # fmt: skip
+        links[f"p{name}"] = {
+            "type": "conduit",
+            "from": to,
+            "to": "river",
+            "diameter": float(rng.uniform(0.25, 0.6)),
+            "length": float(rng.uniform(20.0, 80.0)),
+            "inverts": [7.5, 7.2],
+            "manning": 0.013,
+            "cells": int(rng.integers(5, 16)),
+        }
 
 
 def run_street(seed: int, folder: Path) -> Street:
@@ -159,9 +226,11 @@ def main() -> None:
     for one in faults:
         print(f"street {one.seed}: {one.fault}")
     ratios = np.array([one.steps / max(one.still, 1) for one in streets])
-    print(f"{count} streets, {len(faults)} faults; greatest ledger {max(one.remainder for one in streets):.2g};"
-          f" steps over those with shut gullies: median {np.median(ratios):.3g}, greatest {ratios.max():.3g};"
-          f" {time.process_time() - began:.0f} s")  # fmt: skip
+    print(
+        f"{count} streets, {len(faults)} faults; greatest ledger {max(one.remainder for one in streets):.2g};"
+        f" steps over those with shut gullies: median {np.median(ratios):.3g}, greatest {ratios.max():.3g};"
+        f" {time.process_time() - began:.0f} s"
+    )
     agree("streets that fail", len(faults), 0)
 
 

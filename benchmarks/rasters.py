@@ -37,11 +37,23 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "dem.asc")
         head = f"ncols {side}\nnrows {side}\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
-        path.write_text(head + "\n".join(" ".join(map(repr, row)) for row in values[::-1].tolist()) + "\n")
+        path.write_text(
+            head + "\n".join(" ".join(map(repr, row)) for row in values[::-1].tolist()) + "\n"
+        )
         pixels = timed(f"ASCII grid of {side**2:.3g} pixels", lambda: read_pixels(path))
-        for what, form in (("rectangles", mesh), ("quadrilaterals of a file", dataclasses.replace(mesh, grid=None))):
-            mean = timed(f"means over {len(mesh.cells):.3g} {what}", lambda form=form: Raster("dem", pixels).over(form))
-            agree("volume", abs(mean @ mesh.area / values.sum() - 1.0), 1e-12 if form is mesh else 1e-3)
+        for what, form in (
+            ("rectangles", mesh),
+            ("quadrilaterals of a file", dataclasses.replace(mesh, grid=None)),
+        ):
+            mean = timed(
+                f"means over {len(mesh.cells):.3g} {what}",
+                lambda form=form: Raster("dem", pixels).over(form),
+            )
+            agree(
+                "volume",
+                abs(mean @ mesh.area / values.sum() - 1.0),
+                1e-12 if form is mesh else 1e-3,
+            )
         x, y = (line.ravel() for line in np.meshgrid(*[np.arange(0.0, 0.15 * side)] * 2))
         path = Path(folder, "points.csv")
         rows = zip(x.tolist(), y.tolist(), (0.1 * x + np.sin(y)).tolist(), strict=True)

@@ -41,8 +41,12 @@ class Kept(MemorySink):
 
 def model_of(cells: int):
     """Model of a dam break over a bed between walls, with a given step."""
-    pool = square(cells) | {"level": 1.0, "bed": "0.3*sin(x)*cos(y)", "manning": 0.02,
-                            "start": {"level": f"where(x < {0.4 * SIZE}, 1.5, 1)"}}  # fmt: skip
+    pool = square(cells) | {
+        "level": 1.0,
+        "bed": "0.3*sin(x)*cos(y)",
+        "manning": 0.02,
+        "start": {"level": f"where(x < {0.4 * SIZE}, 1.5, 1)"},
+    }
     step = 0.05 * SIZE / cells
     numerics = scene(pool, STEPS * step)["numerics"] | {"step": step}
     del numerics["courant"]
@@ -95,32 +99,49 @@ def asked(many: int, *words) -> list[str]:
     command = [sys.executable, __file__, "--part", *map(str, words)]
     if many > 1:
         command = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(many), *command]
-    found = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ).stdout
+    found = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=os.environ
+    ).stdout
     steps = " and ".join(map(str, words[3:]))
-    print(f"  {many} {'ranks' if many > 1 else 'process'}, {steps} steps: {found.strip()}", flush=True)
+    print(
+        f"  {many} {'ranks' if many > 1 else 'process'}, {steps} steps: {found.strip()}", flush=True
+    )
     return found.partition(";")[0].split()
 
 
 def main() -> None:
     options = parser(__doc__)
     options.add_argument(
-        "cells", nargs="?", type=int, help="number of cells along a side (default 4096, with --quick 32)"
+        "cells",
+        nargs="?",
+        type=int,
+        help="number of cells along a side (default 4096, with --quick 32)",
     )
-    options.add_argument("--back", action="store_true", help="also a stop by two ranks, resumed by one process")
-    options.add_argument("--part", nargs="+", metavar="WORD", help="arguments of one process that the script starts")
+    options.add_argument(
+        "--back", action="store_true", help="also a stop by two ranks, resumed by one process"
+    )
+    options.add_argument(
+        "--part", nargs="+", metavar="WORD", help="arguments of one process that the script starts"
+    )
     given = options.parse_args()
     if given.part:
         part(int(given.part[0]), *given.part[1:])
         return
     cells = given.cells or (32 if given.quick else 4096)
-    print(f"{machine('fvsolve', 'numba', 'mpi4py')}\ndam break on {cells}^2 cells; hashes of states", flush=True)
+    print(
+        f"{machine('fvsolve', 'numba', 'mpi4py')}\ndam break on {cells}^2 cells; hashes of states",
+        flush=True,
+    )
     with tempfile.TemporaryDirectory(prefix="fvsolve-resumed-") as folder:
         one, two = Path(folder) / "one.npz", Path(folder) / "two.npz"
         half, whole = asked(1, cells, "-", one, STOP, STEPS - STOP)
         if not peer_module("mpi4py", "mpi4py"):
             return
         (again,) = asked(2, cells, one, "-", STEPS - STOP)
-        print(f"stopped by one and resumed by two ranks: states are {'equal' if whole == again else 'NOT'}", flush=True)
+        print(
+            f"stopped by one and resumed by two ranks: states are {'equal' if whole == again else 'NOT'}",
+            flush=True,
+        )
         agree("states that differ", whole != again, 0)
         if given.back:
             (other,) = asked(2, cells, "-", two, STOP)

@@ -25,7 +25,8 @@ from measure import agree, parser
 
 HERE = Path(__file__).resolve().parent.parent
 CASE = HERE / "cases" / "valve-closure.toml"
-GOALS = {"cold": 15.0, "store": 3.0, "warm": 0.7}  # times of the whole process on an idle machine [s]
+# times of the whole process on an idle machine [s]
+GOALS = {"cold": 15.0, "store": 3.0, "warm": 0.7}
 RATIO = 0.5  # ratio to the time of an earlier version, warm
 IMPORTS = "import numpy, numba"  # least time of a process that imports numba
 ENDS = b"finished at "
@@ -38,10 +39,16 @@ def seconds(command: list[str], cache: Path, package: Path = HERE) -> float:
 
 def measured(command: list[str], cache: Path, package: Path = HERE) -> tuple[float, float, float]:
     """Wall time to the answer, wall time to the end of the process, and CPU time of all its processes [s]."""
-    environment = os.environ | {"FVSOLVE_CACHE": str(cache), "PYTHONPATH": str(package), "PYTHONUNBUFFERED": "1"}
+    environment = os.environ | {
+        "FVSOLVE_CACHE": str(cache),
+        "PYTHONPATH": str(package),
+        "PYTHONUNBUFFERED": "1",
+    }
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # byte code is written, as on a user's machine
     before, start, answer = busy(), time.perf_counter(), float("nan")
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL
+    ) as process:
         for line in process.stdout:
             if line.startswith(ENDS):
                 answer = time.perf_counter() - start
@@ -65,24 +72,40 @@ def cache(folder: Path, quick: bool) -> Path:
     return cache_folder()
 
 
-def measure(case: Path, times: int, packages: dict[str, Path], quick: bool) -> dict[tuple[str, str], list[tuple]]:
+def measure(
+    case: Path, times: int, packages: dict[str, Path], quick: bool
+) -> dict[tuple[str, str], list[tuple]]:
     """Times of each run by (version, start), with the versions in turn."""
     found: dict[tuple[str, str], list[tuple]] = {}
     with tempfile.TemporaryDirectory(prefix="fvsolve-start-up-") as folder:
         top = Path(folder)
 
         def go(version: str, start: str, cache: Path) -> None:
-            run = [sys.executable, "-P", "-m", "fvsolve", "run", str(case), "--out", str(top / version), "--force"]
+            run = [
+                sys.executable,
+                "-P",
+                "-m",
+                "fvsolve",
+                "run",
+                str(case),
+                "--out",
+                str(top / version),
+                "--force",
+            ]
             found.setdefault((version, start), []).append(measured(run, cache, packages[version]))
 
         for i in range(max(1, times // 3)):
             for version in packages:
                 go(version, "cold", cache(top / f"{version}-{i}", quick))
         for i in range(max(1, times // 3)):
-            for start, part in (("store", ""), ("store without fluids", "code"))[: 1 if quick else None]:
+            for start, part in (("store", ""), ("store without fluids", "code"))[
+                : 1 if quick else None
+            ]:
                 copied = top / f"{start}-{i}"
                 shutil.copytree(
-                    cache(top / "this-0", quick) / part, copied / part, ignore=shutil.ignore_patterns("*.nb?")
+                    cache(top / "this-0", quick) / part,
+                    copied / part,
+                    ignore=shutil.ignore_patterns("*.nb?"),
                 )
                 go("this", start, copied)
         for _ in range(times):
@@ -97,30 +120,52 @@ def measure(case: Path, times: int, packages: dict[str, Path], quick: bool) -> d
 def main() -> None:
     options = parser(__doc__)
     options.add_argument(
-        "case", nargs="?", type=Path, help="case to run (default valve-closure, with --quick two-tanks)"
+        "case",
+        nargs="?",
+        type=Path,
+        help="case to run (default valve-closure, with --quick two-tanks)",
     )
-    options.add_argument("--times", type=int, help="number of warm runs (default 5, with --quick 1)")
+    options.add_argument(
+        "--times", type=int, help="number of warm runs (default 5, with --quick 1)"
+    )
     options.add_argument("--beside", type=Path, help="checkout of another version")
     arguments = options.parse_args()
     arguments.case = arguments.case or (CASE.with_stem("two-tanks") if arguments.quick else CASE)
     arguments.times = arguments.times or (1 if arguments.quick else 5)
     packages = {"this": HERE} | ({"other": arguments.beside.resolve()} if arguments.beside else {})
     print(f"fvsolve run {arguments.case.name}, whole process, least of the runs [s]\n")
-    print("| version | start | answer | whole | CPU | runs | goal | |\n|---|---|---|---|---|---|---|---|")
+    print(
+        "| version | start | answer | whole | CPU | runs | goal | |\n|---|---|---|---|---|---|---|---|"
+    )
     found = measure(arguments.case, arguments.times, packages, arguments.quick)
-    least = {key: [min(column) for column in zip(*runs, strict=True)] for key, runs in found.items()}
+    least = {
+        key: [min(column) for column in zip(*runs, strict=True)] for key, runs in found.items()
+    }
     for (version, start), (answer, whole, cpu) in least.items():
         goal = GOALS.get(start) if version == "this" else None
-        verdict = "" if goal is None else "met" if whole <= goal else f"missed by {whole / goal:.2f} times"
+        verdict = (
+            ""
+            if goal is None
+            else "met"
+            if whole <= goal
+            else f"missed by {whole / goal:.2f} times"
+        )
         stated = "" if goal is None else f"{goal:g}"
         runs = found[version, start]
-        agree("runs that give no answer", sum(one[0] != one[0] for one in runs) if "imports" not in start else 0, 0)
-        print(f"| {version} | {start} | {answer:.2f} | {whole:.2f} | {cpu:.2f} | {len(runs)} | {stated} | {verdict} |")
+        agree(
+            "runs that give no answer",
+            sum(one[0] != one[0] for one in runs) if "imports" not in start else 0,
+            0,
+        )
+        print(
+            f"| {version} | {start} | {answer:.2f} | {whole:.2f} | {cpu:.2f} | {len(runs)} | {stated} | {verdict} |"
+        )
     if arguments.beside:
         parts = [a / b for a, b in zip(least["this", "warm"], least["other", "warm"], strict=True)]
         verdict = "met" if parts[1] <= RATIO else f"missed by {parts[1] / RATIO:.2f} times"
         told = ", ".join(
-            f"{part:.2f} of its {what}" for part, what in zip(parts, ("answer", "whole", "CPU"), strict=True)
+            f"{part:.2f} of its {what}"
+            for part, what in zip(parts, ("answer", "whole", "CPU"), strict=True)
         )
         print(f"\nwarm, beside the other version: {told}; goal {RATIO:g} of the whole: {verdict}")
 

@@ -21,7 +21,8 @@ from pathlib import Path
 import measure
 from compare_commits import HERE, extract, revision
 
-SPAN, MOST_RUNS = 0.6, 200  # time in which a process repeats a run [s], and the greatest number of repeats
+# time in which a process repeats a run [s], and the greatest number of repeats
+SPAN, MOST_RUNS = 0.6, 200
 LONGEST = 6.0  # a case whose run takes longer is run once a round [s]
 
 WORKER = f"""
@@ -54,11 +55,21 @@ for line in sys.stdin:
 def worker(commit: str, folder: Path) -> subprocess.Popen:
     """Process that times the cases of a commit whose paths it reads."""
     extract(commit, folder)
-    known = {**os.environ, "PYTHONPATH": str(folder), "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"}
+    known = {
+        **os.environ,
+        "PYTHONPATH": str(folder),
+        "MPLBACKEND": "Agg",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
     return subprocess.Popen(
-        [sys.executable, "-P", "-c", WORKER], env=known, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, text=True, cwd=folder,
-    )  # fmt: skip
+        [sys.executable, "-P", "-c", WORKER],
+        env=known,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        cwd=folder,
+    )
 
 
 def timed(process: subprocess.Popen, path: Path) -> list:
@@ -71,7 +82,9 @@ def main() -> int:
     parser = measure.parser(__doc__)
     parser.add_argument("old", nargs="?", default="HEAD", help="old commit")
     parser.add_argument("new", nargs="?", default="HEAD", help="new commit")
-    parser.add_argument("--cases", default="", help="names of cases, separated by commas (default all)")
+    parser.add_argument(
+        "--cases", default="", help="names of cases, separated by commas (default all)"
+    )
     parser.add_argument("--rounds", type=int, default=3, help="turns of each commit")
     asked = parser.parse_args()
     if asked.quick and not (HERE.parent / ".git").exists():
@@ -81,11 +94,18 @@ def main() -> int:
     ratios = []
     with tempfile.TemporaryDirectory(prefix="fvsolve-") as made:
         trees = [Path(made) / side for side in ("old", "new")]
-        workers = [worker(revision(commit), tree) for commit, tree in zip((asked.old, asked.new), trees, strict=True)]
+        workers = [
+            worker(revision(commit), tree)
+            for commit, tree in zip((asked.old, asked.new), trees, strict=True)
+        ]
         for name in names or sorted(path.stem for path in (trees[0] / "cases").glob("*.toml")):
-            rounds = [[timed(process, tree / "cases" / f"{name}.toml")
-                       for process, tree in zip(workers, trees, strict=True)]
-                      for _ in range(1 if asked.quick else asked.rounds)]  # fmt: skip
+            rounds = [
+                [
+                    timed(process, tree / "cases" / f"{name}.toml")
+                    for process, tree in zip(workers, trees, strict=True)
+                ]
+                for _ in range(1 if asked.quick else asked.rounds)
+            ]
             failed = [side[1] for pair in rounds for side in pair if side[0] is None]
             if failed:
                 print(f"{name:28s} {failed[0]}", flush=True)
@@ -93,16 +113,24 @@ def main() -> int:
             old, new = (min(pair[k][0] for pair in rounds) for k in (0, 1))
             spread = [pair[1][0] / pair[0][0] for pair in rounds]
             ratios.append(new / old)
-            rest, steps = [min(pair[k][2] for pair in rounds) for k in (0, 1)], [rounds[0][k][1] for k in (0, 1)]
-            print(f"{name:28s} {1e9 * old:12.1f} ns {1e9 * new:12.1f} ns   ratio {new / old:.3f}"
-                  f"   rounds {min(spread):.3f} to {max(spread):.3f}, steps {steps[0]} and {steps[1]}, rest "
-                  f"{1e3 * rest[0]:.2f} and {1e3 * rest[1]:.2f} ms", flush=True)  # fmt: skip
+            rest, steps = (
+                [min(pair[k][2] for pair in rounds) for k in (0, 1)],
+                [rounds[0][k][1] for k in (0, 1)],
+            )
+            print(
+                f"{name:28s} {1e9 * old:12.1f} ns {1e9 * new:12.1f} ns   ratio {new / old:.3f}"
+                f"   rounds {min(spread):.3f} to {max(spread):.3f}, steps {steps[0]} and {steps[1]}, rest "
+                f"{1e3 * rest[0]:.2f} and {1e3 * rest[1]:.2f} ms",
+                flush=True,
+            )
         for process in workers:
             process.stdin.close()
             process.wait()
     if ratios:
         ratios.sort()
-        print(f"{len(ratios)} cases: ratio {ratios[0]:.3f} to {ratios[-1]:.3f}, median {ratios[len(ratios) // 2]:.3f}")
+        print(
+            f"{len(ratios)} cases: ratio {ratios[0]:.3f} to {ratios[-1]:.3f}, median {ratios[len(ratios) // 2]:.3f}"
+        )
     return 0
 
 

@@ -47,13 +47,17 @@ FACTORS = (0.5, 0.9, 1.1, 1.3, 2.0, 4.0, 10.0, 30.0, 100.0, 1e3, 1e4)
 METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")
 WITHIN = 0.02
 LEAST_RANGE = 0.02
-CONSERVED = 1e-3  # range over magnitude below which a probe counts as constant; its magnitude is its range
+# range over magnitude below which a probe counts as constant; its magnitude is its range
+CONSERVED = 1e-3
 LOWEST = 1e-9
 
 
 def model_with(case: str, method: str, changes: dict, **steps):
-    return model_of(case, {"expect": {}, **changes, "numerics.method": method}
-                    | {f"numerics.{key}": value for key, value in steps.items()})  # fmt: skip
+    return model_of(
+        case,
+        {"expect": {}, **changes, "numerics.method": method}
+        | {f"numerics.{key}": value for key, value in steps.items()},
+    )
 
 
 def limit_of(case: str, method: str, changes: dict) -> float:
@@ -140,7 +144,11 @@ def main() -> int:
                     count += 1
                     off, name = difference(result, fine)
                     good = result.ok
-                    if factor > 1.0 and not good and not any("or less" in one.text for one in result.warnings):
+                    if (
+                        factor > 1.0
+                        and not good
+                        and not any("or less" in one.text for one in result.warnings)
+                    ):
                         silent += 1
                     if good and off > WITHIN:
                         wrong += 1
@@ -152,7 +160,9 @@ def main() -> int:
                         line += f" {factor:g}: {'ok' if good else 'no'} {off:.1g};"
                 print(line, flush=True)
     print(f"{count} runs: {wrong} ok and more than {WITHIN:g} from the fine run (goal 0)")
-    print(f"{lost} within the limit, right and not ok (goal 0); {silent} not ok without a step that is short enough")
+    print(
+        f"{lost} within the limit, right and not ok (goal 0); {silent} not ok without a step that is short enough"
+    )
     return 1 if wrong or lost else 0
 
 

@@ -14,14 +14,17 @@ from importlib import import_module
 
 from measure import machine, parser
 
-TABLES = ("cylinder", "pipe", "network", "start", "auto")  # each table has a module, which imports its peers
+# each table has a module, which imports its peers
+TABLES = ("cylinder", "pipe", "network", "start", "auto")
 
 
 def main() -> None:
     """Print the selected tables."""
     options = parser(__doc__)
     options.add_argument(
-        "what", nargs="*", help=f"tables: {', '.join(TABLES)} (default all, with --quick all but start)"
+        "what",
+        nargs="*",
+        help=f"tables: {', '.join(TABLES)} (default all, with --quick all but start)",
     )
     given = options.parse_args()
     print(machine("numpy", "numba", "scipy", "numbalsoda", "scikit-sundae"))

@@ -14,7 +14,14 @@ from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.studies.outcome import CappedRun, Outcome, outcome, study_model
 
 HERE = Path(__file__).resolve().parent
-SCENES = ("cylinder-servo", "hydraulic-drive", "chamber-chain", "pipe-tiny-chamber", "temperature-front", "servo-arm")
+SCENES = (
+    "cylinder-servo",
+    "hydraulic-drive",
+    "chamber-chain",
+    "pipe-tiny-chamber",
+    "temperature-front",
+    "servo-arm",
+)
 GOAL = 1.5  # greatest ratio to the CPU time of the best single method
 TARGETS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # rms errors of the worst probe, relative to its range
 TRUTH = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-12}
@@ -28,8 +35,12 @@ def auto_table(quick: bool) -> None:
         agree("ratio of auto to the best single method", worst, 1e6)
     else:
         methods = [m.name for m in METHODS.values() if m.adaptive] + ["auto"]
-        worst = max(beside(name, 10.0 ** -np.arange(2.0, 10.1, 0.5), ROUNDS, methods) for name in SCENES)
-    print(f"\n  auto beside the best single method, at worst {worst:.2f} times; goal {GOAL}: ", end="")
+        worst = max(
+            beside(name, 10.0 ** -np.arange(2.0, 10.1, 0.5), ROUNDS, methods) for name in SCENES
+        )
+    print(
+        f"\n  auto beside the best single method, at worst {worst:.2f} times; goal {GOAL}: ", end=""
+    )
     print("met" if worst <= GOAL else "missed")
 
 
@@ -37,7 +48,10 @@ def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
     """Print the cost of each error in a case, and return the greatest ratio of `auto` to the best method."""
     path = next(
         p
-        for p in (HERE.parent / "cases" / f"{name}.toml", HERE.parent / "tests" / "reference" / f"{name}.toml")
+        for p in (
+            HERE.parent / "cases" / f"{name}.toml",
+            HERE.parent / "tests" / "reference" / f"{name}.toml",
+        )
         if p.exists()
     )
     case, truth = load(path), outcome(path, TRUTH)
@@ -48,15 +62,21 @@ def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
             for rtol, (cost, error) in found.items():
                 if cost < SLOW:
                     found[rtol] = (min(cost, outcome(models[method, rtol]).processor), error)
-    print(f"\n{name}: CPU time [ms] of an error, and over that of the best single method", flush=True)
+    print(
+        f"\n{name}: CPU time [ms] of an error, and over that of the best single method", flush=True
+    )
     return max((verdict(runs, target) for target in TARGETS), default=np.nan)
 
 
-def series(case, method: str, tolerances, truth: Outcome, models: dict) -> dict[float, tuple[float, float]]:
+def series(
+    case, method: str, tolerances, truth: Outcome, models: dict
+) -> dict[float, tuple[float, float]]:
     """CPU time [s] and error of a method by tolerance, the largest tolerance first."""
     found = {}
     for rtol in tolerances:
-        models[method, rtol] = model = study_model(case, {"numerics.method": method, "numerics.rtol": float(rtol)})
+        models[method, rtol] = model = study_model(
+            case, {"numerics.method": method, "numerics.rtol": float(rtol)}
+        )
         run = outcome(model, run=limited)
         if not run.ok:
             break
@@ -94,5 +114,8 @@ def verdict(runs: dict, target: float) -> float:
         return np.inf if best else 0.0
     least, ratio = best[0][0], prices["auto"][0] / best[0][0]
     others = ", ".join(f"{method} {cost / least:.2f}" for cost, method in best[:4])
-    print(f"  {target:.0e}: auto {1e3 * prices['auto'][0]:9.3f}{prices['auto'][1]} {ratio:5.2f}; {others}", flush=True)
+    print(
+        f"  {target:.0e}: auto {1e3 * prices['auto'][0]:9.3f}{prices['auto'][1]} {ratio:5.2f}; {others}",
+        flush=True,
+    )
     return ratio

@@ -22,8 +22,10 @@ from fvsolve.jit import njit
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
 SCHEMES = ("upwind", "upwind5")
-COURANT, METHOD = 20.0, "alexander-2"  # two stages, solved one after the other with one factorisation
-STUDY = {"factor": 71.0, "solve": 18.0}  # [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (numba.md)
+# two stages, solved one after the other with one factorisation
+COURANT, METHOD = 20.0, "alexander-2"
+# [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (numba.md)
+STUDY = {"factor": 71.0, "solve": 18.0}
 GOAL = 1.5  # greatest ratio to the time of the study
 BUDGET = 0.2  # time of a measurement [s]
 
@@ -32,9 +34,13 @@ def network(pipes: int, cells: int, scheme: str, **numerics) -> dict:
     """Case of pipes between two lakes and junctions, a ring with chords; the demand of one junction stops."""
     nodes = {f"n{i}": {"type": "junction"} for i in range(pipes // 2 + 1)}
     count = len(nodes)
-    nodes |= {name: {"type": "reservoir", "head": head} for name, head in (("high", 60.0), ("low", 50.0))}
+    nodes |= {
+        name: {"type": "reservoir", "head": head} for name, head in (("high", 60.0), ("low", 50.0))
+    }
     nodes[f"n{count // 2}"]["demand"] = {"start": 0.2, "duration": 0.5, "value": [0.02, 0.0]}
-    ends = [("high", "n0"), ("low", f"n{count - 1}")] + [(f"n{i}", f"n{(i + 1) % count}") for i in range(count)]
+    ends = [("high", "n0"), ("low", f"n{count - 1}")] + [
+        (f"n{i}", f"n{(i + 1) % count}") for i in range(count)
+    ]
     ends += [(f"n{i}", f"n{(i + 3) % count}") for i in range(pipes - len(ends))]
     links = {
         f"p{k}": {
@@ -49,8 +55,20 @@ def network(pipes: int, cells: int, scheme: str, **numerics) -> dict:
         }
         for k, (a, b) in enumerate(ends)
     }
-    made = {"schema": 1, "title": f"{pipes} pipes", "fluid": dict(WATER), "nodes": nodes, "links": links}
-    made["numerics"] = {"end": 5.0, "scheme": scheme, "method": METHOD, "courant": COURANT, **numerics}
+    made = {
+        "schema": 1,
+        "title": f"{pipes} pipes",
+        "fluid": dict(WATER),
+        "nodes": nodes,
+        "links": links,
+    }
+    made["numerics"] = {
+        "end": 5.0,
+        "scheme": scheme,
+        "method": METHOD,
+        "courant": COURANT,
+        **numerics,
+    }
     return made | {"output": {"every": 0.05, "fields": 0, "probes": ["n0.pressure"]}}
 
 
@@ -67,7 +85,9 @@ class Costs:
 def network_table(quick: bool) -> None:
     """Print the times of the parts of a Newton step, and of whole runs."""
     title = f"{'factor':>9} {'study':>6} {'SuperLU':>8} {'solve':>8} {'study':>6} {'SuperLU':>8} {'f':>7} {'df/dy':>8}"
-    print(f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of numba.md, scaled by the unknowns")
+    print(
+        f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of numba.md, scaled by the unknowns"
+    )
     print(f"  {'pipes':>5} {'unknowns':>8} {'scheme':8} {'kind':7} {title}")
     global BUDGET
     sizes, schemes, BUDGET = (SIZES[:1], SCHEMES[:1], 0.0) if quick else (SIZES, SCHEMES, BUDGET)
@@ -92,7 +112,11 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     shape, n, m, handle = structure.shape, structure.n, structure.m, slate.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)
     stepper = Integrator(method_named(METHOD), n, m, lambda: structure, model.scale.copy())
-    stepper.out, stepper.calls, stepper.control["ledger_offset"] = out, addresses((rhs,) * (RHS_CALL + 1)), where
+    stepper.out, stepper.calls, stepper.control["ledger_offset"] = (
+        out,
+        addresses((rhs,) * (RHS_CALL + 1)),
+        where,
+    )
     jacobian, store = stepper.jacobian, np.zeros(structure.store_size)
     f, f_work, x = np.zeros((3, n))
     step = COURANT * min(p.length / p.cells / p.wave_speed for p in model.pipes)
@@ -117,7 +141,9 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
         factor=1e6 * best(lambda: factor(shape, jacobian, shift, store), BUDGET),
         solve=1e6 * best(fresh, BUDGET),
     )
-    square = csc_array((jacobian, structure.pattern.indices, structure.pattern.indptr), shape=(n + m, n))[:n]
+    square = csc_array(
+        (jacobian, structure.pattern.indices, structure.pattern.indptr), shape=(n + m, n)
+    )[:n]
     matrix = (shift * eye_array(n) - square).tocsc()
     wanted = splu(matrix).solve(f)
     fresh()
@@ -141,9 +167,15 @@ def change(handle, run, t, y, f, supply, f_work):
 
 def superlu(matrix: csc_array) -> tuple[float, float]:
     """Times to factor and to solve by SciPy's SuperLU, ordered for symmetric patterns [us]."""
-    options = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "diag_pivot_thresh": 0.0}
+    options = {
+        "permc_spec": "MMD_AT_PLUS_A",
+        "options": {"SymmetricMode": True},
+        "diag_pivot_thresh": 0.0,
+    }
     made, b = splu(matrix, **options), np.ones(matrix.shape[0])
-    return 1e6 * best(lambda: splu(matrix, **options), BUDGET), 1e6 * best(lambda: made.solve(b), 0.5 * BUDGET)
+    return 1e6 * best(lambda: splu(matrix, **options), BUDGET), 1e6 * best(
+        lambda: made.solve(b), 0.5 * BUDGET
+    )
 
 
 def whole(pipes: int, cells: int, scheme: str, costs: Costs, scaled: dict) -> None:
@@ -152,9 +184,15 @@ def whole(pipes: int, cells: int, scheme: str, costs: Costs, scaled: dict) -> No
     if not runs[0].ok:
         raise SystemExit(runs[0].reason)
     found = min(runs, key=lambda r: r.summary["seconds"]).summary
-    counts = {name: found[name] for name in ("steps", "rhs", "jacobians", "factorisations", "newton")}
+    counts = {
+        name: found[name] for name in ("steps", "rhs", "jacobians", "factorisations", "newton")
+    }
     wall = 1e6 * found["seconds"]
-    asked = counts["newton"] * scaled["solve"] + counts["factorisations"] * scaled["factor"] + counts["rhs"] * costs.rhs
+    asked = (
+        counts["newton"] * scaled["solve"]
+        + counts["factorisations"] * scaled["factor"]
+        + counts["rhs"] * costs.rhs
+    )
     said = ", ".join(f"{count} {name}" for name, count in counts.items())
     print(f"    {METHOD}, {said}: {wall / counts['newton']:.1f} us an iteration in all; ", end="")
     print(f"{wall / asked:.2f} times the study's figures for these, goal {GOAL}: ", end="")

@@ -15,9 +15,11 @@ from stiff_cylinder import implicit_methods, reached
 import fvsolve
 
 TARGET = 1e-6
-GOALS = {"explicit": 7.0, "implicit": 1.0}  # least ratio of every peer, and of CVODE with a band matrix
+# least ratio of every peer, and of CVODE with a band matrix
+GOALS = {"explicit": 7.0, "implicit": 1.0}
 BEYOND = "numbalsoda DOP853"  # outside the goals: explicit, compiled, and with the same f
-COURANTS = {"rk4": (1.4, 1.2, 1.0, 0.7), "dormand-prince": (1.4, 1.0)}  # upwind5 and RK4 are stable up to 1.43
+# upwind5 and RK4 are stable up to 1.43
+COURANTS = {"rk4": (1.4, 1.2, 1.0, 0.7), "dormand-prince": (1.4, 1.0)}
 
 
 def pipe_table(quick: bool) -> None:
@@ -28,16 +30,21 @@ def pipe_table(quick: bool) -> None:
         f"\nA pulse in a pipe of {pulse.cells} cells, there and back; upwind5, band {low} + 1 + {up}; a call of f: ",
         end="",
     )
-    print(f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}")
+    print(
+        f"{call_time(pulse.rhs, pulse.start.y):.2f} us, interleaved {call_time(pulse.rhs_mixed, pulse.start.y):.2f}"
+    )
     budget, rounds = (0.0, 1) if quick else (0.3, 3)
-    tolerances = (1e-6,) if quick else 10.0 ** -np.arange(5.0, 10.0)  # at 1e-4 LSODA switches to full matrices
+    # at 1e-4 LSODA switches to full matrices
+    tolerances = (1e-6,) if quick else 10.0 ** -np.arange(5.0, 10.0)
     groups = {
         "explicit": [stepped(pulse, method, "courant") for method in COURANTS],
         "implicit": [stepped(pulse, method, "rtol") for method in implicit_methods(quick)],
         "peers": pipe_peers(pulse, quick),
     }
     settings = {s.name: tolerances for group in groups.values() for s in group}
-    settings |= {s.name: courants for s, courants in zip(groups["explicit"], COURANTS.values(), strict=True)}
+    settings |= {
+        s.name: courants for s, courants in zip(groups["explicit"], COURANTS.values(), strict=True)
+    }
     solvers = [s for group in groups.values() for s in group]
     charts = chart(solvers, settings, pulse.distance, budget, rounds, enough=0.3 * TARGET)
     if quick:
@@ -85,7 +92,11 @@ def pipe_peers(pulse: Acoustics, quick: bool) -> list[Solver]:
     if not quick:
         banded += [scipy_odeint(mixed), scipy_ivp(mixed, "BDF")]
     if sundae and not quick:
-        banded.append(cvode(mixed, "scikit-sundae CVODE Adams, band", cvode_options(mixed) | {"method": "Adams"}))
+        banded.append(
+            cvode(
+                mixed, "scikit-sundae CVODE Adams, band", cvode_options(mixed) | {"method": "Adams"}
+            )
+        )
     return found + [at_end(solver, back) for solver in banded]
 
 
@@ -103,8 +114,12 @@ def verdict(charts) -> None:
         if runs
     }
     prices = {name: found for name, found in prices.items() if np.isfinite(found[0])}
-    least = {of: min((cost for cost, _, g in prices.values() if g == of), default=np.nan) for of in GOALS}
-    print(f"\n  end error {TARGET:.0e}: wall time, and how many times that of fvsolve's best explicit and implicit")
+    least = {
+        of: min((cost for cost, _, g in prices.values() if g == of), default=np.nan) for of in GOALS
+    }
+    print(
+        f"\n  end error {TARGET:.0e}: wall time, and how many times that of fvsolve's best explicit and implicit"
+    )
     for name, (cost, how, group) in sorted(prices.items(), key=lambda item: item[1][0]):
         factors = {of: cost / least[of] for of in GOALS}
         said = []

@@ -19,7 +19,8 @@ from start_up import cache
 
 EXPLICIT, IMPLICIT = "ssp-rk3", ("radau-iia-5", "esdirk-4")
 GOALS = {"cold": 8.0, "warm": 0.8}  # in addition to the explicit run [s]
-SCENES = {"dense": (1, 5), "banded": (1, 60), "sparse": (3, 30)}  # linear algebra -> (pipes, cells of each)
+# linear algebra -> (pipes, cells of each)
+SCENES = {"dense": (1, 5), "banded": (1, 60), "sparse": (3, 30)}
 ROOMS = ("irk", "dirk", "newton", "linear_", "structure", "auto")  # of implicit steps
 
 
@@ -40,7 +41,10 @@ def scene(kind: str, method: str) -> dict:
         for i in range(pipes)
     }
     demand = {"start": 0.1, "duration": 0.1, "value": [0.01, 0.0]}
-    nodes = {"lake": {"type": "reservoir", "head": 50.0}, "gate": {"type": "junction", "demand": demand}}
+    nodes = {
+        "lake": {"type": "reservoir", "head": 50.0},
+        "gate": {"type": "junction", "demand": demand},
+    }
     numerics = {"end": 0.3, "scheme": "upwind", "method": method, "courant": 0.9}
     output = {"fields": 0, "probes": ["gate.pressure"]}
     made = {"schema": 1, "title": kind, "fluid": dict(WATER), "nodes": nodes, "links": links}
@@ -50,21 +54,29 @@ def scene(kind: str, method: str) -> dict:
 def start_table(quick: bool) -> None:
     """Print wall times of first and later runs, and functions of implicit steps in the cache after explicit runs."""
     print("\nStart-up, whole processes [s]; more: beyond the explicit run of the same scene")
-    print(f"  {'scene':8} {'method':12} {'cold':>6} {'more':>6} {'after':>6} {'more':>6} {'warm':>6} {'more':>6}")
+    print(
+        f"  {'scene':8} {'method':12} {'cold':>6} {'more':>6} {'after':>6} {'more':>6} {'warm':>6} {'more':>6}"
+    )
     worst = {"cold": 0.0, "warm": 0.0}
     with tempfile.TemporaryDirectory(prefix="fvsolve-stiff-") as folder:
         for kind in ["sparse"] if quick else SCENES:
             own = cache(Path(folder) / kind, quick)
             base, first = first_and_later(own, kind, EXPLICIT, quick)
-            print(f"  {kind:8} {EXPLICIT:12} {first:6.2f} {'':6} {'':6} {'':6} {base:6.2f}", flush=True)
+            print(
+                f"  {kind:8} {EXPLICIT:12} {first:6.2f} {'':6} {'':6} {'':6} {base:6.2f}",
+                flush=True,
+            )
             if not quick:
-                print(f"    functions of implicit steps compiled: {', '.join(compiled_rooms(own)) or 'nothing'}")
+                print(
+                    f"    functions of implicit steps compiled: {', '.join(compiled_rooms(own)) or 'nothing'}"
+                )
             for method in IMPLICIT[: 1 if quick else None]:
                 cold = seconds(kind, method, cache(Path(folder) / f"{kind}-{method}", quick))
                 warm, after = first_and_later(own, kind, method, quick)
                 more = {"cold": cold - first, "after": after - base, "warm": warm - base}
                 cells = (
-                    f"{cold:6.2f} {more['cold']:6.2f} {after:6.2f} {more['after']:6.2f} {warm:6.2f} {more['warm']:6.2f}"
+                    f"{cold:6.2f} {more['cold']:6.2f} {after:6.2f} {more['after']:6.2f} "
+                    f"{warm:6.2f} {more['warm']:6.2f}"
                 )
                 print(f"  {kind:8} {method:12} {cells}", flush=True)
                 worst = {name: max(worst[name], more[name]) for name in worst}
@@ -80,7 +92,9 @@ def first_and_later(cache: Path, kind: str, method: str, quick: bool) -> tuple[f
     With `quick` both are that of the first run.
     """
     first = seconds(kind, method, cache)
-    return min((seconds(kind, method, cache) for _ in range(0 if quick else 5)), default=first), first
+    return min(
+        (seconds(kind, method, cache) for _ in range(0 if quick else 5)), default=first
+    ), first
 
 
 def seconds(kind: str, method: str, cache: Path) -> float:
@@ -99,7 +113,12 @@ def compiled_rooms(cache: Path) -> list[str]:
 def main() -> None:
     """Print the table, or make one run of it."""
     options = parser(__doc__)
-    options.add_argument("--run", nargs=2, metavar=("KIND", "METHOD"), help="scene and method of one run of the table")
+    options.add_argument(
+        "--run",
+        nargs=2,
+        metavar=("KIND", "METHOD"),
+        help="scene and method of one run of the table",
+    )
     given = options.parse_args()
     if given.run:
         import fvsolve

@@ -104,8 +104,15 @@ def waiting(times: int = 2000, rounds: int = 200) -> float:
     """Least wall time of a barrier of two threads [s]."""
     best = np.inf
     for _ in range(rounds):
-        board, owns = aligned_zeros(2 * band_exchange.LINE), np.zeros((2, band_exchange.HEAD), dtype=np.int64)
-        owns[:, band_exchange.BAND], owns[:, band_exchange.BAND_COUNT], owns[:, band_exchange.BOARD] = (
+        board, owns = (
+            aligned_zeros(2 * band_exchange.LINE),
+            np.zeros((2, band_exchange.HEAD), dtype=np.int64),
+        )
+        (
+            owns[:, band_exchange.BAND],
+            owns[:, band_exchange.BAND_COUNT],
+            owns[:, band_exchange.BOARD],
+        ) = (
             (0, 1),
             2,
             board.ctypes.data,
@@ -123,7 +130,9 @@ def waiting(times: int = 2000, rounds: int = 200) -> float:
 
 def two_threads(sizes, rounds: int) -> None:
     """Print the speed-ups of two threads, by physics and size."""
-    print("\nWall time of a step [us] by one thread and by two: speed-up (by CPU time what free cores would allow)")
+    print(
+        "\nWall time of a step [us] by one thread and by two: speed-up (by CPU time what free cores would allow)"
+    )
     print("| |" + "".join(f" {n}^2 |" for n in sizes))
     print("|---|" + "---|" * len(sizes))
     for name in BASINS:
@@ -146,23 +155,33 @@ def on_triangles(size: int, rounds: int) -> None:
         model = build(load(scene(basin, END)))
         agree("states of one thread beside those of two", apart(model), 0.0)
         (one, cpu), (two, both) = by_threads([model, model], (1, 2), rounds)
-        print(f"{WATER}, {model.all_cells} triangles: {1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
-              f"{against(GOAL_TRIANGLES, one / two)}; by CPU time {2.0 * cpu / both:.2f}", flush=True)  # fmt: skip
+        print(
+            f"{WATER}, {model.all_cells} triangles: {1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
+            f"{against(GOAL_TRIANGLES, one / two)}; by CPU time {2.0 * cpu / both:.2f}",
+            flush=True,
+        )
 
 
 def weak(rounds: int) -> None:
     """Print the weak scaling: twice the rows with twice the threads."""
     models = [model_of(WATER, WEAK, rows) for rows in (WEAK // 2, WEAK)]
     (one, cpu), (two, both) = by_threads(models, (1, 2), rounds)
-    print(f"\nWeak scaling, {WEAK} x {WEAK // 2} cells a thread: "
-          f"{1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
-          f"{against(GOAL_WEAK, one / two)}; by CPU time {2.0 * cpu / both:.2f}", flush=True)  # fmt: skip
+    print(
+        f"\nWeak scaling, {WEAK} x {WEAK // 2} cells a thread: "
+        f"{1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
+        f"{against(GOAL_WEAK, one / two)}; by CPU time {2.0 * cpu / both:.2f}",
+        flush=True,
+    )
 
 
 def by_size(sizes) -> None:
     """Print speeds per cell on one thread by CPU time, and those with stages formed after all rates."""
-    print("\nMillion cell-steps a second of CPU time, one thread (in brackets: stages formed apart from rates)")
-    print("| |" + "".join(f" {n}^2 |" for n in sizes) + " spread |\n|---|" + "---|" * (len(sizes) + 1))
+    print(
+        "\nMillion cell-steps a second of CPU time, one thread (in brackets: stages formed apart from rates)"
+    )
+    print(
+        "| |" + "".join(f" {n}^2 |" for n in sizes) + " spread |\n|---|" + "---|" * (len(sizes) + 1)
+    )
     for name in BASINS:
         row, speeds = f"| {name} |", []
         for n in sizes:
@@ -174,10 +193,14 @@ def by_size(sizes) -> None:
                     loop.run(steps)
                     best[k] = min(best[k], (process_time() - start) / steps)
             found = n * n / best / 1e6
-            speeds.append(found[0] if formed.size else found.max())  # small basins have one kind of stages
+            # small basins have one kind of stages
+            speeds.append(found[0] if formed.size else found.max())
             row += f" {speeds[-1]:.1f}{f' ({found[1]:.1f})' if formed.size else ''} |"
         spread = max(speeds) / min(speeds)
-        print(f"{row} {spread:.2f}, goal {FLAT[name]}: {'met' if spread <= FLAT[name] else 'missed'} |", flush=True)
+        print(
+            f"{row} {spread:.2f}, goal {FLAT[name]}: {'met' if spread <= FLAT[name] else 'missed'} |",
+            flush=True,
+        )
 
 
 def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
@@ -203,9 +226,12 @@ def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
     rows = 2 * 5 * 3 * size * 8 / 5e9  # time to read rows of both neighbours at 5 GB/s [s]
     waits = (3 * stages + 1) * wait * many / 2.0
     found = stages * (slowest + rows) + rest + waits
-    print(f"MODELLED, {many} cores, {WATER}, {size}^2: rates of the slowest band {1e6 * slowest:.0f} us (measured), "
-          f"rows {1e6 * rows:.1f} us, waits {1e6 * waits:.1f} us a step (a wait of two {1e9 * wait:.0f} ns, measured): "
-          f"{step / found:.1f} times one core, {against(GOAL_SIXTEEN, step / found)}", flush=True)  # fmt: skip
+    print(
+        f"MODELLED, {many} cores, {WATER}, {size}^2: rates of the slowest band {1e6 * slowest:.0f} us (measured), "
+        f"rows {1e6 * rows:.1f} us, waits {1e6 * waits:.1f} us a step (a wait of two {1e9 * wait:.0f} ns, measured): "
+        f"{step / found:.1f} times one core, {against(GOAL_SIXTEEN, step / found)}",
+        flush=True,
+    )
 
 
 def rank(sizes, rounds: int) -> None:
@@ -231,8 +257,12 @@ def two_ranks(sizes, rounds: int) -> None:
         return
     start = Path(sys.executable).with_name("mpiexec")
     command = [start, "-n", "2", sys.executable, __file__, "--rank", *map(str, sizes)]
-    found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=os.environ).stdout
-    print(f"\nTwo ranks, {WATER}: wall time of a step [us] by one process and by two ranks, speed-up")
+    found = subprocess.run(
+        command, stdout=subprocess.PIPE, text=True, check=True, env=os.environ
+    ).stdout
+    print(
+        f"\nTwo ranks, {WATER}: wall time of a step [us] by one process and by two ranks, speed-up"
+    )
     for line in found.splitlines():
         n, two = int(line.split()[0]), float(line.split()[1])
         model = model_of(WATER, n, n)
@@ -243,10 +273,18 @@ def two_ranks(sizes, rounds: int) -> None:
 def main() -> None:
     global BASINS, CHUNK, WEAK, MODELLED, BY_SIZE
     options = parser(__doc__)
-    options.add_argument("--large", action="store_true", help="also speeds of 2048^2 and 4096^2 cells")
-    options.add_argument("--flat", nargs="+", type=int, metavar="SIZE", help="only speeds by these sizes")
     options.add_argument(
-        "--rank", nargs="+", type=int, metavar="SIZE", help="grids of one rank of MPI that the script starts"
+        "--large", action="store_true", help="also speeds of 2048^2 and 4096^2 cells"
+    )
+    options.add_argument(
+        "--flat", nargs="+", type=int, metavar="SIZE", help="only speeds by these sizes"
+    )
+    options.add_argument(
+        "--rank",
+        nargs="+",
+        type=int,
+        metavar="SIZE",
+        help="grids of one rank of MPI that the script starts",
     )
     given, sizes, rounds = options.parse_args(), SIZES, ROUNDS
     if given.quick:

@@ -45,8 +45,11 @@ class Main:
 
 def by_fvsolve(reaches, duration):
     """Times from the closure [s], heads at the gate [ft] and CPU time [s] of fvsolve."""
-    keys = {"links.main.cells": reaches, "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"},
-            "links.valve.opening": {"start": SHUT, "duration": duration, "value": [1.0, 0.0]}}  # fmt: skip
+    keys = {
+        "links.main.cells": reaches,
+        "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"},
+        "links.valve.opening": {"start": SHUT, "duration": duration, "value": [1.0, 0.0]},
+    }
     begin = process_time()
     run = fvsolve.run(CASE, keys)
     return run.t - SHUT, np.asarray(run["gate.head"]) / FOOT, process_time() - begin
@@ -59,7 +62,10 @@ def by_rthym(reaches, duration):
     """
     begin, step = process_time(), Main.length / Main.wave_speed / reaches
     trace = peer_moc.uniform_pipe(
-        Main(duration=max(duration, step)), reaches, int(9.0 * 1219.2 / 914.4 * reaches), friction=(0.5, -1.0)
+        Main(duration=max(duration, step)),
+        reaches,
+        int(9.0 * 1219.2 / 914.4 * reaches),
+        friction=(0.5, -1.0),
     )
     return trace.time, trace.head / FOOT, process_time() - begin
 
@@ -120,13 +126,19 @@ def by_tsnet(reaches, duration):
         tm = tsnet.simulation.Initializer(tm, 0, "DD")
         tm = tsnet.simulation.MOCSimulator(tm, str(Path(folder) / "results"), "unsteady")
         busy = process_time() - begin
-    return np.asarray(tm.simulation_timestamps) - SHUT, np.asarray(tm.get_node("gate").head) / FOOT, busy
+    return (
+        np.asarray(tm.simulation_timestamps) - SHUT,
+        np.asarray(tm.get_node("gate").head) / FOOT,
+        busy,
+    )
 
 
 def table(duration):
     """Print the results of all programs for a closure."""
     print("peer       reaches  plateau  change  greatest  over 326 ft  CPU [s]")
-    peers = (("rthym-moc", by_rthym),) * bool(peer_moc.rthym_moc) + (("TSNet", by_tsnet),) * bool(TSNET)
+    peers = (("rthym-moc", by_rthym),) * bool(peer_moc.rthym_moc) + (("TSNet", by_tsnet),) * bool(
+        TSNET
+    )
     for name, solve in (("fvsolve", by_fvsolve), *peers):
         before = None
         for reaches in REACHES[:4] if name == "TSNet" else REACHES:
@@ -134,7 +146,9 @@ def table(duration):
             plateau = float(np.interp(1.0, t, head))
             change = "" if before is None else f"{plateau - before:+.3f}"
             more = 100.0 * (head.max() / BOUND - 1.0)
-            print(f"{name:10s} {reaches:7d}  {plateau:7.2f} {change:>7s}  {head.max():8.1f}  {more:9.1f} %  {cpu:7.2f}")
+            print(
+                f"{name:10s} {reaches:7d}  {plateau:7.2f} {change:>7s}  {head.max():8.1f}  {more:9.1f} %  {cpu:7.2f}"
+            )
             if name != "rthym-moc":  # its plateau is far above
                 agree(f"plateau of {name} beside {BOUND:g} ft", abs(plateau / BOUND - 1.0), 0.02)
             before = plateau
@@ -146,7 +160,9 @@ def main():
     if parser(__doc__).parse_args().quick:
         REACHES = (26, 50)
     for words, duration in (("in 50 ms", 0.05), ("at once (peers: within one step)", 0.0)):
-        print(f"The valve shuts {words}: head at the gate of the 914 m main [ft]; Joukowsky and friction head: 326")
+        print(
+            f"The valve shuts {words}: head at the gate of the 914 m main [ft]; Joukowsky and friction head: 326"
+        )
         table(duration)
 
 

@@ -22,7 +22,8 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for generated_pages
 from generated_pages import GENERATED  # noqa: E402
 
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # tutorials run `fvsolve`
+# tutorials run `fvsolve`
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 os.environ["IPYTHONDIR"] = tempfile.mkdtemp(prefix="fvsolve-site-")
 PROFILE = Path(os.environ["IPYTHONDIR"], "profile_default", "startup")
 PROFILE.mkdir(parents=True)
@@ -74,7 +75,9 @@ def pages_outside() -> dict[Path, str]:
     found = {}
     for path in DOCS.rglob("*.md"):
         if mark := ELSEWHERE.search(path.read_text(encoding="utf-8")):
-            found[(path.parent / mark[1]).resolve()] = path.relative_to(DOCS).with_suffix("").as_posix()
+            found[(path.parent / mark[1]).resolve()] = (
+                path.relative_to(DOCS).with_suffix("").as_posix()
+            )
     return found
 
 
@@ -93,7 +96,9 @@ def read_page(app, page: str, source: list[str]) -> None:
     text = NAMED.sub(r"[\1](", text)
     if file.name == "index.md":
         rows = "\n".join(line for line in text.splitlines() if line.startswith("|"))
-        linked = dict.fromkeys(name for name, heading in LINK.findall(rows) if name.endswith(".md") and not heading)
+        linked = dict.fromkeys(
+            name for name, heading in LINK.findall(rows) if name.endswith(".md") and not heading
+        )
         text += "\n```{toctree}\n:hidden:\n\n" + "\n".join(linked) + "\n```\n"
     source[0] = text
 
@@ -103,7 +108,9 @@ def target(link: str, folder: Path, page: str) -> str:
     path = (folder / link).resolve()
     if path in OUTSIDE:
         path = DOCS / f"{OUTSIDE[path]}.md"
-    return os.path.relpath(path, (DOCS / page).parent).replace(os.sep, "/") if path.exists() else link
+    return (
+        os.path.relpath(path, (DOCS / page).parent).replace(os.sep, "/") if path.exists() else link
+    )
 
 
 def plain_cells(app, document) -> None:
@@ -126,7 +133,9 @@ def formula(display: str, before: str = "", after: str = ""):
     """Visitor of formula nodes, which writes them as MathML."""
 
     def visit(writer, node) -> None:
-        writer.body.append(before + latex2mathml.converter.convert(node.astext(), display=display) + after)
+        writer.body.append(
+            before + latex2mathml.converter.convert(node.astext(), display=display) + after
+        )
         raise nodes.SkipNode
 
     return visit
@@ -135,6 +144,8 @@ def formula(display: str, before: str = "", after: str = ""):
 def setup(app) -> None:
     app.connect("source-read", read_page)
     app.connect("doctree-read", plain_cells)
-    app.connect("build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True))
+    app.connect(
+        "build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True)
+    )
     block = formula("block", '<div class="formula">', "</div>\n")
     app.add_html_math_renderer("mathml", (formula("inline"), None), (block, None))

@@ -16,7 +16,8 @@ from fvsolve.units import DIMENSIONS, NEAR_MISSES, UNITS, WORDS, Unit
 
 PACKAGE = Path(fvsolve.__file__).parent
 PYTHON_PAGE = (Path(__file__).parent / "python.md").read_text(encoding="utf-8")
-ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")  # beginning of a line of a docstring about arguments or fields
+# beginning of a line of a docstring about arguments or fields
+ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")
 CODE = re.compile(r"(`[^`]*`)")
 
 
@@ -28,14 +29,19 @@ def commands() -> str:
 
     group = get_command(application())
     with group.context_class(group, info_name="fvsolve") as top:
-        return "\n".join(command_section(group.get_command(top, name), name, top) for name in group.list_commands(top))
+        return "\n".join(
+            command_section(group.get_command(top, name), name, top)
+            for name in group.list_commands(top)
+        )
 
 
 def command_section(command, name: str, top) -> str:
     """Section of a command; `top` : context of the application."""
     with command.context_class(command, info_name=name, parent=top) as context:
         usage = " ".join(["fvsolve", name, *command.collect_usage_pieces(context)])
-        records = filter(None, (one.get_help_record(context) for one in command.get_params(context)))
+        records = filter(
+            None, (one.get_help_record(context) for one in command.get_params(context))
+        )
         rows = [(f"`{names}`", text) for names, text in records if names != "--help"]
     options = table(("argument or option", "meaning"), rows) if rows else ""
     return f"## fvsolve {name}\n\n```text\n{usage}\n```\n\n{prose(command.help)}\n\n{options}"
@@ -45,11 +51,17 @@ def units() -> str:
     """Tables of the quantities of a case file, with all their units, and of the spellings that are refused."""
     rows = {}  # by words, because some dimensions differ only in their use
     for name, one in DIMENSIONS.items():
-        own = ", ".join(f"`{unit}` {size(found)}" for unit, found in UNITS.items() if found.dimension == name)
-        as_other = ", ".join(filter(None, [f"those of {DIMENSIONS[one.base].words}" if one.base else "", own]))
+        own = ", ".join(
+            f"`{unit}` {size(found)}" for unit, found in UNITS.items() if found.dimension == name
+        )
+        as_other = ", ".join(
+            filter(None, [f"those of {DIMENSIONS[one.base].words}" if one.base else "", own])
+        )
         rows.setdefault(one.words, (one.words, f"`{one.si}`", f'`"{one.example}"`', as_other))
     words = [(f"`{word}`", f"`{symbol}`") for word, symbol in WORDS.items()]
-    refused = [(f"`{given}`", f"`{proposal}`") for given, proposal in NEAR_MISSES.items() if proposal]
+    refused = [
+        (f"`{given}`", f"`{proposal}`") for given, proposal in NEAR_MISSES.items() if proposal
+    ]
     return (
         "## Units of each quantity\n\n"
         f"{table(('quantity', 'SI', 'example', 'units, with their size in SI'), rows.values())}\n"
@@ -61,7 +73,9 @@ def units() -> str:
 def size(unit: Unit) -> str:
     """Size of a unit in SI; of a unit with an offset, the formula of a number in it."""
     factor = f"{unit.numerator / unit.denominator:.10g}"
-    return f"(number + {unit.offset:g}) × {factor}" if unit.offset else factor + " gauge" * unit.gauge
+    return (
+        f"(number + {unit.offset:g}) × {factor}" if unit.offset else factor + " gauge" * unit.gauge
+    )
 
 
 def names() -> str:
@@ -71,7 +85,8 @@ def names() -> str:
     steppers = sorted((said & {*fvsolve.steppers.__all__}) - {*studies})
     modules = {"fvsolve": fvsolve.__all__, "fvsolve.studies": studies, "fvsolve.steppers": steppers}
     return "\n".join(
-        f"## {module}\n\n" + "".join(entry(module, one) for one in all_) for module, all_ in modules.items()
+        f"## {module}\n\n" + "".join(entry(module, one) for one in all_)
+        for module, all_ in modules.items()
     )
 
 
@@ -79,7 +94,9 @@ def entry(module: str, name: str) -> str:
     """Directive of a public name; a class contains its members that python.md names."""
     found, text = getattr(import_module(module), name), ""
     if not inspect.isclass(found):
-        return directive("function", f"{module}.{name}{arguments(found)}", docstring(found, f"{module}.{name}"))
+        return directive(
+            "function", f"{module}.{name}{arguments(found)}", docstring(found, f"{module}.{name}")
+        )
     for member in dict.fromkeys(re.findall(r"[.`](\w+)", PYTHON_PAGE)):
         value = vars(found).get(member)
         kind = "method" if inspect.isfunction(value) else "property"
@@ -87,7 +104,9 @@ def entry(module: str, name: str) -> str:
             head = member + (arguments(value) if kind == "method" else "")
             text += directive(kind, head, docstring(value, f"{name}.{member}"))
     kind = "exception" if issubclass(found, Exception) else "class"
-    return directive(kind, f"{module}.{name}", f"{docstring(found, f'{module}.{name}')}\n\n{text}", "::::")
+    return directive(
+        kind, f"{module}.{name}", f"{docstring(found, f'{module}.{name}')}\n\n{text}", "::::"
+    )
 
 
 def directive(kind: str, head: str, text: str, fence: str = ":::") -> str:
@@ -97,14 +116,18 @@ def directive(kind: str, head: str, text: str, fence: str = ":::") -> str:
 def arguments(found) -> str:
     """Arguments of a function with their default values, without types and without `self`."""
     given = inspect.signature(found)
-    kept = [one.replace(annotation=one.empty) for key, one in given.parameters.items() if key != "self"]
+    kept = [
+        one.replace(annotation=one.empty) for key, one in given.parameters.items() if key != "self"
+    ]
     return str(given.replace(parameters=kept, return_annotation=given.empty))
 
 
 def docstring(found, name: str) -> str:
     """Docstring as Markdown. Raises ValueError for a public name without docstring."""
     if not (text := inspect.getdoc(found)):
-        raise ValueError(f"{name} has no docstring; expected a sentence, because the site lists all public names")
+        raise ValueError(
+            f"{name} has no docstring; expected a sentence, because the site lists all public names"
+        )
     return prose(text)
 
 
@@ -124,12 +147,17 @@ def prose(text: str) -> str:
 
 def escaped(text: str) -> str:
     """Text in which characters with a meaning in Markdown, outside of code, stand for themselves."""
-    return "".join(one if one.startswith("`") else re.sub(r"[*<$|]", r"\\\g<0>", one) for one in CODE.split(text))
+    return "".join(
+        one if one.startswith("`") else re.sub(r"[*<$|]", r"\\\g<0>", one)
+        for one in CODE.split(text)
+    )
 
 
 def table(head, rows) -> str:
     """Markdown table."""
-    lines = (" | ".join(escaped(cell) for cell in cells) for cells in (head, ("---",) * len(head), *rows))
+    lines = (
+        " | ".join(escaped(cell) for cell in cells) for cells in (head, ("---",) * len(head), *rows)
+    )
     return "".join(f"| {line} |\n" for line in lines)
 
 
@@ -146,21 +174,26 @@ def tables() -> str:
             for name, about, columns in records:
                 rows = []
                 for column in columns:
-                    line = lines[column.value.end_lineno - 1]
-                    own = "" if line.startswith(name) else comment(line)  # a record in one line has only its own
+                    row = column.value.end_lineno - 1
+                    # a record in one line has only its own
+                    own = "" if lines[row].startswith(name) else comment(lines, row)
                     rows.append((f"`{column.arg}`", type_of(column.value), own))
                 sections += f"### {name}\n\n{escaped(about)}\n\n{table(('column', 'type', 'meaning'), rows)}\n"
     return sections
 
 
 def records_in(text: str) -> Iterator[tuple[str, str, list[ast.keyword]]]:
-    """Yield the record types in a text of Python: name, comment in its first line, columns as arguments of `record`."""
+    """Yield the record types in a text of Python: name, its comment, columns as arguments of `record`."""
     if "= record(" not in text:
         return
     for found in ast.parse(text).body:
         call = found.value if isinstance(found, ast.Assign) else None
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "record":
-            yield found.targets[0].id, comment(text.splitlines()[found.lineno - 1]), call.keywords
+        if (
+            isinstance(call, ast.Call)
+            and isinstance(call.func, ast.Name)
+            and call.func.id == "record"
+        ):
+            yield found.targets[0].id, comment(text.splitlines(), found.lineno - 1), call.keywords
 
 
 def type_of(value: ast.expr) -> str:
@@ -169,9 +202,14 @@ def type_of(value: ast.expr) -> str:
     return {"i8": "integer", "f8": "number"}.get(kind, f"`{kind}`")
 
 
-def comment(line: str) -> str:
-    """Comment at the end of a line of code; "" without one."""
-    return line.partition("  # ")[2].strip()
+def comment(lines: list[str], row: int) -> str:
+    """Comment at the end of a line of code, else in the lines above it; "" without one."""
+    if own := lines[row].partition("  # ")[2].strip():
+        return own
+    first = row
+    while first > 0 and lines[first - 1].lstrip().startswith("# "):
+        first -= 1
+    return " ".join(line.lstrip(" #").rstrip() for line in lines[first:row])
 
 
 def validation() -> str:
@@ -183,7 +221,8 @@ def validation() -> str:
     return re.sub(r"(?<=\]\()([\w-]+\.png)", r"results/\1", text)
 
 
-VIEWS = {"flooding": "40 s", "tanker-braking": "3 s"}  # shipped cases that can be turned by hand: time of the frame
+# shipped cases that can be turned by hand: time of the frame
+VIEWS = {"flooding": "40 s", "tanker-braking": "3 s"}
 
 
 def views() -> str:

@@ -11,7 +11,9 @@ from IPython import get_ipython
 
 def system(command: str) -> None:
     """Run a shell command and print its output. Raises RuntimeError if it fails."""
-    done = subprocess.run(command, shell=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    done = subprocess.run(
+        command, shell=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     print(done.stdout, end="")
     if done.returncode:
         raise RuntimeError(f"exit status {done.returncode} of: {command}")
@@ -20,4 +22,5 @@ def system(command: str) -> None:
 get_ipython().system = system
 for name in ("FORCE_COLOR", "CLICOLOR_FORCE"):  # set by ipykernel
     os.environ.pop(name, None)
-os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"  # figures are output of cells, in .ci/run too
+# figures are output of cells, in .ci/run too
+os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"

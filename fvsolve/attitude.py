@@ -12,7 +12,8 @@ import numpy as np
 
 Vector = Any  # three numbers, array-like
 Matrix = np.ndarray
-EDGE = 1e-12  # cosine of pitch, or sine of the second classical Euler angle, below which two angles are not separable
+# cosine of pitch, or sine of the second classical Euler angle, below which two angles are not separable
+EDGE = 1e-12
 
 
 def skew(u: Vector) -> Matrix:
@@ -23,7 +24,9 @@ def skew(u: Vector) -> Matrix:
 
 def unskew(matrix: Matrix) -> np.ndarray:
     """Vector of the skew-symmetric part of a matrix : float64[3]. It is the inverse of `skew`."""
-    return 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    return 0.5 * np.array(
+        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
+    )
 
 
 def unit(u: Vector) -> np.ndarray:
@@ -108,7 +111,11 @@ def of_axis(axis: Vector, angle: float) -> Matrix:
     (docs/course.md, 42 and 43).
     """
     k = unit(axis)
-    return math.cos(angle) * np.eye(3) + math.sin(angle) * skew(k) + (1.0 - math.cos(angle)) * np.outer(k, k)
+    return (
+        math.cos(angle) * np.eye(3)
+        + math.sin(angle) * skew(k)
+        + (1.0 - math.cos(angle)) * np.outer(k, k)
+    )
 
 
 def axis_angle(rotation: Matrix) -> tuple[np.ndarray, float]:
@@ -210,7 +217,9 @@ def euler_parameters_rate(e: Any, w: Vector) -> np.ndarray:
     deta/dt = -eps . w / 2, deps/dt = (eta w + eps x w) / 2, derived from (44) and (49) of docs/course.md. The sum
     eta^2 + eps . eps stays constant, whatever its value.
     """
-    eta, eps, w = e[0], np.asarray(e[1:], dtype=float), np.asarray(w, dtype=float)
+    eta = e[0]
+    eps = np.asarray(e[1:], dtype=float)
+    w = np.asarray(w, dtype=float)
     return 0.5 * np.concatenate([[-eps @ w], eta * w + np.cross(eps, w)])
 
 

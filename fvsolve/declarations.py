@@ -39,7 +39,9 @@ def header_of(noun: str) -> re.Pattern[str]:
     return re.compile(head + r"(?:[@ )].*\n)*(?:class|def) (?P<attribute>\w+)")
 
 
-def headers(patterns: Iterable[str], header: re.Pattern[str]) -> Iterator[tuple[str, re.Match[str]]]:
+def headers(
+    patterns: Iterable[str], header: re.Pattern[str]
+) -> Iterator[tuple[str, re.Match[str]]]:
     """Headers in the files of the package that match glob patterns: name of the module, match."""
     for pattern in patterns:
         for path in sorted(PACKAGE.glob(pattern)):
@@ -106,7 +108,12 @@ def _entry_points_on(path: tuple[str, ...]) -> list[EntryPoint]:
             except (OSError, UnicodeDecodeError):  # most packages have no such file
                 text = ""
             packages.setdefault(name.partition("-")[0], text)
-    return [entry for name, text in packages.items() if "[fvsolve." in text for entry in _parsed(name, text)]
+    return [
+        entry
+        for name, text in packages.items()
+        if "[fvsolve." in text
+        for entry in _parsed(name, text)
+    ]
 
 
 def _parsed(package: str, text: str) -> Iterator[EntryPoint]:
@@ -145,7 +152,11 @@ class Declaration(NamedTuple):
     def load(self) -> Any:
         """Import the module, and return the object. Raises FvsolveError if a module outside the package fails."""
         try:
-            module = _module_of_file(self.module) if self.module.endswith(".py") else import_module(self.module)
+            module = (
+                _module_of_file(self.module)
+                if self.module.endswith(".py")
+                else import_module(self.module)
+            )
             return member(module, self.attribute)
         except (Exception, SystemExit) as error:
             if not self.source:
@@ -155,7 +166,9 @@ class Declaration(NamedTuple):
     def text(self) -> str:
         """Text of the module, which is not imported; "" if it has none."""
         try:
-            return Path(self.module if self.module.endswith(".py") else _path_of(self.module)).read_text("utf-8")
+            return Path(
+                self.module if self.module.endswith(".py") else _path_of(self.module)
+            ).read_text("utf-8")
         except (ImportError, OSError, ValueError):
             return ""
 
@@ -203,7 +216,13 @@ class Declarations(Mapping[str, Declaration]):
     header : regular expression with the groups `attribute` and `name`; further groups are options
     """
 
-    def __init__(self, noun: str, plural: str, patterns: tuple[str, ...], header: re.Pattern[str] | None = None):
+    def __init__(
+        self,
+        noun: str,
+        plural: str,
+        patterns: tuple[str, ...],
+        header: re.Pattern[str] | None = None,
+    ):
         self.noun = noun
         self.header = header or header_of(noun)
         self.group = f"fvsolve.{plural.replace(' ', '_')}"
@@ -242,14 +261,18 @@ class Declarations(Mapping[str, Declaration]):
     def _declaration(self, module: str, match: re.Match[str], source: str) -> Declaration:
         options = {key: text for key, text in match.groupdict().items() if text is not None}
         attribute = options.pop("attribute")
-        return Declaration(self.noun, options.pop("name", attribute), module, attribute, options, source)
+        return Declaration(
+            self.noun, options.pop("name", attribute), module, attribute, options, source
+        )
 
     def _read_others(self) -> dict[str, Declaration]:
         result: dict[str, Declaration] = {}
         for found in [*self._of_entry_points(), *self._of_files()]:
             if found.name in result or found.name in self.own():
                 error = f'a declaration of the {self.noun} "{found.name}" exists already; expected another name'
-                warnings.warn(unreadable(found.source, found.place, error), RuntimeWarning, stacklevel=2)
+                warnings.warn(
+                    unreadable(found.source, found.place, error), RuntimeWarning, stacklevel=2
+                )
             else:
                 result[found.name] = found
         return result

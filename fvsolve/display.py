@@ -37,7 +37,9 @@ class Displayable:
         try:
             import pandas
         except ImportError:
-            raise FvsolveError(f"{type(self).__name__}.frame() needs pandas: pip install pandas") from None
+            raise FvsolveError(
+                f"{type(self).__name__}.frame() needs pandas: pip install pandas"
+            ) from None
         return pandas.DataFrame(dict(self.table_columns()))
 
     @validated(path=PATH)
@@ -57,9 +59,14 @@ class Displayable:
         rows = list(zip(*columns.values(), strict=True))
         head = "".join(f"<th>{escape(str(name))}</th>" for name in columns)
         body = "".join(
-            "<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>" for row in rows[:TABLE_ROWS]
+            "<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>"
+            for row in rows[:TABLE_ROWS]
         )
-        more = f"<p>{len(rows) - TABLE_ROWS} more rows in .frame()</p>" if len(rows) > TABLE_ROWS else ""
+        more = (
+            f"<p>{len(rows) - TABLE_ROWS} more rows in .frame()</p>"
+            if len(rows) > TABLE_ROWS
+            else ""
+        )
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}{self._picture_html()}"
 
     def _picture_html(self) -> str:
@@ -69,7 +76,9 @@ class Displayable:
         except Exception:  # a notebook then shows the table alone; `.plot()` raises the error
             return ""
         text = escape(self.summary_line(), quote=True)
-        return f'<img alt="{text}" src="data:image/png;base64,{b64encode(data.getvalue()).decode()}">'
+        return (
+            f'<img alt="{text}" src="data:image/png;base64,{b64encode(data.getvalue()).decode()}">'
+        )
 
 
 def save(figure, path) -> None:

@@ -12,7 +12,9 @@ MOST_COMPARED = 500  # names that are compared with others for one error
 LONGEST_MESSAGE = 1500  # greatest length of the message of a fault; the rest is cut
 MOST_FAULTS = 50  # faults that a message lists; of further faults it states the number
 # Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
-INVISIBLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+INVISIBLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,11 @@ class Fault:
 
     def __str__(self) -> str:
         where = "--set " if self.override else f"line {self.line}: " if self.line else ""
-        cut = self.message if len(self.message) <= LONGEST_MESSAGE else f"{self.message[:LONGEST_MESSAGE]}..."
+        cut = (
+            self.message
+            if len(self.message) <= LONGEST_MESSAGE
+            else f"{self.message[:LONGEST_MESSAGE]}..."
+        )
         return f"{where}{self.place}: {cut}" if self.place else f"{where}{cut}"
 
 
@@ -56,8 +62,15 @@ class Notice:
 
     def plain(self) -> dict[str, Any]:
         """Fields of the notice as a dictionary, for JSON."""
-        return {"kind": self.kind, "place": self.place, "key": self.key, "value": self.value, "limit": self.limit,
-                "ok": self.ok, "text": self.text}  # fmt: skip
+        return {
+            "kind": self.kind,
+            "place": self.place,
+            "key": self.key,
+            "value": self.value,
+            "limit": self.limit,
+            "ok": self.ok,
+            "text": self.text,
+        }
 
 
 class FvsolveError(Exception):

@@ -9,7 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 NUMBERS = itertools.count()
-TEMPORARY = re.compile(r"\.(\d+)-\d+\.tmp(\..*)?")  # name of a temporary file: process, number, ending of the new file
+# name of a temporary file: process, number, ending of the new file
+TEMPORARY = re.compile(r"\.(\d+)-\d+\.tmp(\..*)?")
 
 
 @contextmanager

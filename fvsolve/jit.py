@@ -31,7 +31,23 @@ from fvsolve.compile.functions import (
 )
 
 __all__ = [
-    "ARRAYS", "COMPILING", "DeclaredFunction", "Intrinsic", "add_sources", "cache_folder", "code_folder",
-    "compile_in_parallel", "compile_once", "compile_signature", "declare_function", "inline", "is_cold", "njit",
-    "other_caches", "plain_kinds", "reading_folders", "source_hash", "specialise",
-]  # fmt: skip
+    "ARRAYS",
+    "COMPILING",
+    "DeclaredFunction",
+    "Intrinsic",
+    "add_sources",
+    "cache_folder",
+    "code_folder",
+    "compile_in_parallel",
+    "compile_once",
+    "compile_signature",
+    "declare_function",
+    "inline",
+    "is_cold",
+    "njit",
+    "other_caches",
+    "plain_kinds",
+    "reading_folders",
+    "source_hash",
+    "specialise",
+]

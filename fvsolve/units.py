@@ -67,14 +67,19 @@ def _units(dimension: str, spellings: dict[str, Any]) -> dict[str, Unit]:
     """Units of a dimension, or of "gauge" or "absolute" pressure : spelling -> unit."""
     kinds = {kind: dimension == kind for kind in ("gauge", "absolute")}
     dimension = "pressure" if any(kinds.values()) else dimension
-    numbers = {spelling: given if isinstance(given, list) else [given] for spelling, given in spellings.items()}
+    numbers = {
+        spelling: given if isinstance(given, list) else [given]
+        for spelling, given in spellings.items()
+    }
     return {spelling: Unit(dimension, *given, **kinds) for spelling, given in numbers.items()}
 
 
 _TABLES = read_table("units")
 DIMENSIONS = {name: Dimension(**keys) for name, keys in _TABLES["dimensions"].items()}
 UNITS: dict[str, Unit] = {
-    spelling: unit for entry in _TABLES["units"].items() for spelling, unit in _units(*entry).items()
+    spelling: unit
+    for entry in _TABLES["units"].items()
+    for spelling, unit in _units(*entry).items()
 }
 NEAR_MISSES: dict[str, str] = _TABLES["near_misses"]
 LIKELY: dict[str, list[str]] = _TABLES["likely"]
@@ -85,9 +90,14 @@ _SAFE_SPELLING = re.compile(
 )
 
 BASE = {
-    "[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A", "[temperature]": "K", "[substance]": "mol",
+    "[length]": "m",
+    "[mass]": "kg",
+    "[time]": "s",
+    "[current]": "A",
+    "[temperature]": "K",
+    "[substance]": "mol",
     "[luminosity]": "cd",
-}  # fmt: skip
+}
 
 
 def pint_unit(spelling: str) -> Unit | None:
@@ -102,14 +112,22 @@ def pint_unit(spelling: str) -> Unit | None:
     try:
         unit_value = registry.Quantity(1.0, registry.parse_units(spelling)).to_base_units()
         zero_value = registry.Quantity(0.0, registry.parse_units(spelling)).to_base_units()
-    except Exception:  # pint raises errors of many families; whichever, it does not know the spelling
+    except Exception:
+        # pint raises errors of many families; whichever, it does not know the spelling
         return None
     factor = float(unit_value.magnitude - zero_value.magnitude)
     if not (math.isfinite(factor) and factor > 0):
         return None
     for name, dimension in DIMENSIONS.items():
-        si = dimension.si.replace("-", "").replace("m2", "m**2").replace("m3", "m**3").replace("s2", "s**2")
-        if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(unit_value.dimensionality):
+        si = (
+            dimension.si.replace("-", "")
+            .replace("m2", "m**2")
+            .replace("m3", "m**3")
+            .replace("s2", "s**2")
+        )
+        if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(
+            unit_value.dimensionality
+        ):
             return Unit(name, factor, offset=float(zero_value.magnitude) / factor)
     return Unit(f"quantity of [{base_units(unit_value.dimensionality)}]", factor)
 
@@ -134,17 +152,43 @@ def base_units(dimensionality: Mapping[str, float]) -> str:
 
 def superscript(power: float) -> str:
     """Text of a power in superscript digits; empty for 1."""
-    return "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))
+    return (
+        "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))
+    )
 
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "begins_as_quantity", "convert", "find", "unit_of",
-    "is_number_with_unit", "likely", "parse", "plain_numbers", "show", "span",
-    "vacuum", "expected",
-]  # fmt: skip
+    "DIMENSIONS",
+    "UNITS",
+    "Dimension",
+    "Kinematic",
+    "Unit",
+    "begins_as_quantity",
+    "convert",
+    "find",
+    "unit_of",
+    "is_number_with_unit",
+    "likely",
+    "parse",
+    "plain_numbers",
+    "show",
+    "span",
+    "vacuum",
+    "expected",
+]
 
 LONGEST = 100  # greatest length of a unit [characters]
-SIGNS = ("²", "2"), ("³", "3"), ("¹", "1"), ("⁻", "-"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")
+SIGNS = (
+    ("²", "2"),
+    ("³", "3"),
+    ("¹", "1"),
+    ("⁻", "-"),
+    ("µ", "u"),
+    ("μ", "u"),
+    ("°", "deg"),
+    ("·", " "),
+    ("*", " "),
+)
 # Least and greatest magnitude of a number other than 0 [SI]: fifth powers and quotients of such numbers stay finite.
 MIN_NUMBER, MAX_NUMBER = 1e-30, 1e30
 WATER_DENSITY = 1000.0  # [kg/m3]
@@ -234,7 +278,11 @@ def parse_in(given: Any, si: str, remedy: str) -> float:
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}")
         registry = pint.get_application_registry()
         try:
-            unit = registry.Quantity(1.0, registry.parse_units(_for_pint(bare))) if bare else registry.Quantity(1.0)
+            unit = (
+                registry.Quantity(1.0, registry.parse_units(_for_pint(bare)))
+                if bare
+                else registry.Quantity(1.0)
+            )
         except Exception:  # pint raises errors of many families
             raise ValueError(f"{show(given)}: unknown unit {show(spelling)}; {remedy}") from None
         unit = 1.0 / unit if spelling.startswith("1/") else unit
@@ -258,10 +306,14 @@ def plain_numbers(text: str, line: int = 1) -> Any:
         return np.empty(0)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)  # of NumPy before 2.4, for a text that is not a number
+            # of NumPy before 2.4, for a text that is not a number
+            warnings.simplefilter("error", DeprecationWarning)
             return np.fromstring(text, sep=" ")
     except (ValueError, DeprecationWarning):
-        faulty = next((item for item in re.finditer(r"\S+", text) if not _PLAIN_NUMBER.fullmatch(item[0])), None)
+        faulty = next(
+            (item for item in re.finditer(r"\S+", text) if not _PLAIN_NUMBER.fullmatch(item[0])),
+            None,
+        )
     if faulty is None:
         raise ValueError("the numbers cannot be read")
     comma = re.match(r"[+-]?\d[\d.]*,\d", faulty[0])
@@ -291,12 +343,18 @@ def _readable(over: str, under: str) -> str:
     top, bottom = DIMENSIONS[over].si, DIMENSIONS[under].si
     if bottom == "-":
         return top if top != "-" else "1, without a unit"
-    return f"1/{bottom}" if top == "-" and " " not in bottom and "/" not in bottom else f"{top} per {bottom}"
+    return (
+        f"1/{bottom}"
+        if top == "-" and " " not in bottom and "/" not in bottom
+        else f"{top} per {bottom}"
+    )
 
 
 def _for_pint(spelling: str) -> str:
     """Spelling of a unit for pint: `m3/s / (N m)` is `m**3/s/(N*m)`."""
-    text = re.sub(r"\s*/\s*", "/", spelling.replace("-", "1") if spelling.startswith("-") else spelling)
+    text = re.sub(
+        r"\s*/\s*", "/", spelling.replace("-", "1") if spelling.startswith("-") else spelling
+    )
     text = re.sub(r"([A-Za-z])(-?\d)", r"\1**\2", text.replace("(-)", "1"))
     return re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", text)
 
@@ -336,25 +394,39 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
         folded = _canonical(spelling).casefold().replace(" ", "")
         for known in _spellings(dimension):
             if known.casefold().replace(" ", "") == folded:
-                raise ValueError(f"unknown unit {show(spelling)}; did you mean {show((number + ' ' + known).strip())}?")
+                raise ValueError(
+                    f"unknown unit {show(spelling)}; did you mean {show((number + ' ' + known).strip())}?"
+                )
         unit = pint_unit(spelling) if _canonical(spelling) not in NEAR_MISSES else None
     text = show(f"{number} {spelling}".strip())
-    suggested = NEAR_MISSES.get(_canonical(spelling)) or NEAR_MISSES.get(_without_words(_canonical(spelling)), "")
+    suggested = NEAR_MISSES.get(_canonical(spelling)) or NEAR_MISSES.get(
+        _without_words(_canonical(spelling)), ""
+    )
     if unit is None:
         if not suggested or UNITS[suggested].dimension != base:
             close = difflib.get_close_matches(_canonical(spelling), _spellings(dimension), n=1)
             suggested = close[0] if close else ""
-        hint = f"did you mean {show((number + ' ' + suggested).strip())}?" if suggested else expected(dimension)
+        hint = (
+            f"did you mean {show((number + ' ' + suggested).strip())}?"
+            if suggested
+            else expected(dimension)
+        )
         raise ValueError(f"{text}: unknown unit {show(spelling)}; {hint}")
     kinematic = dimension == "viscosity" and unit.dimension == "kinematic viscosity"
     if unit.dimension not in (base, dimension) and not kinematic:
         hint = expected(dimension)
         if suggested and UNITS[suggested].dimension == base:
             hint = f"expected {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + suggested).strip())}?"
-        words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
+        words = (
+            DIMENSIONS[unit.dimension].words
+            if unit.dimension in DIMENSIONS
+            else f"a {unit.dimension}"
+        )
         raise ValueError(f"{text} is {words}; {hint}")
     if dimension == "gauge_pressure" and unit.absolute:
-        raise ValueError(f"{text} is an absolute pressure; expected a gauge pressure, for example {show('5 barg')}")
+        raise ValueError(
+            f"{text} is an absolute pressure; expected a gauge pressure, for example {show('5 barg')}"
+        )
     if unit.gauge and not DIMENSIONS[dimension].gauge:
         raise ValueError(f"{text} is a gauge pressure; {expected(dimension)}")
     return unit
@@ -370,12 +442,16 @@ def is_unit(spelling: str) -> bool:
     return len(spelling) <= LONGEST and _table_unit(spelling) is not None
 
 
-def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
+def vacuum(
+    given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0
+) -> str:
     """Text of a message about a given pressure that is too low for a liquid; pressure : its value in Pa, absolute
 
     vapor_pressure : of the fluid [Pa]; ambient : ambient pressure [Pa]
     """
-    below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
+    below = (
+        "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
+    )
     match = _split(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
     if spelling in UNITS and UNITS[spelling].gauge:
@@ -409,9 +485,17 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
     """
     match = _split(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
-    units = [unit for unit in LIKELY.get(DIMENSIONS[dimension].base or dimension, ()) if unit != _canonical(spelling)]
+    units = [
+        unit
+        for unit in LIKELY.get(DIMENSIONS[dimension].base or dimension, ())
+        if unit != _canonical(spelling)
+    ]
     weights = {"cSt": WATER_DENSITY}  # a kinematic viscosity instead of a dynamic one
-    fit = [unit for unit in units if least <= weights.get(unit, 1.0) * UNITS[unit].si(float(number)) <= greatest]
+    fit = [
+        unit
+        for unit in units
+        if least <= weights.get(unit, 1.0) * UNITS[unit].si(float(number)) <= greatest
+    ]
     fit = [show(f"{number} {unit}") for unit in fit[: 2 if dimension == "viscosity" else 1]]
     return f"; did you mean {' or '.join(fit)}?" if fit else ""
 
@@ -435,7 +519,9 @@ def show(given: Any) -> str:
 
 def _parse_number(given: Any, dimension: str) -> float:
     if isinstance(given, bool) or not isinstance(given, (int, float)):
-        kind = {bool: "true or false", dict: "a table", list: "a list"}.get(type(given), f"a {type(given).__name__}")
+        kind = {bool: "true or false", dict: "a table", list: "a list"}.get(
+            type(given), f"a {type(given).__name__}"
+        )
         raise ValueError(f"{show(given)} is {kind}; {expected(dimension)}")
     try:
         return float(given)
@@ -462,7 +548,9 @@ def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
     if not spelling:
         if dimension != "number":
             si = DIMENSIONS[dimension].si
-            raise ValueError(f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?')
+            raise ValueError(
+                f'{show(text)} has no unit; did you mean "{number} {si}", or the bare number {number}?'
+            )
         return float(number), None
     if re.match(r",\d", spelling):
         raise ValueError(comma_text(text))
@@ -504,7 +592,13 @@ def _without_negative_powers(spelling: str) -> str:
     """Spelling of a unit with slashes in place of negative powers, after CF and udunits: `kg m-2 s-1` is `kg/m2/s`."""
     if not _NEGATIVE_POWER.search(spelling) or any(sign in spelling for sign in "/()"):
         return spelling
-    factors = [(factor, re.fullmatch(r"([A-Za-z_]+)-(\d)", factor)) for factor in spelling.split(" ")]
+    factors = [
+        (factor, re.fullmatch(r"([A-Za-z_]+)-(\d)", factor)) for factor in spelling.split(" ")
+    ]
     above = " ".join(factor for factor, power in factors if power is None)
-    below = [power[1] + ("" if power[2] == "1" else power[2]) for _, power in factors if power is not None]
+    below = [
+        power[1] + ("" if power[2] == "1" else power[2])
+        for _, power in factors
+        if power is not None
+    ]
     return "/".join([above or "1", *below])

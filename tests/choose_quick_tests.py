@@ -93,11 +93,17 @@ class Recorder:
                 return compiled(function, key, *more)
             finally:
                 spent, inner = processor_seconds() - start, self.nested.pop()
-                self.seconds[f"{function.__module__}.{function.__qualname__}({key.lstrip('.')})"] = spent - inner
+                self.seconds[
+                    f"{function.__module__}.{function.__qualname__}({key.lstrip('.')})"
+                ] = spent - inner
                 if self.nested:
                     self.nested[-1] += spent
 
-        Function.code, Function.__call__, Function._compiled = watched_code, watched_call, watched_compiled
+        Function.code, Function.__call__, Function._compiled = (
+            watched_code,
+            watched_call,
+            watched_compiled,
+        )
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item, nextitem):
@@ -112,8 +118,13 @@ class Recorder:
             return (yield)
         finally:
             names = [f"{kind} {name}" for kind, some in tally.names.items() for name in some]
-            row = {"test": item.nodeid, "seconds": processor_seconds() - start, "compiled": self.seconds,
-                   "called": sorted(CALLED), "names": sorted(names)}  # fmt: skip
+            row = {
+                "test": item.nodeid,
+                "seconds": processor_seconds() - start,
+                "compiled": self.seconds,
+                "called": sorted(CALLED),
+                "names": sorted(names),
+            }
             self.file.write(json.dumps(row) + "\n")
             tally.names = before
 
@@ -176,7 +187,12 @@ def costs(rows: list[dict]) -> tuple[dict[str, Cost], dict[str, float]]:
     return {
         row["test"]: Cost(
             max(0.0, row["seconds"] - sum(row["compiled"].values())),
-            frozenset(name for called in row["called"] for name in by_name[called.split("(")[0]] if called in name)
+            frozenset(
+                name
+                for called in row["called"]
+                for name in by_name[called.split("(")[0]]
+                if called in name
+            )
             | frozenset(row["compiled"]),
             frozenset(row["names"]),
         )
@@ -202,10 +218,16 @@ def quick(tests: dict[str, Cost], compiled: dict[str, float], seconds: float) ->
     kept, out, fixed = dict(tests), {}, needed(tests)
     while True:
         users = Counter(name for cost in kept.values() for name in cost.functions)
-        if sum(cost.own for cost in kept.values()) + sum(compiled[name] for name in users) <= seconds:
+        if (
+            sum(cost.own for cost in kept.values()) + sum(compiled[name] for name in users)
+            <= seconds
+        ):
             return out
         share = {name: compiled[name] / count for name, count in users.items()}
-        whole = {test: cost.own + sum(share[name] for name in cost.functions) for test, cost in kept.items()}
+        whole = {
+            test: cost.own + sum(share[name] for name in cost.functions)
+            for test, cost in kept.items()
+        }
         free = [test for test in kept if test not in fixed]
         if not free:
             return out
@@ -215,19 +237,34 @@ def quick(tests: dict[str, Cost], compiled: dict[str, float], seconds: float) ->
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=415.0, help="processor time of the quick tests (default 415)")
-    parser.add_argument("--recording", type=Path, metavar="FOLDER", help="read a recording, or write one here")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=415.0,
+        help="processor time of the quick tests (default 415)",
+    )
+    parser.add_argument(
+        "--recording", type=Path, metavar="FOLDER", help="read a recording, or write one here"
+    )
     options = parser.parse_args()
     folder = options.recording or Path(tempfile.mkdtemp(prefix="fvsolve-recording-"))
     folder.mkdir(parents=True, exist_ok=True)
     if not any(folder.glob("*.json")):
         record(folder)
-    lines = [line for path in sorted(folder.glob("*.json")) for line in path.read_text(encoding="utf-8").splitlines()]
+    lines = [
+        line
+        for path in sorted(folder.glob("*.json"))
+        for line in path.read_text(encoding="utf-8").splitlines()
+    ]
     tests, compiled = costs([json.loads(line) for line in lines])
     out = quick(tests, compiled, options.seconds)
     slow = {test: round(cost, 2) for test, cost in sorted(out.items())}
-    LIST.write_text(json.dumps({"seconds": options.seconds, "slow": slow}, indent=1) + "\n", encoding="utf-8")
+    LIST.write_text(
+        json.dumps({"seconds": options.seconds, "slow": slow}, indent=1) + "\n", encoding="utf-8"
+    )
     own = sum(cost.own for cost in tests.values())
     print(
         f"{len(tests)} tests take {own:.0f} s and {sum(compiled.values()):.0f} s of compiling {len(compiled)} functions"

@@ -22,17 +22,21 @@ from tally import Tally, unknown_names
 from fvsolve.core.steppers.tableau import METHODS
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore the signal
+# background jobs of a shell ignore the signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: more threads are slower
 SLOW = json.loads((Path(__file__).parent / "durations.json").read_text(encoding="utf-8"))["slow"]
 TIER, TALLY, UNCOVERED = pytest.StashKey[str](), pytest.StashKey[Tally](), pytest.StashKey[list]()
-SELECTIONS = ("quick", "keyword", "markexpr", "lf", "deselect", "collectonly")  # options that leave out tests
+# options that leave out tests
+SELECTIONS = ("quick", "keyword", "markexpr", "lf", "deselect", "collectonly")
 fix_constants()
 
 
 def pytest_addoption(parser):
     parser.addoption("--full", action="store_true", help="run all tests, not only the quick tests")
-    parser.addoption("--quick", action="store_true", help="run only the quick tests of the paths given")
+    parser.addoption(
+        "--quick", action="store_true", help="run only the quick tests of the paths given"
+    )
     parser.addoption("--rest", action="store_true", help="run all tests but the quick tests")
 
 
@@ -60,13 +64,19 @@ def pytest_configure_node(node):
 
 
 def pytest_collection_modifyitems(config, items):
-    drawing = {item for item in items if getattr(getattr(item, "function", None), "hypothesis", None)}
+    drawing = {
+        item for item in items if getattr(getattr(item, "function", None), "hypothesis", None)
+    }
     for item in drawing if not NEW else ():
         hypothesis.seed(zlib.crc32(item.originalname.encode()))(item.function)
-    quick = {item for item in items if item.nodeid not in SLOW and is_in_turn(item, "quick_in_turn")}
+    quick = {
+        item for item in items if item.nodeid not in SLOW and is_in_turn(item, "quick_in_turn")
+    }
     if config.stash[TIER] != "full":
         config.stash[TALLY].names["unknown"] = unknown_names(SLOW, [item.nodeid for item in items])
-    chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]
+    chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[
+        config.stash[TIER]
+    ]
     if config.stash[TIER] != "full":
         chosen = {item for item in chosen if is_in_turn(item)}
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
@@ -116,7 +126,8 @@ def fvs(monkeypatch, capsys):
     from fvsolve import jit
     from fvsolve.cli import main
 
-    monkeypatch.setattr(jit, "is_cold", lambda: False)  # else the first test of a cold cache would see a notice
+    # else the first test of a cold cache would see a notice
+    monkeypatch.setattr(jit, "is_cold", lambda: False)
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])
@@ -133,7 +144,9 @@ def fvs(monkeypatch, capsys):
 def cluster():
     """Cluster of two processes of Dask, which takes a seventh of a processor even while it waits."""
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=":0"
+    ) as local:
         yield local
 
 
@@ -168,7 +181,8 @@ def surroundings(module) -> tuple:
         if isinstance(value, (dict, list, set)) and name[0] != "_"
     }
     variables = {  # the first import of rasterio, by WNTR too, sets bundles of certificates
-        name: value for name, value in os.environ.items()
+        name: value
+        for name, value in os.environ.items()
         if name != "PYTEST_CURRENT_TEST" and not name.endswith("_CURL_CA_BUNDLE")
-    }  # fmt: skip
+    }
     return os.getcwd(), variables, tables

@@ -34,13 +34,16 @@ class DrawnFault:
     def planted(self, text: str) -> str:
         """Text of the file with the fault; raises ValueError if the old text does not stand at the place."""
         if not text.startswith(self.old, self.start):
-            raise ValueError(f"fvsolve/{self.path}: {self.old!r} does not stand at character {self.start}")
+            raise ValueError(
+                f"fvsolve/{self.path}: {self.old!r} does not stand at character {self.start}"
+            )
         return text[: self.start] + self.new + text[self.start + len(self.old) :]
 
     def shown(self, text: str) -> str:
         """Line number and line of the file with the fault."""
         return (
-            f"{text.count(chr(10), 0, self.start) + 1}: {self.planted(text)[self.start :].partition(chr(10))[0][:60]}"
+            f"{text.count(chr(10), 0, self.start) + 1}: "
+            f"{self.planted(text)[self.start :].partition(chr(10))[0][:60]}"
         )
 
 
@@ -49,7 +52,11 @@ class Places:
 
     def __init__(self, text: str) -> None:
         self.text, self.lines = text, [0]
-        functions = [node for node in ast.parse(text).body if isinstance(node, (ast.FunctionDef, ast.ClassDef))]
+        functions = [
+            node
+            for node in ast.parse(text).body
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+        ]
         self.nodes = [node for function in functions for node in ast.walk(function)]
         for line in text.splitlines(keepends=True):
             self.lines.append(self.lines[-1] + len(line))
@@ -70,16 +77,28 @@ class Places:
         for node in self.nodes:
             if kind == "sign" and isinstance(node, ast.BinOp) and type(node.op) in SIGNS:
                 yield from self.operator(node.left, node.right, *SIGNS[type(node.op)])
-            elif kind == "comparison" and isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:
-                yield from self.operator(node.left, node.comparators[0], *COMPARISONS[type(node.ops[0])])
+            elif (
+                kind == "comparison"
+                and isinstance(node, ast.Compare)
+                and type(node.ops[0]) in COMPARISONS
+            ):
+                yield from self.operator(
+                    node.left, node.comparators[0], *COMPARISONS[type(node.ops[0])]
+                )
             elif kind == "factor" and isinstance(node, ast.BinOp) and is_product_of_floats(node):
                 yield self.start(node), "", "1.01 * "
             elif kind == "index" and isinstance(node, ast.Subscript) and is_index(node.slice):
                 begin, end = self.start(node.slice), self.end(node.slice)
                 old = self.text[begin:end]
-                yield begin, old, old.split()[0] if isinstance(node.slice, ast.BinOp) else f"{old} - 1"
+                yield (
+                    begin,
+                    old,
+                    old.split()[0] if isinstance(node.slice, ast.BinOp) else f"{old} - 1",
+                )
 
-    def operator(self, left: ast.AST, right: ast.AST, old: str, new: str) -> Iterator[tuple[int, str, str]]:
+    def operator(
+        self, left: ast.AST, right: ast.AST, old: str, new: str
+    ) -> Iterator[tuple[int, str, str]]:
         """Yield the operator between two operands, unless a text or a comment is between them."""
         begin, end = self.end(left), self.start(right)
         between = self.text[begin:end]
@@ -88,19 +107,29 @@ class Places:
 
 
 def is_text(node: ast.AST) -> bool:
-    return isinstance(node, ast.JoinedStr) or isinstance(node, ast.Constant) and isinstance(node.value, str)
+    return (
+        isinstance(node, ast.JoinedStr)
+        or isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+    )
 
 
 def is_product_of_floats(node: ast.BinOp) -> bool:
     """True for a product or quotient with a number that has a point."""
     numbers = [one.value for one in (node.left, node.right) if isinstance(one, ast.Constant)]
-    return isinstance(node.op, (ast.Mult, ast.Div)) and any(isinstance(number, float) for number in numbers)
+    return isinstance(node.op, (ast.Mult, ast.Div)) and any(
+        isinstance(number, float) for number in numbers
+    )
 
 
 def is_index(node: ast.AST) -> bool:
     """True for a name such as `k`, and for a name plus or minus 1."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
-        return isinstance(node.left, ast.Name) and isinstance(node.right, ast.Constant) and node.right.value == 1
+        return (
+            isinstance(node.left, ast.Name)
+            and isinstance(node.right, ast.Constant)
+            and node.right.value == 1
+        )
     return isinstance(node, ast.Name) and len(node.id) == 1
 
 
@@ -129,7 +158,9 @@ def candidates() -> dict[tuple[str, str], list[DrawnFault]]:
         if group := group_of(name):
             places = Places(path.read_text(encoding="utf-8"))
             for kind in KINDS:
-                lists[kind, group] += [DrawnFault(name.as_posix(), *place) for place in places.of_kind(kind)]
+                lists[kind, group] += [
+                    DrawnFault(name.as_posix(), *place) for place in places.of_kind(kind)
+                ]
     return lists
 
 

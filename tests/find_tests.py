@@ -59,11 +59,25 @@ def path_of(name: str) -> Path:
 
 def record() -> None:
     """Run the tests of both parts with a context for each test."""
-    options = ["-q", "-n", "2", "--dist", "worksteal", "--cov=fvsolve", "--cov-context=test", "--cov-report="]
+    options = [
+        "-q",
+        "-n",
+        "2",
+        "--dist",
+        "worksteal",
+        "--cov=fvsolve",
+        "--cov-context=test",
+        "--cov-report=",
+    ]
     for name, (environment, paths) in RECORDINGS.items():
         path_of(name).parent.mkdir(exist_ok=True)
         environment = os.environ | environment | {"COVERAGE_FILE": str(path_of(name))}
-        subprocess.run([sys.executable, "-m", "pytest", *options, *paths], cwd=TOP, env=environment, check=False)
+        subprocess.run(
+            [sys.executable, "-m", "pytest", *options, *paths],
+            cwd=TOP,
+            env=environment,
+            check=False,
+        )
 
 
 def tests_of(module: Path, line: int | None) -> Counter:
@@ -82,7 +96,9 @@ def tests_of(module: Path, line: int | None) -> Counter:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("module", nargs="?", help="path of a module")
     parser.add_argument("--line", type=int, metavar="N", help="number of a line of the module")
     parser.add_argument("--record", action="store_true", help="run the tests and record")

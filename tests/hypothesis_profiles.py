@@ -16,7 +16,12 @@ from hypothesis.internal.conjecture import providers
 
 KEPT = Path(__file__).parent / "failing_examples"
 NEW = int(os.environ.get("FVSOLVE_EXAMPLES", "0"))
-COMMON = {"deadline": None, "database": None, "print_blob": True, "suppress_health_check": list(HealthCheck)}
+COMMON = {
+    "deadline": None,
+    "database": None,
+    "print_blob": True,
+    "suppress_health_check": list(HealthCheck),
+}
 settings.register_profile("full", max_examples=100, derandomize=not NEW, **COMMON)
 settings.register_profile("quick", max_examples=5, derandomize=not NEW, **COMMON)
 
@@ -32,7 +37,9 @@ def examples(number: int, **more) -> Callable[[Callable], Callable]:
     def decorated(test: Callable) -> Callable:
         for arguments in failing_examples(test):
             test = example(**arguments)(test)
-        return settings(max_examples=NEW or min(number, settings.default.max_examples), **more)(test)
+        return settings(max_examples=NEW or min(number, settings.default.max_examples), **more)(
+            test
+        )
 
     return decorated
 

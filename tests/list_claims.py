@@ -20,7 +20,9 @@ def claims(files: dict[str, str]) -> dict[str, str]:
     lines = {}
     for path, text in sorted(files.items()):
         for node in ast.walk(ast.parse(text)):
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.name.startswith("test_"):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.name.startswith(
+                "test_"
+            ):
                 lines[f"{path}::{node.name}"] = (ast.get_docstring(node) or "").split("\n")[0]
     return lines
 
@@ -32,7 +34,9 @@ def of_tree() -> dict[str, str]:
 
 def of_commit(commit: str) -> dict[str, str]:
     """Test files of a commit, by path."""
-    archive = subprocess.run(["git", "archive", commit, "tests"], cwd=TOP, capture_output=True, check=True).stdout
+    archive = subprocess.run(
+        ["git", "archive", commit, "tests"], cwd=TOP, capture_output=True, check=True
+    ).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as files:
         members = [member for member in files if Path(member.name).match("test_*.py")]
         return {member.name: files.extractfile(member).read().decode() for member in members}

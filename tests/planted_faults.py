@@ -46,7 +46,9 @@ class Fault:
     def planted(self, text: str) -> str:
         """Text of the file with the fault; raises ValueError if the old text does not occur exactly once."""
         if text.count(self.old) != 1:
-            raise ValueError(f"fvsolve/{self.path}: {self.old!r} stands {text.count(self.old)} times, expected once")
+            raise ValueError(
+                f"fvsolve/{self.path}: {self.old!r} stands {text.count(self.old)} times, expected once"
+            )
         return text.replace(self.old, self.new)
 
     def shown(self, text: str) -> str:
@@ -82,19 +84,43 @@ FAULTS = [
         "c[i] = s[i] / (m[i] + wall)",
         "c[i] = 2.0 * s[i] / (m[i] + wall)",
     ),
-    Fault("compile/cache_folders.py", 'digest.update(path.read_bytes() + b"\\0")', 'digest.update(b"\\0")'),
+    Fault(
+        "compile/cache_folders.py",
+        'digest.update(path.read_bytes() + b"\\0")',
+        'digest.update(b"\\0")',
+    ),
     Fault("report/draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("core/schemes.py", "(k + 1) ** power - k**power", "(k + 1) ** power + k**power"),
-    Fault("core/mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
-    Fault("core/steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
-    Fault("core/steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
-    Fault("core/steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
+    Fault(
+        "core/mesh/mesh.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"
+    ),
+    Fault(
+        "core/steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"
+    ),
+    Fault(
+        "core/steppers/analysis/trees.py",
+        "return nodes * math.prod(",
+        "return (nodes + 1) * math.prod(",
+    ),
+    Fault(
+        "core/steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"
+    ),
     Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
     Fault(
-        "studies/validation/row_verdicts.py", "max(pair[0] - value, value - pair[1], 0.0)", "max(pair[0] - value, 0.0)"
+        "studies/validation/row_verdicts.py",
+        "max(pair[0] - value, value - pair[1], 0.0)",
+        "max(pair[0] - value, 0.0)",
     ),
-    Fault("core/kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
-    Fault("core/kernels/steady_friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),
+    Fault(
+        "core/kernels/pipes.py",
+        "dl[i] = k * (fl[i + 1] - fl[i])",
+        "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])",
+    ),
+    Fault(
+        "core/kernels/steady_friction.py",
+        "force = loss * (size * flow)",
+        "force = 1.01 * loss * (size * flow)",
+    ),
     Fault(
         "core/kernels/density/log_law.py",
         'st["reference"] + q / (1.0 / st["beta"] + compliance)',
@@ -139,30 +165,60 @@ FAULTS = [
         "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
         "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
     ),
-    Fault("studies/water_quality/moving_segments.py", "entered += goes * supply", "entered -= goes * supply"),
+    Fault(
+        "studies/water_quality/moving_segments.py",
+        "entered += goes * supply",
+        "entered -= goes * supply",
+    ),
     Fault("studies/stability/growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
         "core/solve/held_inputs.py",
         "value_at(model.tables, target.schedule, t, np.inf) / target.scale",
         "value_at(model.tables, target.schedule, t, np.inf) * target.scale",
     ),
-    Fault("exchange/fmi/variables.py", "inputs + list({variable.name", "inputs[:-1] + list({variable.name"),
-    Fault("studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"),
+    Fault(
+        "exchange/fmi/variables.py",
+        "inputs + list({variable.name",
+        "inputs[:-1] + list({variable.name",
+    ),
+    Fault(
+        "studies/loops/sampled.py", "self.drive * (1.0 + z[place])", "self.drive * (1.0 - z[place])"
+    ),
     Fault(
         "features/networks/elimination.py",
         "scale = (1.0, -1.0, -item.value, item.value)",
         "scale = (1.0, -1.0, item.value, -item.value)",
     ),
-    Fault("features/networks/kernels/networks.py", "forward = most - torque", "forward = 1.01 * most - torque"),
+    Fault(
+        "features/networks/kernels/networks.py",
+        "forward = most - torque",
+        "forward = 1.01 * most - torque",
+    ),
     Fault(
         "features/controls/kernels/input_histories.py",
         "weight *= (time - other) / (histories[here] - other)",
         "weight *= 1.01 * (time - other) / (histories[here] - other)",
     ),
-    Fault("features/controls/balance.py", "-residual[acts] / size[acts], RANK", "residual[acts] / size[acts], RANK"),
-    Fault("features/delay_lines/lower.py", '2.0 * beta * pipe["admittance"] /', '2.02 * beta * pipe["admittance"] /'),
-    Fault("features/scalars/balances.py", "decayed = -float(np.sum(decay", "decayed = float(np.sum(decay"),
-    Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
+    Fault(
+        "features/controls/balance.py",
+        "-residual[acts] / size[acts], RANK",
+        "residual[acts] / size[acts], RANK",
+    ),
+    Fault(
+        "features/delay_lines/lower.py",
+        '2.0 * beta * pipe["admittance"] /',
+        '2.02 * beta * pipe["admittance"] /',
+    ),
+    Fault(
+        "features/scalars/balances.py",
+        "decayed = -float(np.sum(decay",
+        "decayed = float(np.sum(decay",
+    ),
+    Fault(
+        "studies/ports/positive_real.py",
+        "order = n.degree - d.degree",
+        "order = d.degree - n.degree",
+    ),
     Fault(
         "core/output/csv_files.py",
         'self.along("u", fields), self.along("v", fields)',
@@ -174,7 +230,9 @@ FAULTS = [
         "gain = cheapest.seconds / richest.seconds",
     ),
     Fault(
-        "features/basins/conduit/conduit_cells.py", "rough[0] * hydraulic_radius_power", "2.0 * hydraulic_radius_power"
+        "features/basins/conduit/conduit_cells.py",
+        "rough[0] * hydraulic_radius_power",
+        "2.0 * hydraulic_radius_power",
     ),
     Fault("features/basins/frame_forces.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
@@ -189,27 +247,41 @@ FAULTS = [
     ),
     Fault(
         "features/basins/free_surface/surface_patches.py",
-        "dydt[o + i] += flow * near.flow_weight(",
-        "dydt[o + i] -= flow * near.flow_weight(",
+        "dydt[o + i] += (\n            flow * near.flow_weight(",
+        "dydt[o + i] -= (\n            flow * near.flow_weight(",
     ),
-    Fault("parts/full_pipe.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault(
+        "parts/full_pipe.py",
+        "DN_NPS.get(number, number / 25.0)",
+        "DN_NPS.get(number, number / 25.4)",
+    ),
     Fault(
         "parts/accumulator/law.py",
         "rho * (n * p * compressibility * (total - volume) + volume)",
         "rho * (n * p * compressibility * (total - volume) - volume)",
     ),
-    Fault("parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
-    Fault("parts/pump/law.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
+    Fault(
+        "parts/tank.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"
+    ),
+    Fault(
+        "parts/pump/law.py",
+        "residual = drop + weight * head",
+        "residual = drop + 1.01 * weight * head",
+    ),
     Fault("core/run/verdicts.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault(
-        "exchange/epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"
+        "exchange/epanet/part_tables.py",
+        "2.0 * GRAVITY * drop / velocity**2",
+        "2.02 * GRAVITY * drop / velocity**2",
     ),
     Fault(
         "core/solve/run_summary.py",
         'row["inflow"] - row["outflow"] for name',
         'row["inflow"] + row["outflow"] for name',
     ),
-    Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),
+    Fault(
+        "exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"
+    ),
 ]
 
 
@@ -230,7 +302,11 @@ def copied(folder: Path) -> Path:
 
 def tests_fail(folder: Path, jobs: int, *options: str) -> str:
     """Name of the first test that fails, empty if all pass."""
-    environment = os.environ | {"PYTHONPATH": str(folder), "MPLBACKEND": "Agg", "PYVISTA_OFF_SCREEN": "true"}
+    environment = os.environ | {
+        "PYTHONPATH": str(folder),
+        "MPLBACKEND": "Agg",
+        "PYVISTA_OFF_SCREEN": "true",
+    }
     command = [
         sys.executable,
         "-m",
@@ -249,7 +325,9 @@ def tests_fail(folder: Path, jobs: int, *options: str) -> str:
     if found.returncode in (0, 5):
         return ""
     if not lines:
-        raise RuntimeError(f"pytest ended with {found.returncode}: {found.stdout[-2000:]}{found.stderr[-2000:]}")
+        raise RuntimeError(
+            f"pytest ended with {found.returncode}: {found.stdout[-2000:]}{found.stderr[-2000:]}"
+        )
     return lines[0].split(" - ")[0]
 
 
@@ -271,7 +349,9 @@ def near(fault: Fault | DrawnFault) -> list[str]:
     return files or ([f"tests/{part}"] if (TOP / "tests" / part).is_dir() else [])
 
 
-def searched(folder: Path, fault: Fault | DrawnFault, options: argparse.Namespace) -> tuple[str, str]:
+def searched(
+    folder: Path, fault: Fault | DrawnFault, options: argparse.Namespace
+) -> tuple[str, str]:
     """Tests that find a fault, "quick", "full" or "", and the first of them that fails."""
     path = folder / "fvsolve" / fault.path
     text, files = path.read_text(encoding="utf-8"), near(fault)
@@ -290,16 +370,36 @@ def searched(folder: Path, fault: Fault | DrawnFault, options: argparse.Namespac
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("--full", action="store_true", help="run all tests on faults that the quick tests miss")
-    asked.add_argument("--near", action="store_true", help="run the quick tests of the module of a fault only")
-    asked.add_argument("--list", action="store_true", help="print the faults and run no tests")
-    asked.add_argument("--only", default="", metavar="TEXT", help="only faults whose path contains this text")
-    asked.add_argument(
-        "--draw", type=int, default=0, metavar="N", help="number of drawn faults; those of the list if 0"
+    asked = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    asked.add_argument("--seed", type=int, default=1, metavar="N", help="seed of drawn faults (default 1)")
-    asked.add_argument("--jobs", type=int, default=2, metavar="N", help="number of processes of a test run (default 2)")
+    asked.add_argument(
+        "--full", action="store_true", help="run all tests on faults that the quick tests miss"
+    )
+    asked.add_argument(
+        "--near", action="store_true", help="run the quick tests of the module of a fault only"
+    )
+    asked.add_argument("--list", action="store_true", help="print the faults and run no tests")
+    asked.add_argument(
+        "--only", default="", metavar="TEXT", help="only faults whose path contains this text"
+    )
+    asked.add_argument(
+        "--draw",
+        type=int,
+        default=0,
+        metavar="N",
+        help="number of drawn faults; those of the list if 0",
+    )
+    asked.add_argument(
+        "--seed", type=int, default=1, metavar="N", help="seed of drawn faults (default 1)"
+    )
+    asked.add_argument(
+        "--jobs",
+        type=int,
+        default=2,
+        metavar="N",
+        help="number of processes of a test run (default 2)",
+    )
     options = asked.parse_args()
     faults = drawn(options.seed, options.draw) if options.draw else FAULTS
     needed = DRAWN_NEEDED if options.draw else (QUICK_NEEDED, ALL_NEEDED)
@@ -307,13 +407,19 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="fvsolve-faults-") as name:
         folder = copied(Path(name))
         for fault in (fault for fault in faults if options.only in fault.path):
-            start, line = time.perf_counter(), fault.shown((PACKAGE / fault.path).read_text(encoding="utf-8"))
+            start, line = (
+                time.perf_counter(),
+                fault.shown((PACKAGE / fault.path).read_text(encoding="utf-8")),
+            )
             if options.list:
                 print(f"fvsolve/{fault.path}:{line}")
                 continue
             by, first = searched(folder, fault, options)
             count, quick, every = count + 1, quick + (by == "quick"), every + bool(by)
-            print(f"{by or 'MISSED':6s} {time.perf_counter() - start:5.0f} s  {fault.path}:{line}  {first}", flush=True)
+            print(
+                f"{by or 'MISSED':6s} {time.perf_counter() - start:5.0f} s  {fault.path}:{line}  {first}",
+                flush=True,
+            )
     if options.list:
         return
     print(f"{count} faults: quick tests find {quick}, expected {needed[0]}")

@@ -23,7 +23,9 @@ class Tally:
         Integrator.__init__ = self._after(
             Integrator.__init__, lambda stepper, method, *_: self._add("method", method.name)
         )
-        cli.application = self._after(cli.application, lambda *command: self._add("command", *command))
+        cli.application = self._after(
+            cli.application, lambda *command: self._add("command", *command)
+        )
 
     def add(self, plain: dict[str, list[str]]) -> None:
         for kind, names in plain.items():
@@ -35,7 +37,9 @@ class Tally:
     def missing(self) -> list[str]:
         """Lines for each kind with a name that was not run, and for each listed test that does not exist."""
         lines = {kind: sorted(names - self.names[kind]) for kind, names in expected().items()}
-        unknown = [f"tests/durations.json: {name} is not a test" for name in sorted(self.names["unknown"])]
+        unknown = [
+            f"tests/durations.json: {name} is not a test" for name in sorted(self.names["unknown"])
+        ]
         return [f"{kind}: {', '.join(names)}" for kind, names in lines.items() if names] + unknown
 
     def _add(self, kind: str, *names: str) -> None:
@@ -72,7 +76,11 @@ def unknown_names(listed, collected: list[str]) -> set[str]:
     """
     files = {name.partition("::")[0] for name in collected}
     places = {name: name.partition("::")[0] for name in {*listed} - {*collected}}
-    return {name for name, file in places.items() if file in files or not (Path(__file__).parents[1] / file).is_file()}
+    return {
+        name
+        for name, file in places.items()
+        if file in files or not (Path(__file__).parents[1] / file).is_file()
+    }
 
 
 def expected() -> dict[str, set[str]]:
@@ -87,6 +95,9 @@ def expected() -> dict[str, set[str]]:
         "scheme": set(SCHEMES),
         "method": {method.name for method in METHODS.values()},
         "law": set(LAWS),
-        "command": {command.name or command.callback.__name__ for command in cli.application().registered_commands},
+        "command": {
+            command.name or command.callback.__name__
+            for command in cli.application().registered_commands
+        },
         "shipped case": {path.stem for path in folders.CASES.glob("*.toml")},
     }

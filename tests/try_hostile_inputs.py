@@ -34,7 +34,11 @@ def attempt(item: hostile_inputs.Input, folder: Path) -> str:
             case = fvsolve.load(Raw(item.table, "case", None, item.folder))
         else:
             path = folder / "case.toml"
-            text = item.text.encode("utf-8", "surrogatepass") if isinstance(item.text, str) else item.text
+            text = (
+                item.text.encode("utf-8", "surrogatepass")
+                if isinstance(item.text, str)
+                else item.text
+            )
             path.write_bytes(text)
             case = fvsolve.load(path)
         cells = sum(link.cells for link in case.links.values() if link.kind == "pipe")
@@ -60,16 +64,26 @@ def harm(item: hostile_inputs.Input, folder: Path) -> tuple[str, str]:
     seconds = time.process_time() - began
     memory = 1024.0 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
     faults = [] if outcome in ("refused", "built", "loaded") else [outcome]
-    faults += [f"{seconds:.1f} s"] * (seconds > SECONDS) + [f"{memory / 1e9:.2f} GB"] * (memory > MEMORY)
-    faults += sorted({f"{w.category.__name__}: {w.message} ({Path(w.filename).name}, line {w.lineno})" for w in caught
-                      if issubclass(w.category, RuntimeWarning)})  # fmt: skip
+    faults += [f"{seconds:.1f} s"] * (seconds > SECONDS) + [f"{memory / 1e9:.2f} GB"] * (
+        memory > MEMORY
+    )
+    faults += sorted(
+        {
+            f"{w.category.__name__}: {w.message} ({Path(w.filename).name}, line {w.lineno})"
+            for w in caught
+            if issubclass(w.category, RuntimeWarning)
+        }
+    )
     return outcome, "; ".join(faults)
 
 
 def drawn(seed: int, count: int) -> list[hostile_inputs.Input]:
     """Inputs drawn by a seed: nine of ten are mutants of shipped cases, the others texts."""
     draw = random.Random(seed)
-    return [*hostile_inputs.mutants(draw, count - count // 10), *hostile_inputs.texts(draw, count // 10)]
+    return [
+        *hostile_inputs.mutants(draw, count - count // 10),
+        *hostile_inputs.texts(draw, count // 10),
+    ]
 
 
 def main() -> None:
@@ -77,7 +91,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--only", default="", help="text in the names of the inputs")
-    parser.add_argument("--part", default="1/1", help="part of the inputs, for several processes, such as 1/2 and 2/2")
+    parser.add_argument(
+        "--part",
+        default="1/1",
+        help="part of the inputs, for several processes, such as 1/2 and 2/2",
+    )
     options = parser.parse_args()
     outcomes, harmful = Counter(), 0
     part, parts = map(int, options.part.split("/"))

@@ -17,7 +17,12 @@ from fvsolve.case import bodies
 from fvsolve.case.interior_patches import interior_patches
 from fvsolve.case.moving_walls import moving_wall_faults, moving_walls
 from fvsolve.case.output_grids import grid_faults
-from fvsolve.case.raster_meshes import raster_extent, rasters_with_holes, stretch_notes, terrace_notes
+from fvsolve.case.raster_meshes import (
+    raster_extent,
+    rasters_with_holes,
+    stretch_notes,
+    terrace_notes,
+)
 from fvsolve.case.resource_checks import BASIN_CELL, byte_text, free_memory, name_faults
 from fvsolve.case.sections import Output
 from fvsolve.core.fluid.laws import law_names
@@ -31,9 +36,19 @@ from fvsolve.units import show
 def closure_faults(basin: Any, options: Any) -> Faults:
     """Faults (key path within the patch, message) of the closure of a driven patch; options : keys of the patch."""
     if options.depth is not None and options.discharge is None:
-        yield ("depth",), "is the depth of an inflow by `discharge`; give `discharge` too, or leave this key out"
-    elif options.depth is not None and options.depth.kind != "control" and not options.depth.value.max() > 0.0:
-        yield ("depth",), "is never above 0; expected the depth of a supercritical inflow, or no key for critical flow"
+        yield (
+            ("depth",),
+            "is the depth of an inflow by `discharge`; give `discharge` too, or leave this key out",
+        )
+    elif (
+        options.depth is not None
+        and options.depth.kind != "control"
+        and not options.depth.value.max() > 0.0
+    ):
+        yield (
+            ("depth",),
+            "is never above 0; expected the depth of a supercritical inflow, or no key for critical flow",
+        )
     if options.closure is None:
         return
     below = "boundary" if options.closure == options.boundary else options.closure
@@ -41,7 +56,10 @@ def closure_faults(basin: Any, options: Any) -> Faults:
         yield (below,), f"does not apply to physics {show(basin.physics)}; leave this key out"
         return
     if basin.on is not None:
-        yield (below,), "a basin on a body has no driven patches; expected a wall, an open boundary or a link"
+        yield (
+            (below,),
+            "a basin on a body has no driven patches; expected a wall, an open boundary or a link",
+        )
     if options.normal_slope is not None and not basin.manning:
         yield (below,), "needs the friction of the bed; give `manning` of the basin too"
     if options.rating is not None and options.rating.fault:
@@ -57,11 +75,17 @@ def source_faults(basin: Any, mesh: Any) -> Faults:
     frames = len(getattr(getattr(basin, "rain", None), "frames", ()))
     if (size := 2 * 8 * frames * len(mesh.cells)) > free_memory():  # copied once
         text = f"{frames} frames on {len(mesh.cells)} cells take about {byte_text(size)} of memory, and "
-        yield ("rain",), f"{text}{byte_text(free_memory())} are free; expected fewer frames or cells"
+        yield (
+            ("rain",),
+            f"{text}{byte_text(free_memory())} are free; expected fewer frames or cells",
+        )
     for key in ("rain", "infiltration", "walls"):
         if getattr(basin, key, None) and (basin.on is not None or moving_walls(basin)):
             where = "a basin on a body" if basin.on is not None else "a basin with a moving wall"
-            yield (key,), f"is not supported for {where}; expected a fixed basin, or leave this key out"
+            yield (
+                (key,),
+                f"is not supported for {where}; expected a fixed basin, or leave this key out",
+            )
 
 
 def face_wall_faults(basin: Any, mesh: Any) -> Faults:
@@ -78,7 +102,10 @@ def face_wall_faults(basin: Any, mesh: Any) -> Faults:
                 what += f"; its groups are {listing(known) or 'none'}"
             yield ("walls", name, "group"), what
         elif not wall.chain(mesh).faces.size:
-            low, high = (", ".join(f"{x:.6g}" for x in end) for end in (mesh.points.min(0), mesh.points.max(0)))
+            low, high = (
+                ", ".join(f"{x:.6g}" for x in end)
+                for end in (mesh.points.min(0), mesh.points.max(0))
+            )
             text = f"cuts no face between two cells; the basin reaches from ({low}) m to ({high}) m"
             yield ("walls", name, "line" if wall.group is None else "group"), text
 
@@ -113,17 +140,30 @@ def crest_faults(links: dict[str, Any], pools: dict[str, Any], meshes: dict) -> 
     for name, weir in links.items():
         if not is_kind(weir, "weir") or weir.crest.kind == "control":
             continue
-        ends, levels, doubts = [*weir.ports.values()], [], []
+        ends = [*weir.ports.values()]
+        levels = []
+        doubts = []
         for pool, _, patch in (end.partition(".") for end in ends):
-            if pool in meshes and patch in patch_names(meshes[pool]) and getattr(pools[pool], "bed", None) is not None:
+            if (
+                pool in meshes
+                and patch in patch_names(meshes[pool])
+                and getattr(pools[pool], "bed", None) is not None
+            ):
                 lowest, doubt = bed_at(pools[pool], meshes[pool], patch)
                 levels.append((pools[pool].elevation or 0.0) + lowest)
                 doubts.append(doubt)
         top = float(weir.crest.value.max())
-        if len(levels) == 2 and all(top < level - doubt for level, doubt in zip(levels, doubts, strict=True)):
-            at = " and ".join(f"{level:g} m at {end}" for level, end in zip(levels, ends, strict=True))
+        if len(levels) == 2 and all(
+            top < level - doubt for level, doubt in zip(levels, doubts, strict=True)
+        ):
+            at = " and ".join(
+                f"{level:g} m at {end}" for level, end in zip(levels, ends, strict=True)
+            )
             text = f"{top:g} m above datum is below the bed on both sides, {at}"
-            yield ("links", name, "crest"), f"{text}; expected a crest above the lower bed, in heights above datum"
+            yield (
+                ("links", name, "crest"),
+                f"{text}; expected a crest above the lower bed, in heights above datum",
+            )
 
 
 if TYPE_CHECKING:
@@ -179,7 +219,9 @@ class BasinFields:
             near = ",".join(f"{value:.6g}" for value in self.points.nearest(x, y))
             east, north = getattr(self.basin, "origin", None) or (0.0, 0.0)
             if (east or north) and self.points.cell(x - east, y - north) >= 0:
-                near += f"; for easting and northing subtract `origin`: {x - east:.6g},{y - north:.6g}"
+                near += (
+                    f"; for easting and northing subtract `origin`: {x - east:.6g},{y - north:.6g}"
+                )
             text = f"{x:.9g},{y:.9g} m lies outside the mesh or in a hole"
             raise ValueError(f"{text}; the nearest point inside is {near}")
         return x, y
@@ -192,7 +234,9 @@ class BasinFields:
         return MeshPoints(self.mesh)
 
 
-def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None, scalars: dict) -> dict[str, Any]:
+def probe_kinds(
+    name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None, scalars: dict
+) -> dict[str, Any]:
     """Kinds of a basin and of its patches for the reading of probes, by full name.
 
     mesh, lumped : mesh of a basin with cells, or of a basin whose water is lumped masses; the other is None
@@ -200,13 +244,18 @@ def probe_kinds(name: str, basin: Basin, mesh: Mesh | None, lumped: Mesh | None,
     """
     own = basin.physics_type
     if lumped is not None:
-        fields = {"depth": own.fields["depth"]} if basin.sloshing == "modes" and own.has_modes else {}
+        fields = (
+            {"depth": own.fields["depth"]} if basin.sloshing == "modes" and own.has_modes else {}
+        )
         what = f"the water of {name} has no cells (sloshing = {show(basin.sloshing)})"
         return {name: BasinFields(fields, lumped, what=what) if own.has_modes else None}
     fields = own.fields | (dict.fromkeys(scalars, "number") if own.carries else {})
     patches = {f"{name}.{patch}": place_kind(basin, patch) for patch in patch_names(mesh)}
     what = f"{name} has the physics {show(own.name)}"
-    return {name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals, basin=basin), **patches}
+    return {
+        name: BasinFields(fields, mesh, bool(own.maxima), what, own.totals, basin=basin),
+        **patches,
+    }
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -215,31 +264,54 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
 
     try:
         if basin.is_rectangle:
-            size, cells, corner = raster_extent(basin, setting) if basin.mesh else (basin.size, basin.cells, (0.0, 0.0))
+            size, cells, corner = (
+                raster_extent(basin, setting)
+                if basin.mesh
+                else (basin.size, basin.cells, (0.0, 0.0))
+            )
             count = math.prod(cells or ())
             if count * BASIN_CELL > free_memory():
                 text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
                 text += f", and {byte_text(free_memory())} are free; expected fewer cells"
                 raise ValueFault([(("mesh", "cell") if basin.mesh else ("cells",), text)])
-            sides = {name: (item.side, *item.span) if item.span else item.side
-                     for name, item in basin.patches.items() if not item.is_interior}  # fmt: skip
+            sides = {
+                name: (item.side, *item.span) if item.span else item.side
+                for name, item in basin.patches.items()
+                if not item.is_interior
+            }
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
             mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
-            mesh = replace(mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting))
+            mesh = replace(
+                mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting)
+            )
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
-            raise ValueFault([((), "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file")])
+            raise ValueFault(
+                [
+                    (
+                        (),
+                        "`outside` of a raster applies to rectangles; leave it out, or cut the mesh file",
+                    )
+                ]
+            )
         groups = [wall.group for wall in (getattr(basin, "walls", None) or {}).values()]
         mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
         mesh = replace(mesh, notes=(*mesh.notes, *stretch_notes(basin, mesh, setting)))
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
-            name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
-            raise ValueFault([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
-                          for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
-        raise ValueFault([(fault_keys(fault.place), fault.message) for fault in error.faults]) from None
+            name = Path(basin.mesh.file).name
+            places = [item.place == "unit" for item in error.faults]
+            raise ValueFault(
+                [
+                    (("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
+                    for key, item in zip(places, error.faults, strict=True)
+                ]
+            ) from None
+        raise ValueFault(
+            [(fault_keys(fault.place), fault.message) for fault in error.faults]
+        ) from None
 
 
 def fault_keys(place: str) -> tuple:
@@ -270,11 +342,16 @@ def output_faults(output: Output, nodes: dict[str, Any]) -> Faults:
         yield from ((key, text) for text in name_faults(name))
         yield from _basin_faults((*key, "basin"), grid.basin, nodes, False)
         if isinstance(pool, BasinFields) and pool.basin is not None:
-            yield from (((*key, *below), text) for below, text in grid_faults(grid, pool, output.fields))
+            yield from (
+                ((*key, *below), text) for below, text in grid_faults(grid, pool, output.fields)
+            )
     for k, name in enumerate(output.maxima):
         yield from _basin_faults(("output", "maxima", k), name, nodes, True)
     if output.lines and output.fields == 0:
-        yield ("output", "lines"), "are written with every frame, but `fields` is 0; expected `fields = 1` or more"
+        yield (
+            ("output", "lines"),
+            "are written with every frame, but `fields` is 0; expected `fields = 1` or more",
+        )
 
 
 def add_gauges(output: Output, nodes: dict[str, Any]) -> Faults:
@@ -304,7 +381,9 @@ class SectionKind:
     kind: ClassVar[str] = "section"
 
 
-def section_kinds(output: Output, kinds: dict[str, Any]) -> tuple[dict[str, SectionKind | None], list]:
+def section_kinds(
+    output: Output, kinds: dict[str, Any]
+) -> tuple[dict[str, SectionKind | None], list]:
     """(kinds of the sections of `[output]` for probes, None for a faulty section; faults (key path, message)).
 
     kinds : kinds of all parts, as for `read_probe`
@@ -313,13 +392,24 @@ def section_kinds(output: Output, kinds: dict[str, Any]) -> tuple[dict[str, Sect
     for name, section in output.sections.items():
         key, pool = ("output", "sections", name), kinds["nodes"].get(section.basin)
         found = [(key, text) for text in name_faults(name)]
-        groups = [group for group in ("nodes", "links", "controls", "routes") if name in kinds.get(group, ())]
-        found += [(key, f"{name} is also a name in `{group}`; expected another name") for group in groups]
+        groups = [
+            group
+            for group in ("nodes", "links", "controls", "routes")
+            if name in kinds.get(group, ())
+        ]
+        found += [
+            (key, f"{name} is also a name in `{group}`; expected another name") for group in groups
+        ]
         found += _basin_faults((*key, "basin"), section.basin, kinds["nodes"], True)
         found += [((*key, end), text) for end, text in _end_faults(section, pool, True)]
         if isinstance(pool, BasinFields) and not found:
             if pool.basin.on is not None or moving_walls(pool.basin):
-                found.append(((*key, "basin"), f"{section.basin} moves or has a moving wall; expected a fixed basin"))
+                found.append(
+                    (
+                        (*key, "basin"),
+                        f"{section.basin} moves or has a moving wall; expected a fixed basin",
+                    )
+                )
             elif not section.chain(pool.mesh).faces.size:
                 found.append((key, "cuts no face between two cells; expected a longer line"))
         result[name] = None if found or pool is None else SectionKind()
@@ -334,7 +424,9 @@ def _basin_faults(key: tuple, name: Any, nodes: dict[str, Any], recorded: bool) 
     """
     pool = nodes.get(name, name) if isinstance(name, str) else name
     if pool is not None and not isinstance(pool, BasinFields):
-        pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, BasinFields)]
+        pools = [
+            basin for basin, kind in nodes.items() if kind is None or isinstance(kind, BasinFields)
+        ]
         near = did_you_mean(str(name), pools) or f"; basins are {listing(pools) or 'none'}"
         yield key, f"no basin named {show(name)}{near}"
     elif pool is not None and recorded and not pool.has_maxima:
@@ -366,7 +458,9 @@ def patch_names(mesh: Mesh) -> tuple[str, ...]:
 
 def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
     """Indices of the cells that have a face in a patch, or of those in an interior patch : int64[count], sorted."""
-    return np.unique(mesh.faces(patch).inside) if patch not in mesh.interior else mesh.interior[patch]
+    return (
+        np.unique(mesh.faces(patch).inside) if patch not in mesh.interior else mesh.interior[patch]
+    )
 
 
 def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
@@ -384,7 +478,9 @@ def may_have_faces(basin: Basin) -> bool:
     return basin.physics_type.has_closures and basin.on is None and not moving_walls(basin)
 
 
-def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], meshes: dict) -> frozenset[str]:
+def patches_with_faces(
+    nodes: dict[str, Any], links: dict[str, Any], meshes: dict
+) -> frozenset[str]:
     """Full names of the patches through whose faces the flow of their links passes; cells take it at other patches.
 
     These are patches of fixed basins that may have closures, unless a rigid column joins them: a level that a column
@@ -395,8 +491,18 @@ def patches_with_faces(nodes: dict[str, Any], links: dict[str, Any], meshes: dic
         (others if link.kind == "rigid-column" else joined).update(link.ports.values())
     fixed = [name for name in meshes if may_have_faces(nodes[name])]
     names = {f"{name}.{patch}" for name in fixed for patch in patch_names(meshes[name])}
-    given = {f"{name}.{patch}" for name in fixed for patch, keys in nodes[name].patches.items() if is_source(keys)}
-    ends = {f"{name}.{patch}" for name in fixed if nodes[name].added for patch in patch_names(meshes[name])}
+    given = {
+        f"{name}.{patch}"
+        for name in fixed
+        for patch, keys in nodes[name].patches.items()
+        if is_source(keys)
+    }
+    ends = {
+        f"{name}.{patch}"
+        for name in fixed
+        if nodes[name].added
+        for patch in patch_names(meshes[name])
+    }
     return frozenset(names & ((joined | given) - others) | ends)
 
 
@@ -472,8 +578,41 @@ def _patch_hint(basin: Basin, mesh: Any, name: str) -> str:
     )
 
 
+def patch_faults(name: str, basin: Any, mesh: Any, joined: set) -> Faults:
+    """Faults (key path below `patches`, message) of the patches of a basin.
+
+    joined : places that links join
+    """
+    own = basin.physics_type
+    known = patch_names(mesh)
+    for patch, options in basin.patches.items():
+        if patch not in known:
+            text = f"the mesh has no such patch; {_patch_hint(basin, mesh, patch)}"
+            yield (patch,), text
+        elif f"{name}.{patch}" in joined and not own.joined:
+            text = (
+                "a link joins this patch, but the key `velocity` gives the flow; expected no link"
+            )
+            yield (patch,), text
+        elif f"{name}.{patch}" in joined:
+            text = "a link joins this patch and is its boundary; leave this key out"
+            given = (key for key in options.boundary_keys if getattr(options, key) is not None)
+            yield from (((patch, key), text) for key in given)
+        if patch in known:
+            faults = [*closure_faults(basin, options), *rating_faults(basin, mesh, patch)]
+            yield from (((patch, *below), text) for below, text in faults)
+        if options.impedance is not None and not own.allows_impedance:
+            text = f"does not apply to physics {show(basin.physics)}; leave this key out"
+            yield (patch, "impedance"), text
+
+
 def find_faults(
-    nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
+    nodes: dict[str, Any],
+    links: dict[str, Any],
+    meshes: dict,
+    fluid: Any,
+    times: tuple,
+    all_nodes: Any,
 ) -> Faults:
     """Faults (key path, message) of basins: density law, body, patches, moving walls, formulas.
 
@@ -488,28 +627,16 @@ def find_faults(
         own = basin.physics_type
         if fluid is not None and not own.accepts_law(fluid.law):
             laws = law_names(lambda law, own=own: own.accepts_law(law.name))
-            yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.description}; expected {laws}"
+            yield (
+                ("fluid", "law"),
+                f"{show(fluid.law)} does not apply to {own.description}; expected {laws}",
+            )
         yield from bodies.basin_faults(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
-        known = patch_names(meshes[name])
         yield from moving_wall_faults(name, basin, meshes[name], nodes, joined, times, all_nodes)
-        for patch, options in basin.patches.items():
-            if patch not in known:
-                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, meshes[name], patch)}"
-            elif f"{name}.{patch}" in joined and not own.joined:
-                text = "a link joins this patch, but the key `velocity` gives the flow; expected no link"
-                yield (*key, "patches", patch), text
-            elif f"{name}.{patch}" in joined:
-                text = "a link joins this patch and is its boundary; leave this key out"
-                given = (other for other in options.boundary_keys if getattr(options, other) is not None)
-                yield from (((*key, "patches", patch, other), text) for other in given)
-            if patch in known:
-                faults = [*closure_faults(basin, options), *rating_faults(basin, meshes[name], patch)]
-                yield from (((*key, "patches", patch, *below), text) for below, text in faults)
-            if options.impedance is not None and not own.allows_impedance:
-                text = f"does not apply to physics {show(basin.physics)}; leave this key out"
-                yield (*key, "patches", patch, "impedance"), text
+        faults = patch_faults(name, basin, meshes[name], joined)
+        yield from (((*key, "patches", *below), text) for below, text in faults)
         shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [
@@ -517,7 +644,10 @@ def find_faults(
                 for key_name in type(basin.start).model_fields
             ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
-                yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}; leave this key out"
+                yield (
+                    (*key, "start", other),
+                    f"does not apply to physics {show(basin.physics)}; leave this key out",
+                )
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
         below_faults = [*source_faults(basin, meshes[name]), *face_wall_faults(basin, meshes[name])]
         yield from (((*key, *below), text) for below, text in below_faults)
@@ -530,4 +660,7 @@ def find_faults(
             except ValueError as error:
                 yield (*key, *below), str(error)
             else:
-                yield from (((*key, *below), text) for text in own.value_faults(basin, below, shape, meshes[name]))
+                yield from (
+                    ((*key, *below), text)
+                    for text in own.value_faults(basin, below, shape, meshes[name])
+                )

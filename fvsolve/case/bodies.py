@@ -69,7 +69,9 @@ class BodyQuantities:
             absent = {"travel"}
         elif joint.kind == "prismatic":
             absent = {"angle"}
-        result = {key: dimension for key, dimension in self.body.quantities.items() if key not in absent}
+        result = {
+            key: dimension for key, dimension in self.body.quantities.items() if key not in absent
+        }
         return result | ({"rate": "velocity"} if joint.kind == "prismatic" else {})
 
 
@@ -84,7 +86,9 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
         ready = {}
         for name, body in waiting.items():
             on, point = carrier_of(body)
-            exists = on == WORLD or (hasattr(nodes.get(on), "points") and (not point or point in nodes[on].points))
+            exists = on == WORLD or (
+                hasattr(nodes.get(on), "points") and (not point or point in nodes[on].points)
+            )
             if exists and on not in waiting and on in (WORLD, *result, *frames):
                 ready[name] = body
         if not ready:
@@ -127,18 +131,31 @@ def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
     """
     joint = body.joint
     turn, place = up.attitude @ joint.attitude.rotation, up.at(at)
-    velocity, spin, axis = up.velocity_at(at), up.spin, turn @ joint.unit_axis
+    velocity = up.velocity_at(at)
+    spin = up.spin
+    axis = turn @ joint.unit_axis
     if joint.kind == "revolute":
-        return Pose(turn @ attitude.of_axis(joint.axis, joint_coordinate(joint, t)), place, velocity,
-                    spin + axis * joint_rate(joint, t))  # fmt: skip
+        return Pose(
+            turn @ attitude.of_axis(joint.axis, joint_coordinate(joint, t)),
+            place,
+            velocity,
+            spin + axis * joint_rate(joint, t),
+        )
     if joint.kind == "prismatic":
         far = axis * joint_coordinate(joint, t)
-        return Pose(turn, place + far, velocity + np.cross(spin, far) + axis * joint_rate(joint, t), spin)
+        return Pose(
+            turn, place + far, velocity + np.cross(spin, far) + axis * joint_rate(joint, t), spin
+        )
     if joint.kind == "free":  # its stated velocity is that of the centre of mass
         spin = turn @ joint.angular_velocity
         centre = joint.centre_velocity - np.cross(spin, turn @ np.array(body.centre_of_mass))
         return Pose(turn, place, centre, spin)
-    return Pose(turn, place, velocity, spin + turn @ joint.angular_velocity if joint.kind == "ball" else spin)
+    return Pose(
+        turn,
+        place,
+        velocity,
+        spin + turn @ joint.angular_velocity if joint.kind == "ball" else spin,
+    )
 
 
 def joint_coordinate(joint: Any, t: float) -> float:
@@ -173,7 +190,9 @@ def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | No
     return name if is_kind(node, "body") else WORLD, np.array(node.points[point])
 
 
-def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
+def separation(
+    nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str
+) -> float | None:
     """Distance [m] from the place `first` to the place `second` of a link at the start; None if a position is unknown.
 
     Between masses on their common axis it has a sign: positive if `second` has the greater coordinate.
@@ -196,17 +215,25 @@ def point_inertia(mass: float, r: np.ndarray) -> np.ndarray:
     return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
 
 
-def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
+def coincident_ends(
+    nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]
+) -> Faults:
     """Faults of links that act along the line between two points, if the points coincide at the start."""
     for name, link in links.items():
-        ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
+        ends = [
+            link.ports.get(port)
+            for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))
+        ]
         if (
             None in ends
             or link.kind in ("pin", "bushing")
             or any(getattr(link, key, None) for key in ("direction", "axis"))
         ):
             continue
-        if None not in [body_point(nodes, end) for end in ends] and separation(nodes, poses_of, *ends) == 0.0:
+        if (
+            None not in [body_point(nodes, end) for end in ends]
+            and separation(nodes, poses_of, *ends) == 0.0
+        ):
             text = f"{ends[0]} and {ends[1]} coincide at the start, so the line between them has no direction"
             yield ("links", name), f"{text}; expected a distance above 0"
 
@@ -214,8 +241,16 @@ def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict
 def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
     """Faults of pins whose two points lie apart at the start. A distance along the axis of a pin is allowed."""
     for name, link in links.items():
-        points = [body_point(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
-        if None in points or is_zero_vector(link.axis) or any(body not in (WORLD, *poses_of) for body, _ in points):
+        points = (
+            [body_point(nodes, link.ports[port]) for port in ("from", "to")]
+            if link.kind == "pin"
+            else [None]
+        )
+        if (
+            None in points
+            or is_zero_vector(link.axis)
+            or any(body not in (WORLD, *poses_of) for body, _ in points)
+        ):
             continue
         here, there = (poses_of.get(body, AT_REST).at(place) for body, place in points)
         turn = poses_of.get(points[0][0], AT_REST).attitude
@@ -241,10 +276,20 @@ def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
         if on not in own:
             state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
             hint = did_you_mean(on, own) or f"; bodies are {listing(bodies)}"
-            yield keys, f"{show(on)} {state}; expected a body, a point of a body, or a point of a frame{hint}"
+            yield (
+                keys,
+                f"{show(on)} {state}; expected a body, a point of a body, or a point of a frame{hint}",
+            )
         elif point and point not in own[on].points:
-            has = f"its points are {listing(own[on].points)}" if own[on].points else "it has no points"
-            yield keys, f"{on} has no point {show(point)}; {has}{did_you_mean(point, own[on].points)}"
+            has = (
+                f"its points are {listing(own[on].points)}"
+                if own[on].points
+                else "it has no points"
+            )
+            yield (
+                keys,
+                f"{on} has no point {show(point)}; {has}{did_you_mean(point, own[on].points)}",
+            )
         elif not point and on not in bodies:
             text = f"{show(on)} is a frame; expected a point of this frame (FRAME.POINT)"
             yield keys, f"{text}; for a joint to the world leave out `on`"
@@ -283,7 +328,8 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 
 USE_PIPE = "expected a pipe there, or a chamber"
-LENGTH_TOLERANCE = 1e-6  # relative, and tolerance of zero distance [m]: typed places have few digits
+# relative, and tolerance of zero distance [m]: typed places have few digits
+LENGTH_TOLERANCE = 1e-6
 BISECTIONS = 200  # number of bisections
 
 
@@ -301,7 +347,9 @@ def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
     return on is None or (on in poses and not is_kind(node, "basin"))
 
 
-def faults_on_bodies(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
+def faults_on_bodies(
+    nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any
+) -> Faults:
     """Faults (key path, message) of nodes on bodies, and of links that join them."""
     for name, node in nodes.items():
         if is_kind(node, "basin") or not isinstance(node, PlaceOnBody):
@@ -312,7 +360,9 @@ def faults_on_bodies(nodes: dict[str, Any], links: dict[str, Any], patches: dict
             yield ("nodes", name, "head"), text
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
-        yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches))
+        yield from (
+            (("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches)
+        )
     for place, text in missing_reactions(nodes, links, free=True):
         yield place, f"{text}, or a driven joint instead of a free joint"
 
@@ -335,7 +385,10 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
                 text = f"the reaction of the {flow} on the body is not modelled yet; expected a tank without this key"
                 yield ("nodes", name, key), text
         if hasattr(nodes[name].area, "area"):
-            yield ("nodes", name, "area"), "a tank on a body supports only a constant area; expected a number"
+            yield (
+                ("nodes", name, "area"),
+                "a tank on a body supports only a constant area; expected a number",
+            )
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         if not any(map(on_body, ends)):
@@ -350,7 +403,11 @@ def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool =
         elif link.kind == "rigid-column":
             for end in ends:
                 kinds = {other.kind for other in links.values() if end in other.ports.values()}
-                if end in nodes and nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds:
+                if (
+                    end in nodes
+                    and nodes[end].kind in ("junction", "inflow")
+                    and "pipe" not in kinds
+                ):
                     text = f"at {end} this column joins only valves and columns, whose reaction is not modelled yet"
                     yield key, f"{text}; {USE_PIPE}"
         elif link.kind != "pipe" or free:
@@ -365,7 +422,9 @@ def node_of(place: str, nodes: dict[str, Any]) -> Any:
     return nodes.get(place, nodes.get(place.rpartition(".")[0]))
 
 
-def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Faults:
+def link_faults(
+    link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]
+) -> Faults:
     """Faults (key path in the link, message) of a link with an end on a body, or with a route on a body.
 
     ends : names of the places that its hydraulic ports join
@@ -381,11 +440,19 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
         return
     if len(set(on)) > 1:
         each = zip(ends, on, strict=True)
-        words = " and ".join(f"{end}, on {body}" if body else f"{end}, which is fixed" for end, body in each)
+        words = " and ".join(
+            f"{end}, on {body}" if body else f"{end}, which is fixed" for end, body in each
+        )
         text = f"joins {words}: this would be a flexible hose, which is not supported yet"
         yield (), f"{text}; expected both ends on one body, or both fixed"
         return
-    unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in patch_faults(end, node))]
+    unable = [
+        *dict.fromkeys(
+            words
+            for end, node in zip(ends, stand, strict=True)
+            for words in patch_faults(end, node)
+        )
+    ]
     yield from (((), text) for text in unable)
     where = [patches.get(end, node) for end, node in zip(ends, stand, strict=True)]
     if unable or any(is_kind(node, "basin") for node in where):
@@ -395,7 +462,10 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     if length is None and way > LENGTH_TOLERANCE:
         text = f"the ends lie {way:g} m apart{position_text(ends, patches)}, and {article(link.kind)} has no length"
-        yield (), f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place"
+        yield (
+            (),
+            f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place",
+        )
     elif length is not None and way > length * (1.0 + LENGTH_TOLERANCE):
         text = f"{length:g} m is too short: the route on {on[0]} is {way:g} m long{position_text(ends, patches)}"
         yield ("length",), text
@@ -417,7 +487,11 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
 
 def position_text(ends: list[str], patches: dict[str, Any]) -> str:
     """Text with the computed positions of the ends of a link that are patches; "" if no end is a patch."""
-    texts = [f"{end} at [{', '.join(f'{x:.7g}' for x in patches[end].at)}]" for end in ends if end in patches]
+    texts = [
+        f"{end} at [{', '.join(f'{x:.7g}' for x in patches[end].at)}]"
+        for end in ends
+        if end in patches
+    ]
     return f" ({' and '.join(texts)})" if texts else ""
 
 
@@ -427,16 +501,23 @@ def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fa
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
         if basin.sloshing != "cells":
-            text = "applies only to water on a body; give the body as `on = BODY`, or remove this key"
+            text = (
+                "applies only to water on a body; give the body as `on = BODY`, or remove this key"
+            )
             yield (*key, "sloshing"), text
         return
     if not basin.physics_type.on_bodies:
         from fvsolve.parts.basin import Physics
 
-        kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies)
+        kinds = " or ".join(
+            show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies
+        )
         yield (*key, "on"), f"physics {show(basin.physics)} cannot be on a body; expected {kinds}"
     if basin.sloshing != "cells" and not basin.physics_type.has_modes:
-        yield (*key, "sloshing"), f'needs a free surface; physics {show(basin.physics)} on a body has only "cells"'
+        yield (
+            (*key, "sloshing"),
+            f'needs a free surface; physics {show(basin.physics)} on a body has only "cells"',
+        )
     if any(patch_options.moves for patch_options in basin.patches.values()):
         text = "a basin on a body cannot have moving walls; leave out `on`, or `body` and `travel` of its patches"
         yield (*key, "on"), text
@@ -446,7 +527,8 @@ def basin_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fa
         opened = opened if patch_options.impedance is None else "impedance"
         if opened is not None and free is not None and not basin.lumped:
             text = (
-                f"{free} moves freely, and the reaction to outflow is not modelled; expected a wall or a driven joint"
+                f"{free} moves freely, and the reaction to outflow is not modelled; "
+                "expected a wall or a driven joint"
             )
             yield (*key, "patches", patch, opened), text
 
@@ -457,7 +539,10 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
     if node.on is None:
         for other in ("at", "attitude"):
             if getattr(node, other, None) is not None:
-                yield (*key, other), "has no effect without a body; give the body as `on = BODY`, or remove this key"
+                yield (
+                    (*key, other),
+                    "has no effect without a body; give the body as `on = BODY`, or remove this key",
+                )
         return
     if node.on in nodes or node.on not in named:  # otherwise the body itself is faulty
         yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
@@ -469,7 +554,11 @@ def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
     """Yield a fault text if the name `on` is not that of a body."""
     bodies = [body for body, node in nodes.items() if is_kind(node, "body")]
-    bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
+    bodies += [
+        body
+        for body in named
+        if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"
+    ]
     if not is_kind(nodes.get(on), "body"):
         state = f"is {article(nodes[on].kind)}" if on in nodes else "is not a node"
         expected = f"expected a body: {listing(bodies)}" if bodies else "the case has no body"
@@ -487,13 +576,20 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
         wet = node.kind == "tank" or (
             node.kind == "basin" and node.physics_type.has_modes and node.sloshing != "frozen"
         )
-        if not wet or on not in poses or any(nodes[body].joint.kind != "fixed" for body in carriers(on, nodes)):
+        if (
+            not wet
+            or on not in poses
+            or any(nodes[body].joint.kind != "fixed" for body in carriers(on, nodes))
+        ):
             continue
         turn = poses[on].attitude @ getattr(node, "rotation", np.eye(3))
         if turn[2, 2] <= 0.0:
             angle = np.degrees(np.arccos(turn[2, 2]))
             text = f"the bottom of {name} is inclined by {angle:.3g} deg on {on}, which is fixed"
-            yield ("nodes", name, "on"), f"{text}: the contents would run out; expected less than 90 deg"
+            yield (
+                ("nodes", name, "on"),
+                f"{text}: the contents would run out; expected less than 90 deg",
+            )
 
 
 def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) -> dict[str, Any]:

@@ -15,7 +15,14 @@ from fvsolve.case.claims import Compare, DesignLimit, Expect
 from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe, of_profiles
 from fvsolve.case.reading import followers
-from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.sections import (
+    CAVITY_SCHEMES,
+    DEFAULT_CELLS,
+    ExactSpec,
+    FluidSpec,
+    Numerics,
+    Output,
+)
 from fvsolve.core.fluid import LAWS, Fluid
 from fvsolve.core.fluid.laws import Law
 from fvsolve.core.schemes import SCHEMES
@@ -34,7 +41,8 @@ if TYPE_CHECKING:
     from fvsolve.parts.reaction import Reaction
 
 REPORT_KEYS = ("title", "expect", "compare", "validation")
-STEP_KEYS = ("courant", "step", "rtol", "below_vapor")  # of [numerics], which a continued run may change
+# of [numerics], which a continued run may change
+STEP_KEYS = ("courant", "step", "rtol", "below_vapor")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,24 +82,38 @@ class Case(Displayable):
     raw: dict[str, Any] = field(repr=False)  # tables of the file, with overrides
     folder: Path | None = field(repr=False)
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
-    lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # meshes of basins with water as lumped masses
-    read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (raw value, value as read)
-    equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
+    # meshes of basins with water as lumped masses
+    lumped: dict[str, Any] = field(default_factory=dict, repr=False)
+    # place -> (raw value, value as read)
+    read: dict[tuple, tuple] = field(default_factory=dict, repr=False)
+    # bodies and masses in equilibrium
+    equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)
     validation: Any = None  # `Validation`, or None
 
     picture = "fvsolve.report.draw.object_pictures:case_figure"
 
     def summary_line(self) -> str:
         basins = f", {len(self.meshes)} basins" if self.meshes else ""
-        return (f"{self.name!r}: {len(self.nodes)} nodes, {len(self.links)} links{basins}, {self.fluid.name} under law "
-                f"{self.fluid.law}, {self.numerics.start:g} to {self.numerics.end:g} s")  # fmt: skip
+        return (
+            f"{self.name!r}: {len(self.nodes)} nodes, {len(self.links)} links{basins}, {self.fluid.name} under law "
+            f"{self.fluid.law}, {self.numerics.start:g} to {self.numerics.end:g} s"
+        )
 
     def table_columns(self) -> dict[str, list]:
-        parts = {**{("node", name): part for name, part in self.nodes.items()},
-                 **{("link", name): part for name, part in self.links.items()}}  # fmt: skip
-        joins = [", ".join(map(str, getattr(part, "ports", {}).values())) for part in parts.values()]
+        parts = {
+            **{("node", name): part for name, part in self.nodes.items()},
+            **{("link", name): part for name, part in self.links.items()},
+        }
+        joins = [
+            ", ".join(map(str, getattr(part, "ports", {}).values())) for part in parts.values()
+        ]
         kinds = [part.kind for part in parts.values()]
-        return {"part": [name for _, name in parts], "is": [group for group, _ in parts], "type": kinds, "joins": joins}
+        return {
+            "part": [name for _, name in parts],
+            "is": [group for group, _ in parts],
+            "type": kinds,
+            "joins": joins,
+        }
 
     @property
     def files(self) -> list[Path]:
@@ -102,7 +124,11 @@ class Case(Displayable):
     def probes(self) -> list[Probe]:
         """Probes to record: the probes of `[output]`, then further probes that `[expect]` and `[compare]` name."""
         named = [*self.output.probes]
-        named += [claim.probe for claim in [*self.expect.values(), *self.compare.values()] if claim.probe is not None]
+        named += [
+            claim.probe
+            for claim in [*self.expect.values(), *self.compare.values()]
+            if claim.probe is not None
+        ]
         rows = self.validation.compare if self.validation else ()
         named += [row.measure.probe for row in rows if row.measure.probe is not None]
         return list({probe.text: probe for probe in named}.values())
@@ -111,7 +137,11 @@ class Case(Displayable):
     def extreme_probes(self) -> list[Probe]:
         """Probes of which only the extremes are recorded: at points of pipe profiles, for limits and expectations."""
         named = [*of_profiles(self.links)]
-        extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
+        extents = [
+            claim.extent
+            for claim in [*self.limits.values(), *self.expect.values()]
+            if claim.extent is not None
+        ]
         rows = self.validation.compare if self.validation else ()
         extents += [row.measure.extent for row in rows if row.measure.extent is not None]
         for extent in extents:
@@ -127,7 +157,9 @@ class Case(Displayable):
     def links_with_force_probe(self) -> set[str]:
         """Names of links whose force a probe reads."""
         probes = [*self.probes, *self.extreme_probes]
-        return {probe.name for probe in probes if (probe.part, probe.quantity) == ("links", "force")}
+        return {
+            probe.name for probe in probes if (probe.part, probe.quantity) == ("links", "force")
+        }
 
     @property
     def schemes(self) -> tuple[str, ...]:
@@ -149,14 +181,18 @@ class Case(Displayable):
                 from fvsolve.case import basins
 
                 pose = self.poses.get(node.on)
-                result |= basins.places(name, node, self.meshes[name], pose, self.patches_with_faces)
+                result |= basins.places(
+                    name, node, self.meshes[name], pose, self.patches_with_faces
+                )
             elif node.domain == "hydraulic":
                 result |= self.at_start(node).inner(name)[0]
         for name, link in self.links.items():
             result |= link.inner(name)[0]
             if "A" in link.owns:
                 x = self.separation(link.ports["case"], link.ports["rod"]) - link.closed_length
-                result |= {f"{name}.{place}": chamber for place, chamber in link.chambers(x).items()}
+                result |= {
+                    f"{name}.{place}": chamber for place, chamber in link.chambers(x).items()
+                }
         return result
 
     @cached_property
@@ -197,7 +233,9 @@ class Case(Displayable):
             return nodes
         from fvsolve.case import sloshing
 
-        return sloshing.nodes_with_water(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
+        return sloshing.nodes_with_water(
+            nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start
+        )
 
     @cached_property
     def as_stated(self) -> Case:
@@ -211,7 +249,9 @@ class Case(Displayable):
     def network_places(self) -> frozenset[str]:
         """Nodes of rotation, electricity and heat, and other places that links between such nodes join."""
         own = [name for name, node in self.nodes.items() if node.domain in NETWORK_DOMAINS]
-        return frozenset([*own, *(place for link in self.links.values() for place in link.network_places)])
+        return frozenset(
+            [*own, *(place for link in self.links.values() for place in link.network_places)]
+        )
 
     @property
     def needs_equilibrium(self) -> bool:
@@ -254,14 +294,23 @@ class Case(Displayable):
     @cached_property
     def unread_blocks(self) -> set[str]:
         """Names of the blocks of `controls` that no key follows and no other block reads."""
-        read = {other for name, block in self.controls.items() for other in block.blocks_read if other != name}
+        read = {
+            other
+            for name, block in self.controls.items()
+            for other in block.blocks_read
+            if other != name
+        }
         followed = {name for name, _ in followers(self.raw, "control")}
         return self.controls.keys() - read - followed
 
     @cached_property
     def notices(self) -> list[Notice]:
         """Notices of values outside usual ranges, of schedules after the end of the run, and of blocks without use."""
-        found = case_notices.range_notices(self), case_notices.end_notices(self), case_notices.unread_notices(self)
+        found = (
+            case_notices.range_notices(self),
+            case_notices.end_notices(self),
+            case_notices.unread_notices(self),
+        )
         return [notice for notices in found for notice in notices]
 
     @cached_property
@@ -276,7 +325,11 @@ class Case(Displayable):
         node with an elevation that a link joins to it, since only its head drives the flow. Raises FvsolveError for an
         unknown name.
         """
-        if (neighbour := getattr(self._known(name, self.places, "place of the fluid"), "level_of", None)) is not None:
+        if (
+            neighbour := getattr(
+                self._known(name, self.places, "place of the fluid"), "level_of", None
+            )
+        ) is not None:
             return self.elevation(neighbour)
         stated = self.places[name].elevation
         if stated is not None or not self.elevations_stated:
@@ -297,7 +350,11 @@ class Case(Displayable):
         """Elevation of the axis of a pipe at fractions of its length [m]."""
         link = self.links[name]
         low, high = (self.elevations[end] for end in (link.from_, link.to))
-        return low + fraction * (high - low) if link.profile is None else link.profile.at(fraction * link.length)
+        return (
+            low + fraction * (high - low)
+            if link.profile is None
+            else link.profile.at(fraction * link.length)
+        )
 
     def unit_of(self, dimension: str) -> str:
         """Unit of a dimension in `[output]`, such as "bar" for "pressure"; the SI unit if `[output]` states none.
@@ -307,7 +364,9 @@ class Case(Displayable):
         known, stated = units.DIMENSIONS[dimension], self.output.units
         return stated.get(dimension) or stated.get(known.base) or known.si
 
-    def amount(self, value: float, dimension: str, digits: int = 4, span: bool = False, silent: str = "") -> str:
+    def amount(
+        self, value: float, dimension: str, digits: int = 4, span: bool = False, silent: str = ""
+    ) -> str:
         """Text of the value [SI] of a quantity, in its unit in `[output]`.
 
         digits : number of significant digits; silent : unit that is used in place of the SI unit
@@ -332,7 +391,9 @@ class Case(Displayable):
         """
         link = self.links.get(name) if isinstance(name, str) else None
         if link is None or link.kind != "pipe":
-            link = self._known(name, {key: pipe for key, pipe in self.links.items() if pipe.kind == "pipe"}, "pipe")
+            link = self._known(
+                name, {key: pipe for key, pipe in self.links.items() if pipe.kind == "pipe"}, "pipe"
+            )
         return wave_speed(link, self.properties)
 
     def retardation(self, name: str, scalar: str) -> float:
@@ -340,12 +401,16 @@ class Case(Displayable):
         factor = self.links[name].retardation.get(scalar, 1.0)
         if factor != OF_WALL:
             return factor
-        return heat_retardation(self.links[name], self.properties.density, self.scalars[scalar].specific_heat)
+        return heat_retardation(
+            self.links[name], self.properties.density, self.scalars[scalar].specific_heat
+        )
 
     def _known(self, name: str, known: dict[str, Any], noun: str) -> Any:
         if not isinstance(name, str) or name not in known:
             text = f"unknown {noun} {show(name)}{did_you_mean(str(name), known)}"
-            raise FvsolveError(f"{text}; {f'expected {listing(known)}' if known else f'the case has no {noun}'}")
+            raise FvsolveError(
+                f"{text}; {f'expected {listing(known)}' if known else f'the case has no {noun}'}"
+            )
         return known[name]
 
     def resolved(self) -> str:
@@ -355,8 +420,12 @@ class Case(Displayable):
         at another temperature.
         """
         fluid = self.properties.plain()
-        came = [f"# {key} = {text.inline(value)}" for key, value in fluid.items() if value is not None]
-        return text.write(self.table()).replace("\n[fluid]\n", "\n".join(["", "[fluid]", *came[1:], ""]), 1)
+        came = [
+            f"# {key} = {text.inline(value)}" for key, value in fluid.items() if value is not None
+        ]
+        return text.write(self.table()).replace(
+            "\n[fluid]\n", "\n".join(["", "[fluid]", *came[1:], ""]), 1
+        )
 
     def table(self) -> dict[str, Any]:
         """Nested dicts of the case, shaped like a case file, in SI with every default filled in."""
@@ -368,13 +437,19 @@ class Case(Displayable):
             "ambient_pressure": self.ambient_pressure,
             "gravity": self.gravity,
             "fluid": self.fluid.table(),
-            "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items() if not node.added},
+            "nodes": {
+                name: {"type": node.kind, **node.table()}
+                for name, node in self.nodes.items()
+                if not node.added
+            },
             "links": {
-                name: {"type": link.type_in_file or link.kind, **link.table()} for name, link in self.links.items()
+                name: {"type": link.type_in_file or link.kind, **link.table()}
+                for name, link in self.links.items()
             },
             "signals": {name: plain_value(signal) for name, signal in self.signals.items()},
             "controls": {
-                name: {"type": block.control.kind, **block.control.table()} for name, block in self.controls.items()
+                name: {"type": block.control.kind, **block.control.table()}
+                for name, block in self.controls.items()
             },
             "scalars": {name: item.table() for name, item in self.scalars.items()},
             "reactions": {name: item.table() for name, item in self.reactions.items()},
@@ -394,7 +469,9 @@ class Case(Displayable):
     def identity_text(self) -> str:
         """JSON of `table` without the end time, `STEP_KEYS`, and the keys that change the report of a run only."""
         table = {key: value for key, value in self.table().items() if key not in REPORT_KEYS}
-        table["numerics"] = {key: x for key, x in table["numerics"].items() if key not in ("end", *STEP_KEYS)}
+        table["numerics"] = {
+            key: x for key, x in table["numerics"].items() if key not in ("end", *STEP_KEYS)
+        }
         return json.dumps(table, sort_keys=True, default=str)
 
     @cached_property

@@ -20,17 +20,22 @@ from fvsolve.units import DIMENSIONS
 
 # Allowed ratio. Anchoring changes the wave speed of a plastic pipe by 12 %, the spread of moduli by as much.
 ALLOWED_RATIO = 1.2
-WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  # keys that define a wall
-MAX_ENTRIES = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
+# keys that define a wall
+WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")
+# entries of a hand-written schedule; longer schedules are records, of which a run may use a part
+MAX_ENTRIES = 20
 MAX_CLASS_FRACTION = 3.0  # largest plausible limit, as a multiple of the pressure class
 SHOWN = {"rainfall": "mm/h"}  # dimension -> unit of its numbers in notices, where SI is not usual
-CACHE: dict[int, tuple[Any, Any, list]] = {}  # id -> weak reference to a part, its raw table, its unusual values
+# id -> weak reference to a part, its raw table, its unusual values
+CACHE: dict[int, tuple[Any, Any, list]] = {}
 TWO_ENTRIES = (
     "smooth through two entries is a straight line; for zero slope at both ends, add an entry with the first value "
     "before the first entry, and an entry with the last value after the last entry"
 )
 TOP = {  # keys outside tables
-    "ambient_pressure": Quantity("pressure", usual=UsualRange(3e4, 2e6, "mountains to deep caissons")),
+    "ambient_pressure": Quantity(
+        "pressure", usual=UsualRange(3e4, 2e6, "mountains to deep caissons")
+    ),
     "gravity": Quantity("acceleration", usual=UsualRange(1.0, 30.0, "the Moon to Jupiter")),
 }
 
@@ -39,17 +44,37 @@ def range_notices(case: Any) -> list[Notice]:
     """Notices of values outside the usual range of their key, and of keys that contradict each other."""
     parts = {("fluid",): case.fluid, ("numerics",): case.numerics}
     parts |= {
-        (group, name): part for group in ("nodes", "links", "scalars") for name, part in getattr(case, group).items()
+        (group, name): part
+        for group in ("nodes", "links", "scalars")
+        for name, part in getattr(case, group).items()
     }
-    result = [_notice((), (key,), case, *odd) for key, value in TOP.items()
-             if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
-    result += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
-              for odd in _of_part(part, _raw_value(case.raw, place))]  # fmt: skip
-    result += [_notice(("limits", name), ("class_fraction",), case, limit.class_fraction, MAX_CLASS_FRACTION,
-                      f"{limit.class_fraction:g} times the pressure class; 1 is the class itself")
-              for name, limit in case.limits.items() if (limit.class_fraction or 0.0) > MAX_CLASS_FRACTION]  # fmt: skip
-    result += [_notice(("links", pipe_of_piece(case.raw, name)), ("wave_speed",), case, *odd)
-              for name, link in case.links.items() if (odd := wave_speed_mismatch(case, name, link))]  # fmt: skip
+    result = [
+        _notice((), (key,), case, *odd)
+        for key, value in TOP.items()
+        if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))
+    ]
+    result += [
+        _notice(place, *odd[:1], case, *odd[1:])
+        for place, part in parts.items()
+        for odd in _of_part(part, _raw_value(case.raw, place))
+    ]
+    result += [
+        _notice(
+            ("limits", name),
+            ("class_fraction",),
+            case,
+            limit.class_fraction,
+            MAX_CLASS_FRACTION,
+            f"{limit.class_fraction:g} times the pressure class; 1 is the class itself",
+        )
+        for name, limit in case.limits.items()
+        if (limit.class_fraction or 0.0) > MAX_CLASS_FRACTION
+    ]
+    result += [
+        _notice(("links", pipe_of_piece(case.raw, name)), ("wave_speed",), case, *odd)
+        for name, link in case.links.items()
+        if (odd := wave_speed_mismatch(case, name, link))
+    ]
     return list({(notice.place, notice.text): notice for notice in result}.values())
 
 
@@ -68,12 +93,18 @@ def wave_speed_mismatch(case: Any, name: str, pipe: Any) -> tuple[float, float, 
         )
     except ValueError:  # a material without a wall thickness
         return None
-    speed = math.sqrt(1.0 / (1.0 / case.properties.bulk_modulus + elastic_compliance(wall)) / case.properties.density)
+    speed = math.sqrt(
+        1.0
+        / (1.0 / case.properties.bulk_modulus + elastic_compliance(wall))
+        / case.properties.density
+    )
     if speed / ALLOWED_RATIO <= pipe.wave_speed <= speed * ALLOWED_RATIO:
         return None
     size = " ".join(str(keys[key]) for key in ("material", "class", "nominal") if key in keys)
-    text = (f"{case.amount(pipe.wave_speed, 'velocity')} is stated, but the wall of {size} gives "
-            f"{case.amount(speed, 'velocity')}; leave out `wave_speed`, or `material` and `class`")  # fmt: skip
+    text = (
+        f"{case.amount(pipe.wave_speed, 'velocity')} is stated, but the wall of {size} gives "
+        f"{case.amount(speed, 'velocity')}; leave out `wave_speed`, or `material` and `class`"
+    )
     return pipe.wave_speed, speed, text
 
 
@@ -85,7 +116,11 @@ def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float,
     key = id(part)
     known = CACHE.get(key)
     if known is None or known[0]() is not part or known[1] is not raw:
-        known = CACHE[key] = weakref.ref(part, lambda _: CACHE.pop(key, None)), raw, [*_of_table(part, raw)]
+        known = CACHE[key] = (
+            weakref.ref(part, lambda _: CACHE.pop(key, None)),
+            raw,
+            [*_of_table(part, raw)],
+        )
     return known[2]
 
 
@@ -98,7 +133,9 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
         if (value := getattr(table, name)) is None:
             continue
         if isinstance(value, Table):
-            yield from (((key, *keys), *rest) for keys, *rest in _of_table(value, _raw_value(raw, (key,))))
+            yield from (
+                ((key, *keys), *rest) for keys, *rest in _of_table(value, _raw_value(raw, (key,)))
+            )
         for declaration in declarations:
             if odd := _beyond(declaration, value, _raw_value(raw, (key,))):
                 yield (key,), *odd
@@ -110,12 +147,16 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
 @functools.cache
 def _fields_of(kind: type[Table]) -> list[tuple[str, str, list]]:
     """Fields of a type of tables : (name, key in the file, declarations of its values that state a usual range)."""
-    return [(name, info.alias or name, [value for value in info.metadata if _states_range(value)])
-            for name, info in kind.model_fields.items()]  # fmt: skip
+    return [
+        (name, info.alias or name, [value for value in info.metadata if _states_range(value)])
+        for name, info in kind.model_fields.items()
+    ]
 
 
 def _states_range(declared: Any) -> bool:
-    return any(getattr(value, "usual", None) for value in (declared, getattr(declared, "number", None)))
+    return any(
+        getattr(value, "usual", None) for value in (declared, getattr(declared, "number", None))
+    )
 
 
 def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] | None:
@@ -128,7 +169,8 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
     usual = getattr(declared, "usual", None)
     if not usual:
         return None
-    numbers = getattr(value, "area", getattr(value, "value", value))  # of a table of areas, a schedule, a quantity
+    # of a table of areas, a schedule, a quantity
+    numbers = getattr(value, "area", getattr(value, "value", value))
     for x in map(float, numbers if hasattr(numbers, "__len__") else [numbers]):
         if x == 0.0 or not math.isfinite(x) or usual.least <= x <= usual.greatest:
             continue
@@ -139,7 +181,11 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
             given = f"{per * x:g}{unit}"
         span = f"{per * usual.least:g} to {per * usual.greatest:g}{unit}, {usual.source}"
         hint = units.likely(given, declared.dimension, usual.least, usual.greatest)
-        return x, usual.least if x < usual.least else usual.greatest, f"{given} is outside {span}{hint}"
+        return (
+            x,
+            usual.least if x < usual.least else usual.greatest,
+            f"{given} is outside {span}{hint}",
+        )
     return None
 
 
@@ -152,7 +198,9 @@ def _raw_value(raw: Any, keys: tuple[Any, ...]) -> Any:
 def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, text: str) -> Notice:
     path = default_place(case.raw, (*place, *keys))
     where, key = ".".join(path[: len(place)]), ".".join(map(str, keys))
-    return Notice("range", where, f"{f'{where}.{key}' if where else key}: {text}", key, value, limit)
+    return Notice(
+        "range", where, f"{f'{where}.{key}' if where else key}: {text}", key, value, limit
+    )
 
 
 def end_notices(case: Any) -> list[Notice]:
@@ -176,9 +224,13 @@ def unread_text(name: str) -> str:
 
 def unread_notices(case: Any) -> list[Notice]:
     """Notices of each block that no key, no other block and no probe reads."""
-    stated = str([case.raw.get(section) for section in ("output", "expect", "compare")])  # without default probes
-    return [Notice("start", f"controls.{name}", f"controls.{name}: {unread_text(name)}")
-            for name in case.controls if name in case.unread_blocks and f"controls.{name}." not in stated]  # fmt: skip
+    # without default probes
+    stated = str([case.raw.get(section) for section in ("output", "expect", "compare")])
+    return [
+        Notice("start", f"controls.{name}", f"controls.{name}: {unread_text(name)}")
+        for name in case.controls
+        if name in case.unread_blocks and f"controls.{name}." not in stated
+    ]
 
 
 def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:

@@ -25,7 +25,17 @@ from fvsolve.units import show
 CHAINAGE_KEYS = ("on", "at")
 TIE = 1e-6  # rounding bias [cells]: a pipe drawn in the other direction gets the same cells
 # Keys of a pipe that its pieces do not take over.
-PIECE_KEYS = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")
+PIECE_KEYS = (
+    "length",
+    "cells",
+    "minor_loss",
+    "fittings",
+    "profile",
+    "from",
+    "to",
+    "pieces",
+    "bends",
+)
 Report = Callable[[tuple, str], None]
 
 
@@ -44,20 +54,32 @@ class Placed:
     @property
     def fits(self) -> bool:
         """True if a part of this type may be placed on a pipe."""
-        return kind_of(self.group, self.given) is not None and unfit_reason(self.group, self.given) is None
+        return (
+            kind_of(self.group, self.given) is not None
+            and unfit_reason(self.group, self.given) is None
+        )
 
     @property
     def inline(self) -> bool:
         """True if the part is a link that lies in the pipe."""
         kind = kind_of(self.group, self.given)
-        return self.fits and self.group == "links" and "to" in kind.joins and "to" not in (*self.given, *kind.may_lack)
+        return (
+            self.fits
+            and self.group == "links"
+            and "to" in kind.joins
+            and "to" not in (*self.given, *kind.may_lack)
+        )
 
     @property
     def joins(self) -> tuple[str, str]:
         """Names (node at the end of the pipe piece before the part, node at the start of the pipe piece after it)."""
         if self.group == "nodes":
             return self.name, self.name
-        return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
+        return (
+            (f"{self.name}-in", f"{self.name}-out")
+            if self.inline
+            else (f"{self.name}-at", f"{self.name}-at")
+        )
 
 
 @dataclass
@@ -86,7 +108,9 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     These are parts with a chainage `at`, or with a pipe as `on`; keys : table of the part
     """
     links = table.get("links")
-    pipes = [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []
+    pipes = (
+        [name for name, link in links.items() if is_pipe(link)] if isinstance(links, dict) else []
+    )
     bodies = list(table["nodes"]) if isinstance(table.get("nodes"), dict) else []
     result = []
     for group in ("nodes", "links"):
@@ -154,8 +178,12 @@ def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     The file states the keys of a piece in the table `pieces` of its pipe.
     given : overrides
     """
-    return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
-            for key, value in given.items()}  # fmt: skip
+    return {
+        ".".join(own)
+        if (own := original_keys(table, keys := split_key(str(key)))) != keys
+        else key: value
+        for key, value in given.items()
+    }
 
 
 def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
@@ -164,7 +192,11 @@ def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ..
     The keys of a piece are in the table `pieces` of its pipe; any other key path is returned unchanged.
     """
     match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
-    if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
+    if (
+        match
+        and keys[1] not in table.get("links", {})
+        and keys[1] in pieces_of(table).get(match[1], ())
+    ):
         return ("links", match[1], "pieces", *keys[1:])
     return keys
 
@@ -176,7 +208,10 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
     for group, name, part in placed(table):
         on, key = part.get("on"), (group, name)
         if "on" not in part:
-            yield key, f"`at` is {show(part['at'])}, but `on` is missing; expected the name of the pipe"
+            yield (
+                key,
+                f"`at` is {show(part['at'])}, but `on` is missing; expected the name of the pipe",
+            )
         elif on not in pipes:
             near = did_you_mean(str(on), pipes) or f"; pipes are {listing(pipes) or 'none'}"
             yield (*key, "on"), f"no pipe named {show(on)}{near}"
@@ -192,7 +227,11 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
 
 
 def cut(
-    table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Report
+    table: dict[str, Any],
+    read_pipes: dict[str, Pipe],
+    cells: dict[str, int],
+    faulty: set,
+    report: Report,
 ) -> CutTable:
     """Cut the pipes of a case at the parts placed on them; returns the `CutTable`.
 
@@ -200,8 +239,15 @@ def cut(
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
     faulty : (group, name) of parts with a fault from `faults`
     """
-    result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
-                   frozenset(table["links"]))  # fmt: skip
+    result = CutTable(
+        {
+            **table,
+            "nodes": dict(table["nodes"]),
+            "links": {},
+            "routes": dict(table.get("routes", {})),
+        },
+        frozenset(table["links"]),
+    )
     pipes = [name for name, item in table["links"].items() if is_pipe(item)]
     by_pipe: dict[str, list[Placed]] = {}
     lost: set[str] = set()  # pipes whose pieces are unknown
@@ -220,7 +266,11 @@ def cut(
             result.table["nodes"][name] = rest
         else:
             first, last = item.joins
-            result.table["links"][name] = {**rest, "from": first, **({"to": last} if item.inline else {})}
+            result.table["links"][name] = {
+                **rest,
+                "from": first,
+                **({"to": last} if item.inline else {}),
+            }
     links = result.table["links"]
     result.table["links"] = {}
     for name, part in table["links"].items():
@@ -236,7 +286,9 @@ def cut(
     return result
 
 
-def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
+def add_unknown_pieces(
+    result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report
+) -> None:
     """Add the pieces of a pipe that cannot be cut to the table of `result`, with their connections as the only keys.
 
     name, given : name of the pipe and its keys in the file; parts : parts on it
@@ -274,8 +326,18 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
     part.distance = chainage - begin
     if not 0.0 < part.distance < pipe.length:
         span = f"{on} runs from {begin:.10g} m to {begin + pipe.length:.10g} m"
-        end = pipe.from_ if abs(part.distance) < 1e-9 else pipe.to if abs(part.distance - pipe.length) < 1e-9 else ""
-        reason = f"is the end of {on} at {end}; expected a chainage between its ends" if end else f"is outside: {span}"
+        end = (
+            pipe.from_
+            if abs(part.distance) < 1e-9
+            else pipe.to
+            if abs(part.distance - pipe.length) < 1e-9
+            else ""
+        )
+        reason = (
+            f"is the end of {on} at {end}; expected a chainage between its ends"
+            if end
+            else f"is outside: {span}"
+        )
         report(key, f"{show(given)} {reason}")
         return False
     return True
@@ -284,7 +346,11 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Repor
 def sort_parts(parts: list[Placed], report: Report) -> bool:
     """Sort the parts on a pipe by distance; return True. If two have the same distance, report it and return False."""
     parts.sort(key=lambda part: part.distance)
-    pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
+    pairs = [
+        (part, other)
+        for part, other in zip(parts, parts[1:], strict=False)
+        if part.distance == other.distance
+    ]
     for part, other in pairs:
         text = f"{part.name} has the same place; {remedy_at_equal_chainage(part, other)}, or change `at`"
         report((other.group, other.name, "at"), text)
@@ -302,7 +368,13 @@ def remedy_at_equal_chainage(part: Placed, other: Placed) -> str:
 
 
 def cut_pipe(
-    result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, report: Report
+    result: CutTable,
+    name: str,
+    given: dict,
+    whole: Pipe,
+    parts: list[Placed],
+    cells: int,
+    report: Report,
 ) -> None:
     """Add the pieces of a pipe, the nodes between them and the route along them to the table of `result`.
 
@@ -343,17 +415,27 @@ def name_faults(
                 report(("nodes", place), f"{text}; rename this node")
     own = given.get("pieces", {})
     if not isinstance(own, dict) or not all(isinstance(item, dict) for item in own.values()):
-        report(("links", name, "pieces"), f"{show(own)} is not a table; expected a table for each piece, by its name")
+        report(
+            ("links", name, "pieces"),
+            f"{show(own)} is not a table; expected a table for each piece, by its name",
+        )
         return
     for item in own:
         if item not in names:
             report(
-                ("links", name, "pieces", item), f"{name} has no piece of that name; its pieces are {listing(names)}"
+                ("links", name, "pieces", item),
+                f"{name} has no piece of that name; its pieces are {listing(names)}",
             )
 
 
 def write_pieces(
-    result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]
+    result: CutTable,
+    name: str,
+    given: dict,
+    whole: Pipe,
+    parts: list[Placed],
+    edges: np.ndarray,
+    counts: list[int],
 ):
     """Add the pieces of a pipe and the nodes between them, with their elevations, to the table of `result`.
 
@@ -363,7 +445,8 @@ def write_pieces(
     links, nodes = result.table["links"], result.table["nodes"]
     rest = {key: value for key, value in given.items() if key not in PIECE_KEYS}
     joins = [item.joins for item in parts]
-    starts, ends = [whole.from_, *(last for _, last in joins)], [*(first for first, _ in joins), whole.to]
+    starts = [whole.from_, *(last for _, last in joins)]
+    ends = [*(first for first, _ in joins), whole.to]
     for k, (low, high) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
         piece = {**rest, "from": starts[k], "to": ends[k], "length": high - low, "cells": counts[k]}
         if whole.minor_loss:

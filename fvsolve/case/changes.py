@@ -22,9 +22,16 @@ from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import BY_CELLS, PROFILE, SHAPE, VALUE, Quantity, Text, Value
 from fvsolve.units import show
 
-TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "exact": ExactSpec}
+TABLES = {
+    "fluid": FluidSpec,
+    "numerics": Numerics,
+    "output": Output,
+    "energy": EnergyUse,
+    "exact": ExactSpec,
+}
 CLASSES = (VALUE, PROFILE, SHAPE)
-CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}  # keys of a part that is placed on a pipe
+# keys of a part that is placed on a pipe
+CHAINAGE = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
 
 
 def changes(case: Case, key: str) -> str:
@@ -51,12 +58,20 @@ def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
         return SHAPE  # its pieces between chainages get other cells
     if result == BY_CELLS:
-        result = SHAPE if any(link["type"] == "pipe" and "cells" not in link for link in links) else PROFILE
+        result = (
+            SHAPE
+            if any(link["type"] == "pipe" and "cells" not in link for link in links)
+            else PROFILE
+        )
     unsteady = any(link.get("friction", {}).get("model") == "unsteady" for link in links)
-    driven = any(name in case.nodes and case.nodes[name].kind == "mass" for name in case.network_places)
+    driven = any(
+        name in case.nodes and case.nodes[name].kind == "mass" for name in case.network_places
+    )
     if result == VALUE and (case.needs_equilibrium or driven) and keys[0] in ("nodes", "links"):
-        result = PROFILE  # it may change the equilibrium, or the force of a mass on a network at the start
-    return SHAPE if result == PROFILE and unsteady else result  # the start chooses the terms of unsteady friction
+        # it may change the equilibrium, or the force of a mass on a network at the start
+        result = PROFILE
+    # the start chooses the terms of unsteady friction
+    return SHAPE if result == PROFILE and unsteady else result
 
 
 def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
@@ -97,14 +112,23 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
     result |= {name: Nested(model) for name, model in TABLES.items()}
     for group, kinds in KINDS.items():
-        result[group] = Keys({name: part_keys(kinds[entry["type"]]) for name, entry in raw.get(group, {}).items()})
+        result[group] = Keys(
+            {name: part_keys(kinds[entry["type"]]) for name, entry in raw.get(group, {}).items()}
+        )
     blocks = raw.get("controls", {}).items()
-    result["controls"] = Keys({name: part_keys(Control.kinds[entry["type"]]) for name, entry in blocks})
+    result["controls"] = Keys(
+        {name: part_keys(Control.kinds[entry["type"]]) for name, entry in blocks}
+    )
     result["defaults"] = Keys({kind: Keys(default_values(kind)) for kind in WITH_DEFAULTS})
     for group, name, _ in placed(raw):
-        result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **CHAINAGE})})
+        result[group] = Keys(
+            {**result[group].values, name: Keys({**result[group].values[name].values, **CHAINAGE})}
+        )
     result["validation"] = Keys(values_of(VALIDATION_KEYS))
-    return result | {group: Keys(dict.fromkeys(raw.get(group, {}), entry)) for group, entry in named_tables().items()}
+    return result | {
+        group: Keys(dict.fromkeys(raw.get(group, {}), entry))
+        for group, entry in named_tables().items()
+    }
 
 
 @functools.cache
@@ -116,7 +140,11 @@ def part_keys(model: type) -> Keys:
 @functools.cache
 def named_tables() -> dict[str, Keys]:
     """Declarations of `expect`, `limits` and other groups of named tables : group -> keys of each of its tables."""
-    named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
+    named = {
+        "expect": values_of(expect_keys("number")),
+        "compare": values_of(COMPARE_KEYS),
+        "scalars": Scalar.values(),
+    }
     named |= {"reactions": Reaction.values(), "routes": Route.values()}
     named |= {"limits": values_of(limit_keys("pressure", "pressure"))}
     return {group: Keys(values) for group, values in named.items()}

@@ -47,15 +47,22 @@ def part_faults(
     raw : case before its values were read, for messages; it may be None if `fluid` is None; start : start time [s]
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
-    has_bodies, poses = any(node.kind == "body" or getattr(node, "on", None) for node in nodes.values()), {}
-    named, raw_links = (nodes, {}) if raw is None else (raw.table.get(group, {}) for group in ("nodes", "links"))
+    has_bodies = any(node.kind == "body" or getattr(node, "on", None) for node in nodes.values())
+    poses = {}
+    named, raw_links = (
+        (nodes, {}) if raw is None else (raw.table.get(group, {}) for group in ("nodes", "links"))
+    )
     high = dict(nodes)
     if has_bodies:
         from fvsolve.case import bodies  # only cases with bodies need it
 
         poses = bodies.poses(nodes, start)
         high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
-    lends = any(_may_lend(link, named) for name, link in raw_links.items() if name not in links or "profile" in link)
+    lends = any(
+        _may_lend(link, named)
+        for name, link in raw_links.items()
+        if name not in links or "profile" in link
+    )
     if has_bodies:
         high = {name: bodies.with_elevation(node, poses) for name, node in high.items()}
     yield from _elevations(high, links, lends)
@@ -69,7 +76,9 @@ def part_faults(
         from fvsolve.case import basins, bodies, sloshing
 
         yield from bodies.find_faults(nodes, named)
-        yield from bodies.faults_on_bodies(nodes, links, basins.places_on_bodies(nodes, meshes), named)
+        yield from bodies.faults_on_bodies(
+            nodes, links, basins.places_on_bodies(nodes, meshes), named
+        )
         yield from bodies.coincident_ends(nodes, links, poses)
         yield from bodies.open_pins(nodes, links, poses)
         yield from sloshing.find_faults(nodes, lumped, poses)
@@ -95,35 +104,55 @@ def _may_lend(link: Any, named: dict[str, Any]) -> bool:
     """
     if isinstance(link, dict) and "profile" in link:
         return True
-    return connections.kind_name(link, "links") is None or not {*connections.ends_of(link)} <= named.keys()
+    return (
+        connections.kind_name(link, "links") is None
+        or not {*connections.ends_of(link)} <= named.keys()
+    )
 
 
 def in_space(part: Any) -> bool:
     """True if a part has points, a route or a position in space or on a body."""
     values = vars(part)
-    return "points" in values or bool(values.get("route")) or any(values.get(key) is not None for key in PLACE_KEYS)
+    return (
+        "points" in values
+        or bool(values.get("route"))
+        or any(values.get(key) is not None for key in PLACE_KEYS)
+    )
 
 
 def step_faults(numerics: Numerics, has_cells: bool) -> Faults:
     """Faults (key path, message) of times and step control; has_cells : True if the case has pipes or basins."""
     if not numerics.end > numerics.start:
-        yield ("numerics", "end"), f"{numerics.end:g} s is not after the start at {numerics.start:g} s"
+        yield (
+            ("numerics", "end"),
+            f"{numerics.end:g} s is not after the start at {numerics.start:g} s",
+        )
     method = METHODS.get(numerics.method)
     if numerics.courant is not None and not has_cells:
         or_rtol = " or `rtol`" if method is None or method.adaptive else ""
-        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give `step`{or_rtol} instead"
+        yield (
+            ("numerics", "courant"),
+            f"needs cells, and the case has no pipe or basin; give `step`{or_rtol} instead",
+        )
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.step is not None and not numerics.step > least:
         text = f"{numerics.step:g} s is below the rounding error of the time; expected more than {least:.2g} s"
         yield ("numerics", "step"), text
     if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
-        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more"
+        yield (
+            ("numerics", "rtol"),
+            f"{numerics.rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more",
+        )
     if numerics.method == AUTO and not numerics.courant is numerics.step is None:
         text = 'method "auto" controls the error of its steps; give `rtol`, not `courant` or `step`'
         yield ("numerics", "method"), text
-    by_error = numerics.rtol is not None or (not has_cells and numerics.courant is numerics.step is None)
+    by_error = numerics.rtol is not None or (
+        not has_cells and numerics.courant is numerics.step is None
+    )
     if by_error and method is not None and not method.adaptive:
-        able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
+        able = " or ".join(
+            dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive)
+        )
         message = f"method {show(method.name)} estimates no error; use {able}, or {'`courant` or ' * has_cells}`step`"
         yield ("numerics", "method" if numerics.rtol is None else "rtol"), message
 
@@ -137,13 +166,20 @@ def cavity_faults(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) 
     """Yield a fault if a case with `cavitation` states a scheme that cannot compute cavities."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
-        yield ("numerics", "scheme"), f"{show(numerics.scheme)} cannot compute cavities in pipes; expected {able}"
+        yield (
+            ("numerics", "scheme"),
+            f"{show(numerics.scheme)} cannot compute cavities in pipes; expected {able}",
+        )
 
 
 def claim_faults(expect: dict[str, Expect], numerics: Numerics) -> Faults:
     """Faults of expectations (`[expect]`) at a time outside the run."""
     for text, claim in expect.items() if numerics.end > numerics.start else ():
-        if claim is not None and claim.time is not None and not numerics.start <= claim.time <= numerics.end:
+        if (
+            claim is not None
+            and claim.time is not None
+            and not numerics.start <= claim.time <= numerics.end
+        ):
             run = f"{numerics.start:g} s to {numerics.end:g} s"
             yield ("expect", text), f"{claim.time:g} s is not within the run, {run}"
 
@@ -155,10 +191,15 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fa
     for (group, name), part in wet.items():
         derived = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
         if stated and name not in stated and not derived and not lends:
-            yield (group, name), f"elevation is missing, but stated for {listing(stated)}; expected for all or for none"
+            yield (
+                (group, name),
+                f"elevation is missing, but stated for {listing(stated)}; expected for all or for none",
+            )
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {
-        f"{name}.{place}": link.elevation for name, link in links.items() for place in connections.chambers_of(link)
+        f"{name}.{place}": link.elevation
+        for name, link in links.items()
+        for place in connections.chambers_of(link)
     }
     for name, link in links.items():
         length = getattr(link, "length", None)
@@ -211,14 +252,26 @@ def reserved_names() -> set[str]:
     """
     from fvsolve.parts.basin import VELOCITY_FIELDS, Physics
 
-    kinds = [kind for group in KINDS.values() for kind in group.values()
-             if not is_in_network(kind)]  # fmt: skip
-    fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
-    return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
+    kinds = [kind for group in KINDS.values() for kind in group.values() if not is_in_network(kind)]
+    fields = {
+        name
+        for physics in Physics.kinds.values()
+        for name in physics.fields
+        if name not in VELOCITY_FIELDS
+    }
+    return (
+        RESERVED
+        | fields
+        | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
+    )
 
 
 def scalar_faults(
-    scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], cut: Collection[str], table: dict[str, Any]
+    scalars: dict[str, Any],
+    nodes: dict[str, Any],
+    links: dict[str, Any],
+    cut: Collection[str],
+    table: dict[str, Any],
 ) -> Faults:
     """Faults (key path, message) of names of scalars, their values in parts, and parts that do not support them.
 
@@ -236,7 +289,11 @@ def scalar_faults(
             for scalar, factor in getattr(part, "retardation", {}).items():
                 if (text := _retardation_fault(scalar, factor, scalars)) is not None:
                     yield (group, name, "retardation", scalar), text
-            if scalars and is_kind(part, "basin") and getattr(part, "infiltration", None) is not None:
+            if (
+                scalars
+                and is_kind(part, "basin")
+                and getattr(part, "infiltration", None) is not None
+            ):
                 text = "takes water, but not the scalars in it; expected a case without scalars, or no infiltration"
                 yield (group, name, "infiltration"), text
             if scalars and is_kind(part, "basin") and not part.physics_type.carries:
@@ -249,26 +306,45 @@ def scalar_faults(
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown_scalar(scalar, scalars)
-                    elif part.physics_type.joined and not (patch_options.passes or basins.is_source(patch_options)):
+                    elif part.physics_type.joined and not (
+                        patch_options.passes or basins.is_source(patch_options)
+                    ):
                         text = "is not valid here, because the joined links give the value; remove this key, or set "
                         yield place, text + 'boundary = "open"'
             if scalars and part.no_scalars:
                 yield (group, name), f"is {article(part.kind)}; {part.no_scalars}"
     heated = {name: item for name, item in scalars.items() if item is not None and item.heat}
-    given = [*table.get("links", {}), *(name for name in links if name not in table.get("links", {}))]
+    given = [
+        *table.get("links", {}),
+        *(name for name in links if name not in table.get("links", {})),
+    ]
     yield from _heat_faults(
-        heated, links, [*given, *cut], [*table.get("nodes", {})], any(item is None for item in scalars.values())
+        heated,
+        links,
+        [*given, *cut],
+        [*table.get("nodes", {})],
+        any(item is None for item in scalars.values()),
     )
 
 
-def _value_range(scalar: str, item: Any, reactions: dict[str, Any]) -> tuple[float, bool, str] | None:
+def _value_range(
+    scalar: str, item: Any, reactions: dict[str, Any]
+) -> tuple[float, bool, str] | None:
     """Least value of a scalar, True if it is excluded, and the reason; None for any value."""
     if item.heat:
         unit = f" {item.unit}"
-        return -item.zero, True, f"is not above absolute zero; expected a temperature above {-item.zero:g}{unit}"
+        return (
+            -item.zero,
+            True,
+            f"is not above absolute zero; expected a temperature above {-item.zero:g}{unit}",
+        )
     for name, reaction in reactions.items():
         if reaction is not None and reaction.rate is None and scalar in reaction.sides.names:
-            return 0.0, False, f"is negative, and reaction {name} follows mass action; expected a value of at least 0"
+            return (
+                0.0,
+                False,
+                f"is negative, and reaction {name} follows mass action; expected a value of at least 0",
+            )
     return None
 
 
@@ -280,24 +356,39 @@ def scalar_range_faults(
     scalars, reactions : by name, None if faulty
     """
     sound = {name: item for name, item in scalars.items() if item is not None}
-    bounds = {name: bound for name, item in sound.items() if (bound := _value_range(name, item, reactions))}
+    bounds = {
+        name: bound
+        for name, item in sound.items()
+        if (bound := _value_range(name, item, reactions))
+    }
     places = [(("scalars", name, "initial"), name, sound[name].initial) for name in bounds]
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():
             own = {} if is_kind(part, "basin") else getattr(part, "scalars", {})
-            places += [((group, name, "scalars", scalar), scalar, value) for scalar, value in own.items()]
+            places += [
+                ((group, name, "scalars", scalar), scalar, value) for scalar, value in own.items()
+            ]
             for patch, options in getattr(part, "patches", {}).items():
                 where = (group, name, "patches", patch, "scalars")
-                places += [((*where, scalar), scalar, value) for scalar, value in options.scalars.items()]
+                places += [
+                    ((*where, scalar), scalar, value) for scalar, value in options.scalars.items()
+                ]
     for keys, scalar, value in places:
         if scalar in bounds and getattr(value, "kind", "") != "control":
-            (low, is_open, text), least = bounds[scalar], float(min(getattr(value, "value", [value])))
+            (low, is_open, text), least = (
+                bounds[scalar],
+                float(min(getattr(value, "value", [value]))),
+            )
             if least < low or (is_open and least == low):
                 yield keys, f"{least:g} {text}"
 
 
 def _heat_faults(
-    heated: dict[str, Any], links: dict[str, Any], link_names: list[str], node_names: list[str], faulty: bool
+    heated: dict[str, Any],
+    links: dict[str, Any],
+    link_names: list[str],
+    node_names: list[str],
+    faulty: bool,
 ) -> Faults:
     """Faults of scalars with heat, and of heat exchangers without such a scalar.
 
@@ -306,7 +397,9 @@ def _heat_faults(
     known = [*link_names, *node_names]
     if not heated and not faulty:
         text = "exchanges heat with a temperature of the fluid; declare one, [scalars.NAME] with heat = true"
-        yield from ((("links", name), text) for name, link in links.items() if link.kind == "heat-exchanger")
+        yield from (
+            (("links", name), text) for name, link in links.items() if link.kind == "heat-exchanger"
+        )
     for k, (name, scalar) in enumerate(heated.items()):
         if k > 0:
             yield (
@@ -345,4 +438,6 @@ def _retardation_fault(scalar: str, factor: Any, scalars: dict[str, Any]) -> str
 
 def _unknown_scalar(scalar: str, scalars: dict[str, Any]) -> str:
     near = did_you_mean(scalar, scalars) or (f"; scalars are {listing(scalars)}" if scalars else "")
-    return f"no scalar named {show(scalar)}{near}" + ("" if scalars else f"; declare it as [scalars.{scalar}]")
+    return f"no scalar named {show(scalar)}{near}" + (
+        "" if scalars else f"; declare it as [scalars.{scalar}]"
+    )

@@ -12,12 +12,29 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case.probe import ALL, OF_PRESSURE, Extent, Kinds, Probe, only_dimension, read_extent, read_probe
+from fvsolve.case.probe import (
+    ALL,
+    OF_PRESSURE,
+    Extent,
+    Kinds,
+    Probe,
+    only_dimension,
+    read_extent,
+    read_probe,
+)
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
 from fvsolve.parts.table_model import check_table, read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
+from fvsolve.parts.value import (
+    NEEDED,
+    VALUE,
+    Quantity,
+    ReadContext,
+    ValueFault,
+    faults_of,
+    nonnegative,
+)
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at")
@@ -87,7 +104,9 @@ class Compare:
         return {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
 
 
-def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext) -> Expect | None:
+def read_expect(
+    claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext
+) -> Expect | None:
     """Read one entry of `[expect]`; None if the part that it names is faulty. Raises ValueFault.
 
     claim, given : key and value of the entry; other arguments as for `read_claim`
@@ -133,7 +152,12 @@ def read_claim(
         raise ValueError(f"is not a claim; expected {forms}{hint}")
     function, probe_text = match[1], match[2].strip()
     if probe_text.startswith(RUN_UP) and "run_up" not in kinds["nodes"] | kinds["links"]:
-        return function, None, read_run_up(function, probe_text.removeprefix(RUN_UP), kinds["run_up"], setting), None
+        return (
+            function,
+            None,
+            read_run_up(function, probe_text.removeprefix(RUN_UP), kinds["run_up"], setting),
+            None,
+        )
     when = None
     if function == "at":  # split at the last comma: a point in a basin contains a comma
         probe_text, comma, when = map(str.strip, probe_text.rpartition(","))
@@ -159,7 +183,9 @@ def read_claim(
         raise  # the fault of the probe
 
 
-def read_run_up(function: str, text: str, run_ups: Mapping[str, Any], setting: ReadContext) -> RunUpPlace | None:
+def read_run_up(
+    function: str, text: str, run_ups: Mapping[str, Any], setting: ReadContext
+) -> RunUpPlace | None:
     """Run-up in an expectation from its text, such as "shore, 90"; None if it is faulty. Raises ValueError.
 
     run_ups : run-ups of `[output]` by name, None if `[output]` is faulty
@@ -168,7 +194,9 @@ def read_run_up(function: str, text: str, run_ups: Mapping[str, Any], setting: R
         raise ValueError(f"a run-up has no {function}; expected {listing(able)}")
     name, comma, place = map(str.strip, text.partition(","))
     if (function == "at") != bool(comma):
-        raise ValueError(f"expected {f'at({RUN_UP}NAME, PLACE)' if function == 'at' else f'{function}({RUN_UP}NAME)'}")
+        raise ValueError(
+            f"expected {f'at({RUN_UP}NAME, PLACE)' if function == 'at' else f'{function}({RUN_UP}NAME)'}"
+        )
     if name not in run_ups:
         known = f"; run-ups are {listing(run_ups)}" if run_ups else "; [output] has no run_up"
         raise ValueError(f"no run-up named {show(name)}{did_you_mean(name, run_ups) or known}")
@@ -196,8 +224,14 @@ def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
 COMPARE_KEYS = {
     "file": (val.Text("CSV file with a header; path relative to the case file", VALUE), NEEDED),
     "time": (val.Text("header of the column of times; the first column if left out", VALUE), None),
-    "value": (val.Text("header of the column of values; the second column if left out", VALUE), None),
-    "shift": (Quantity("time", about="time shift, added to the times of the file [s]", changes=VALUE), 0.0),
+    "value": (
+        val.Text("header of the column of values; the second column if left out", VALUE),
+        None,
+    ),
+    "shift": (
+        Quantity("time", about="time shift, added to the times of the file [s]", changes=VALUE),
+        0.0,
+    ),
 }
 
 
@@ -211,7 +245,9 @@ def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compa
         path = find_file(values["file"], setting)
         if probe is None:
             return None
-        t, v, *headers = read_columns(path, values["time"], values["value"], probe.dimension, setting)
+        t, v, *headers = read_columns(
+            path, values["time"], values["value"], probe.dimension, setting
+        )
     except ValueError as error:
         raise ValueFault([(("file",), str(error))]) from None
     return Compare(probe, copy_name(path, setting), path, *headers, values["shift"], t, v)
@@ -282,7 +318,12 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[val.Value, Any]
 
 
 def read_limit(
-    name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: ReadContext
+    name: str,
+    given: Any,
+    kinds: Kinds,
+    routes: Mapping[str, Any],
+    links: Mapping[str, Any],
+    setting: ReadContext,
 ) -> DesignLimit | None:
     """Read one table of `[limits]`; None if the parts that it names are faulty. Raises ValueError, ValueFault.
 
@@ -292,7 +333,9 @@ def read_limit(
     quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
     faults, extent = [], None
     if not isinstance(quantity, str):
-        faults.append((("quantity",), f"{show(quantity)} is not text; expected the name of a quantity"))
+        faults.append(
+            (("quantity",), f"{show(quantity)} is not text; expected the name of a quantity")
+        )
     elif "on" in given:
         try:
             extent = read_extent(given["on"], quantity, kinds, routes)
@@ -300,7 +343,11 @@ def read_limit(
             key = "quantity" if isinstance(error, ValueFault) and "quantity" in given else "on"
             faults.append(((key,), str(error)))
     dimension = (
-        extent.dimension if extent is not None else only_dimension(quantity) if isinstance(quantity, str) else None
+        extent.dimension
+        if extent is not None
+        else only_dimension(quantity)
+        if isinstance(quantity, str)
+        else None
     )
     keys = limit_keys(quantity if isinstance(quantity, str) else "", dimension or "number")
     if dimension is None:
@@ -318,8 +365,18 @@ def read_limit(
     if bounds["maximum"] is not None and bounds["class_fraction"] is not None:
         faults.append((("class_fraction",), "maximum and class_fraction are given; keep one"))
     minimum, maximum = bounds["minimum"], bounds["maximum"]
-    if dimension is not None and isinstance(minimum, float) and isinstance(maximum, float) and not minimum < maximum:
-        faults.append((("minimum",), f"{show(given['minimum'])} is not below maximum, {show(given['maximum'])}"))
+    if (
+        dimension is not None
+        and isinstance(minimum, float)
+        and isinstance(maximum, float)
+        and not minimum < maximum
+    ):
+        faults.append(
+            (
+                ("minimum",),
+                f"{show(given['minimum'])} is not below maximum, {show(given['maximum'])}",
+            )
+        )
     if extent is not None and bounds["class_fraction"] is not None:
         faults += list(pipes_without_class(extent, links))
     if faults:
@@ -327,7 +384,9 @@ def read_limit(
     return None if extent is None else DesignLimit(name, extent, **bounds)
 
 
-def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Iterator[tuple[tuple, str]]:
+def limit_faults(
+    limit: DesignLimit | None, fluid: Any, gravity: float
+) -> Iterator[tuple[tuple, str]]:
     """Faults (key path, message) of a limit that depend on the properties of the fluid and on gravity [m/s2]."""
     if limit is None:
         return
@@ -336,15 +395,23 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
         yield ("quantity",), text
     for key in ("minimum", "maximum"):
         if getattr(limit, key) == VAPOR and fluid is not None and not fluid.vapor_pressure:
-            yield (key,), 'the fluid has no vapour pressure; expected vapor_pressure above 0 under [fluid], or "vacuum"'
+            yield (
+                (key,),
+                'the fluid has no vapour pressure; expected vapor_pressure above 0 under [fluid], or "vacuum"',
+            )
 
 
 def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
     """Yield a fault of the key `class_fraction` if the quantity is not a pressure, or a part has no pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
-        yield ("class_fraction",), f"a pressure class limits the pressure, not {extent.quantity}; leave out `quantity`"
+        yield (
+            ("class_fraction",),
+            f"a pressure class limits the pressure, not {extent.quantity}; leave out `quantity`",
+        )
         return
-    bare = {name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None}
+    bare = {
+        name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None
+    }
     parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
@@ -352,7 +419,9 @@ def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
         yield ("class_fraction",), text
 
 
-def read_expectations(reading: Reading, kinds: Kinds, routes: Mapping[str, Any]) -> dict[str, Expect | None]:
+def read_expectations(
+    reading: Reading, kinds: Kinds, routes: Mapping[str, Any]
+) -> dict[str, Expect | None]:
     """Expectations by their text; None for an expectation on a faulty part."""
     result = {}
     for claim, given in reading.group("expect").items():
@@ -374,7 +443,12 @@ def read_comparisons(reading: Reading, kinds: Kinds) -> dict[str, Compare | None
 
 
 def read_limits(
-    reading: Reading, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], fluid: Any, gravity: float
+    reading: Reading,
+    kinds: Kinds,
+    routes: Mapping[str, Any],
+    links: Mapping[str, Any],
+    fluid: Any,
+    gravity: float,
 ) -> dict[str, DesignLimit | None]:
     """Design limits by name; None for a limit on faulty parts.
 
@@ -384,5 +458,8 @@ def read_limits(
     for name, given in reading.group("limits").items():
         with reading.catch("limits", name):
             result[name] = read_limit(name, given, kinds, routes, links, reading.setting)
-            reading.add((("limits", name, *keys), text) for keys, text in limit_faults(result[name], fluid, gravity))
+            reading.add(
+                (("limits", name, *keys), text)
+                for keys, text in limit_faults(result[name], fluid, gravity)
+            )
     return result

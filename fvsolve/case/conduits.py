@@ -22,7 +22,9 @@ def stated_head(nodes: dict[str, Any], place: str, ambient: float, weight: float
     return height + level if isinstance(level, float) else None
 
 
-def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) -> dict[str, float | None]:
+def heads_at_start(
+    conduits: dict[str, Any], stated: dict[str, float | None]
+) -> dict[str, float | None]:
     """Heads of the nodes of conduits; unknown heads are interpolated along the lengths of conduits.
 
     stated : head of each node, None if it is not known [m]
@@ -49,7 +51,10 @@ def heads_at_start(conduits: dict[str, Any], stated: dict[str, float | None]) ->
 
 
 def chains_of(
-    conduits: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], stated: dict[str, float | None]
+    conduits: dict[str, Any],
+    nodes: dict[str, Any],
+    links: dict[str, Any],
+    stated: dict[str, float | None],
 ) -> dict[str, Any]:
     """Chain of each conduit: all conduits that junctions and inflows join, at which there are no other links.
 
@@ -59,7 +64,12 @@ def chains_of(
 
     from fvsolve.parts.conduit.part import Chain
 
-    others = {place for name, link in links.items() if name not in conduits for place in link.ports.values()}
+    others = {
+        place
+        for name, link in links.items()
+        if name not in conduits
+        for place in link.ports.values()
+    }
     inflows = {}
     for place in stated:
         node = nodes.get(place)
@@ -72,10 +82,18 @@ def chains_of(
     _, group = connected_components(joined @ joined.T)
     found = {}
     for k in range(max(group) + 1):
-        own = {name: conduits[name] for name, mine in zip(conduits, group, strict=True) if mine == k}
+        own = {
+            name: conduits[name] for name, mine in zip(conduits, group, strict=True) if mine == k
+        }
         places = list(dict.fromkeys(place for name in own for place in ends[name]))
-        heads = {place: -np.inf if stated[place] is None else stated[place] for place in places if place not in inflows}
-        found |= dict.fromkeys(own, Chain(own, heads, {place: inflows[place] for place in places if place in inflows}))
+        heads = {
+            place: -np.inf if stated[place] is None else stated[place]
+            for place in places
+            if place not in inflows
+        }
+        found |= dict.fromkeys(
+            own, Chain(own, heads, {place: inflows[place] for place in places if place in inflows})
+        )
     return found
 
 

@@ -25,7 +25,9 @@ def connection_faults(table: dict[str, Any]) -> Faults:
     columns.
     table : nested dicts of the case as in the file
     """
-    nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
+    nodes, links = (
+        {n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links")
+    )
     gone = {name: None for name in (*nodes, *links) if has_unknown_places(name, nodes, links)}
     places = _places(nodes, links, gone)
     ends: dict[str, list[str]] = {}
@@ -37,35 +39,63 @@ def connection_faults(table: dict[str, Any]) -> Faults:
         joined = [place for _, place, _ in ports if isinstance(place, str)]
         unjoined += len(ports) - len({*joined} & places.keys())
         sensed = _sensed_places(_dict(link))
-        faults = (fault for entry in sensed for fault in _port_faults([entry], places, nodes, links, _dict(link)))
+        faults = (
+            fault
+            for entry in sensed
+            for fault in _port_faults([entry], places, nodes, links, _dict(link))
+        )
         yield from ((("links", name, *keys), text) for keys, text in faults)
         unjoined += sum(place not in places for _, place, _ in sensed)
         # with ports that the link does not have, such as B of a valve with three
-        more = [*_dict(_dict(link).get("ports")).values(), _dict(link).get("heat_to"), *(p for _, p, _ in sensed)]
+        more = [
+            *_dict(_dict(link).get("ports")).values(),
+            _dict(link).get("heat_to"),
+            *(p for _, p, _ in sensed),
+        ]
         joined += [place for place in more if isinstance(place, str) and place not in joined]
         ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
-    for group in ("nodes", "links"):
-        kinds = [_dict(node).get("type") for node in nodes.values()]
-        alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
-        if table.get(group) == {} and not alone:
-            yield (group,), "is empty; expected at least two nodes and a link between them"
+    yield from _empty_groups(table, nodes)
     tied = {name: _joined_places(name, node, places) for name, node in nodes.items()}
     hanging = _carrier_pairs(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
-    loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
-             and not touched & {name, *points_of(name, node)}]  # fmt: skip
+    loose = [
+        name
+        for name, node in nodes.items()
+        if name not in gone
+        and own_places(name, node) is None
+        and not touched & {name, *points_of(name, node)}
+    ]
     if len(loose) > unjoined:  # otherwise faulty ports may be those that join them
         yield from ((("nodes", name), "no link touches it") for name in loose)
     if unjoined or gone:
         return  # the connections are not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
-    own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
+    own |= {
+        f"{name}.": [name, *points]
+        for name, node in nodes.items()
+        if (points := points_of(name, node))
+    }
     own |= {f"{k}..": group for k, group in enumerate(hanging)}
-    held = {place for name, joined in ends.items() for place in joined
-            if getattr(kind_of("links", links[name]), "fixes_pressure", False)}  # fmt: skip
+    held = {
+        place
+        for name, joined in ends.items()
+        for place in joined
+        if getattr(kind_of("links", links[name]), "fixes_pressure", False)
+    }
     groups = islands(own | {f"links.{name}": places for name, places in ends.items()})
     yield from _island_faults(groups, nodes, places, held)
     yield from _rigid_junctions(nodes, links, ends)
+
+
+def _empty_groups(table: dict[str, Any], nodes: dict[str, Any]) -> Faults:
+    """Faults (key path, message) of empty tables of nodes and links, where no part can stand alone."""
+    kinds = [_dict(node).get("type") for node in nodes.values()]
+    alone = "body" in kinds or any(
+        own_places(name, node) is not None for name, node in nodes.items()
+    )
+    for group in ("nodes", "links"):
+        if table.get(group) == {} and not alone:
+            yield (group,), "is empty; expected at least two nodes and a link between them"
 
 
 def _port_faults(
@@ -79,7 +109,11 @@ def _port_faults(
     for keys, place, domain in ports:
         if isinstance(place, str) and place not in places:
             yield keys, _unknown_place(place, places, nodes, links)
-        elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
+        elif (
+            isinstance(place, str)
+            and None not in (domain, places[place])
+            and not _fits(places[place], domain)
+        ):
             wrong.append(keys)
             yield keys, _wrong_domain(place, domain, places, nodes, link)
     sorts = {places.get(place): (keys, place) for keys, place, _ in ports if isinstance(place, str)}
@@ -93,13 +127,16 @@ def _port_faults(
             yield keys, f"joins {show(place)} to itself"
 
 
-def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]) -> Faults:
+def _island_faults(
+    groups: list[list[str]], nodes: dict[str, Any], places: dict[str, Any], held: set[str]
+) -> Faults:
     """Faults of several islands (groups of connected names), and of islands in which nothing fixes the pressure.
 
     Islands with a basin may be separate: a reach has its own boundaries.
     places : names that links can join -> domain; held : places at which a link fixes the pressure
     """
-    networks = {*NETWORK_DOMAINS}  # without fluid; they may be separate, also with masses that they move
+    # without fluid; they may be separate, also with masses that they move
+    networks = {*NETWORK_DOMAINS}
     connected = []
     for island in groups:
         domains = {places[name] for name in island}
@@ -114,9 +151,16 @@ def _island_faults(groups: list[list[str]], nodes: dict[str, Any], places: dict[
     for island in groups:
         wet = [name for name in island if places[name] in ("hydraulic", None)]
         kinds = [kind_of("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
-        if held.isdisjoint(wet) and kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
+        if (
+            held.isdisjoint(wet)
+            and kinds
+            and all(kind is not None and not kind.fixes_pressure for kind in kinds)
+        ):
             where = "" if len(groups) == 1 else f" of {listing(island, 6)}"
-            yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
+            yield (
+                ("nodes",),
+                f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber",
+            )
 
 
 def _dict(value: Any) -> dict[str, Any]:
@@ -158,7 +202,12 @@ def has_mesh_file(node: Any) -> bool:
 
 def named_places(name: str, links: dict[str, Any]) -> list[str]:
     """Names of points, patches or chambers of the part `name` that links join, without "NAME." before them."""
-    places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
+    places = [
+        place
+        for link in links.values()
+        for _, place, _ in _ports(_dict(link))
+        if isinstance(place, str)
+    ]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
 
 
@@ -180,7 +229,11 @@ def _joined_places(name: str, node: Any, places: dict[str, Any]) -> list[str]:
 def points_of(name: str, node: Any) -> list[str]:
     """Full names NODE.POINT of the points of a node."""
     kind = kind_of("nodes", node)
-    return [f"{name}.{point}" for point in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
+    return (
+        [f"{name}.{point}" for point in _dict(_dict(node).get("points"))]
+        if kind and "points" in kind.keys()
+        else []
+    )
 
 
 def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
@@ -203,7 +256,9 @@ def _fits(domain: str, domains: str) -> bool:
     return domain in domains.split(" or ")
 
 
-def _places(nodes: dict[str, Any], links: dict[str, Any], gone: Iterable[str]) -> dict[str, str | None]:
+def _places(
+    nodes: dict[str, Any], links: dict[str, Any], gone: Iterable[str]
+) -> dict[str, str | None]:
     """Domain of every place that links can join, by full name; None if its part is faulty.
 
     gone : parts whose points, patches or chambers are not known; the names that links use for these are included
@@ -213,7 +268,11 @@ def _places(nodes: dict[str, Any], links: dict[str, Any], gone: Iterable[str]) -
         kind, own = kind_of("nodes", node), own_places(name, node)
         result |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
         result |= dict.fromkeys(points_of(name, node), "spatial")
-    result |= {place: domain for name, link in links.items() for place, domain in _owned_places(name, link).items()}
+    result |= {
+        place: domain
+        for name, link in links.items()
+        for place, domain in _owned_places(name, link).items()
+    }
     named = [f"{name}.{place}" for name in gone for place in named_places(name, links)]
     return dict.fromkeys(named, None) | result
 
@@ -238,7 +297,11 @@ def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
         return [((key,), link.get(key), None) for key in ("from", "to")]
     keys, found = kind.keys(), []
     for port, domain in kind.joins.items():
-        given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in keys and port not in keys else (link, ())
+        given, below = (
+            (_dict(link.get("ports")), ("ports",))
+            if "ports" in keys and port not in keys
+            else (link, ())
+        )
         if port in given or port not in kind.may_lack:
             found.append(((*below, port), given.get(port), domain))
     return found
@@ -253,18 +316,26 @@ def _sensed_places(link: dict[str, Any]) -> list[tuple[tuple, str, str]]:
         if isinstance(given, str):
             found.append((keys, given, "hydraulic"))
         elif isinstance(given, (list, tuple)):
-            found += [((*keys, k), place, "hydraulic") for k, place in enumerate(given) if isinstance(place, str)]
+            found += [
+                ((*keys, k), place, "hydraulic")
+                for k, place in enumerate(given)
+                if isinstance(place, str)
+            ]
     return found
 
 
-def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:
+def _unknown_place(
+    place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]
+) -> str:
     if place in links:
         own = [other for other in places if other not in nodes and other.startswith(f"{place}.")]
         if own:
             return f"{show(place)} is {article(_dict(links[place])['type'])}; its places are {listing(own)}"
         text = f"{show(place)} is a link, and links join places, not links; put a junction between the two links"
         return f"{text}; places are {listing(places)}"
-    return f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
+    return (
+        f"no place named {show(place)}; places are {listing(places)}{did_you_mean(place, places)}"
+    )
 
 
 def joined_shafts(links: Any) -> list[str]:
@@ -273,7 +344,9 @@ def joined_shafts(links: Any) -> list[str]:
         place
         for link in links.values()
         for keys, place, domain in _ports(_dict(link))
-        if "rotational" in str(domain) and isinstance(place, str) and is_port_of_network(link, keys[-1])
+        if "rotational" in str(domain)
+        and isinstance(place, str)
+        and is_port_of_network(link, keys[-1])
     ]
     return list(dict.fromkeys(place for place in places if place.endswith(".shaft")))
 
@@ -289,7 +362,9 @@ def chambers_of(link: Any) -> list[str]:
     return [place for place, domain in link.owns.items() if domain == "hydraulic"]
 
 
-def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
+def _wrong_domain(
+    place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]
+) -> str:
     owned = "shaft" if places[place] == "rotational" else "chamber"
     owned = "point" if places[place] == "spatial" else owned
     state = f"is {article(nodes[place]['type'] if place in nodes else owned)}"
@@ -318,13 +393,21 @@ def islands(ends: dict[str, list[str]]) -> list[list[str]]:
     return [[name for name in island if name != WORLD] for island in groups.values()]
 
 
-def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Faults:
+def _rigid_junctions(
+    nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]
+) -> Faults:
     touching: dict[str, set[str]] = {}
     for link, places in ends.items():
         for place in places:
             touching.setdefault(place, set()).add(str(_dict(links[link]).get("type")))
     for name, node in nodes.items():
-        if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
-            fixed = ", since its demand is constant above its required_pressure" if "required_pressure" in node else ""
+        if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {
+            "rigid-column"
+        }:
+            fixed = (
+                ", since its demand is constant above its required_pressure"
+                if "required_pressure" in node
+                else ""
+            )
             message = f"only rigid columns join this node, so nothing sets its pressure{fixed}"
             yield ("nodes", name), f"{message}; use a chamber with a volume"

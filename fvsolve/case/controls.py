@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from fvsolve.parts.control import Control
 
 MOST_SAMPLES = 1e9  # of a block in a run
-DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}  # dimension of an error
+# dimension of an error
+DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,11 @@ class Block:
     def followed(self) -> list[str]:
         """Name of the block that its setpoint follows, in a list; empty if there is none."""
         setpoint = self.control.setpoint_schedule
-        return [setpoint.origin["control"]] if setpoint is not None and setpoint.kind == "control" else []
+        return (
+            [setpoint.origin["control"]]
+            if setpoint is not None and setpoint.kind == "control"
+            else []
+        )
 
     @property
     def blocks_passed(self) -> list[str]:
@@ -78,7 +83,9 @@ class Blocks:
 
         self.known_types = Control.kinds
         self.reading, self.kinds, self.setting = reading, kinds, reading.setting
-        self.given = {name: item for name, item in reading.group("controls").items() if self.types(name, item)}
+        self.given = {
+            name: item for name, item in reading.group("controls").items() if self.types(name, item)
+        }
         self.inputs: dict[str, dict[tuple[str, ...], Probe | str | None]] = {
             name: dict(self.read_inputs(name, item)) for name, item in self.given.items()
         }
@@ -89,9 +96,13 @@ class Blocks:
         reading, known = self.reading, self.known_types
         reading.add((("controls", name), text) for text in name_faults(name))
         if not isinstance(given, dict):
-            return reading.fault(("controls", name), f"{show(given)} is not a table; expected a table with a type")
+            return reading.fault(
+                ("controls", name), f"{show(given)} is not a table; expected a table with a type"
+            )
         if "type" not in given:
-            return reading.fault(("controls", name), f"type is missing; expected one of {listing(sorted(known))}")
+            return reading.fault(
+                ("controls", name), f"type is missing; expected one of {listing(sorted(known))}"
+            )
         word = given["type"]
         if isinstance(word, str) and word in known:
             return known[word]
@@ -101,7 +112,9 @@ class Blocks:
     def kind(self, name: str) -> type[Control]:
         return self.known_types[self.given[name]["type"]]
 
-    def read_inputs(self, name: str, given: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], Probe | str | None]]:
+    def read_inputs(
+        self, name: str, given: dict[str, Any]
+    ) -> Iterator[tuple[tuple[str, ...], Probe | str | None]]:
         """Yield the inputs of a block: (key path in the block, probe or name of a block, None if it is faulty)."""
         for keys, text in self.kind(name).inputs_of(given).items():
             value = None
@@ -117,14 +130,18 @@ class Blocks:
         if name != text and "." not in name:
             if name not in known:
                 near = did_you_mean(name, known)
-                raise ValueError(f"no control named {show(name)}{near}; [controls] has {listing(known)}")
+                raise ValueError(
+                    f"no control named {show(name)}{near}; [controls] has {listing(known)}"
+                )
             return name
         try:
             return read_probe(text, self.kinds)
         except ValueError as error:
             block = name.partition(".")[0]
             if block in known and (name != text or block == text):
-                raise ValueError(f'{show(text)} is not a block; did you mean "{BLOCK_PREFIX}{block}"?') from None
+                raise ValueError(
+                    f'{show(text)} is not a block; did you mean "{BLOCK_PREFIX}{block}"?'
+                ) from None
             hint = "" if "did you mean" in str(error) else f"; a block is named {BLOCK_PREFIX}NAME"
             raise ValueError(f"{error}{hint}") from None
 
@@ -146,7 +163,11 @@ class Blocks:
             setpoint = item.get("setpoint")
             if isinstance(setpoint, dict) and setpoint.get("control") == name:
                 found.append(self.first_dimension(other))
-            if self.kind(other).same_unit and name in self.inputs[other].values() and other not in passed:
+            if (
+                self.kind(other).same_unit
+                and name in self.inputs[other].values()
+                and other not in passed
+            ):
                 found += self.known_dimensions(other, (*passed, name))
         return list(dict.fromkeys(dimension for dimension in found if dimension != UNKNOWN))
 
@@ -168,7 +189,8 @@ class Blocks:
 
     def read(self) -> dict[str, Block | None]:
         """Blocks by name, in the order of the file; None for a faulty block."""
-        for _ in range(len(self.given) + 1):  # dimensions of outputs follow from the keys that they drive
+        # dimensions of outputs follow from the keys that they drive
+        for _ in range(len(self.given) + 1):
             outputs = {name: self.output_dimension(name) for name in self.given}
             if outputs == self.outputs:
                 break
@@ -182,7 +204,8 @@ class Blocks:
                 rest = {key: value for key, value in item.items() if key != "type"}
                 control = self.kind(name).model_validate(rest, context=self.setting)
                 if before == len(self.reading.faults) and None not in self.inputs[name].values():
-                    limits, inputs = control.limits or self.driven_range(name), tuple(self.inputs[name].values())
+                    limits = control.limits or self.driven_range(name)
+                    inputs = tuple(self.inputs[name].values())
                     blocks[name] = Block(control, inputs, limits, self.setting.block_units)
         self.reading.add(cycle_faults(blocks))
         return blocks
@@ -190,7 +213,9 @@ class Blocks:
     def driven_range(self, name: str) -> tuple[float, float]:
         """Range of values that all keys driven by a block may have."""
         ranges = [limits for _, limits in self.setting.driven.get(name, ())]
-        return max([-float("inf"), *(r.least for r in ranges)]), min([float("inf"), *(r.greatest for r in ranges)])
+        return max([-float("inf"), *(r.least for r in ranges)]), min(
+            [float("inf"), *(r.greatest for r in ranges)]
+        )
 
     def valid_key(self, name: str, key: str) -> Any:
         """Value of a key of a block; None if it is left out or faulty."""
@@ -205,37 +230,58 @@ class Blocks:
         if pair := unlike(self.known_dimensions(name)):
             first, other = (DIMENSIONS[item].words for item in pair)
             yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
-        ends = [item for item in (self.first_dimension(name), self.outputs[name]) if item != UNKNOWN]
+        ends = [
+            item for item in (self.first_dimension(name), self.outputs[name]) if item != UNKNOWN
+        ]
         if self.kind(name).same_unit and (pair := unlike(ends)):
             first, other = (DIMENSIONS[item].words for item in pair)
-            yield (), f"passes on {first}, but drives {other}; expected keys of the unit of its input"
+            yield (
+                (),
+                f"passes on {first}, but drives {other}; expected keys of the unit of its input",
+            )
         stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")
         low, high = self.driven_range(name)
         least_open = any(r.open and r.least == low for _, r in self.setting.driven.get(name, ()))
         limits, given = stated or (low, high), show(self.given[name].get("limits"))
         if not limits[0] < limits[1]:
             if stated:
-                yield ("limits",), f"{given} has no values between; expected the least, then the greatest"
+                yield (
+                    ("limits",),
+                    f"{given} has no values between; expected the least, then the greatest",
+                )
         elif stated and (limits[0] < low or limits[1] > high or (least_open and limits[0] == low)):
             text = f"{given} goes beyond what the driven keys may be"
-            yield ("limits",), f"{text}; expected values {str(Range(low, high, least_open)).removeprefix('of ')}"
+            yield (
+                ("limits",),
+                f"{text}; expected values {str(Range(low, high, least_open)).removeprefix('of ')}",
+            )
         elif outputs := self.valid_key(name, "output"):
             for k, output in enumerate(outputs):
                 if not low <= output <= high:
                     text = f"{show(self.given[name]['output'][k])} is not a value that the driven keys may have"
-                    yield ("output", k), f"{text}; expected values {str(Range(low, high)).removeprefix('of ')}"
+                    yield (
+                        ("output", k),
+                        f"{text}; expected values {str(Range(low, high)).removeprefix('of ')}",
+                    )
         elif (
-            not stated and (table := self.valid_key(name, "table")) and not all(low <= x <= high for x in table.output)
+            not stated
+            and (table := self.valid_key(name, "table"))
+            and not all(low <= x <= high for x in table.output)
         ):
             text = f"{show(list(table.output))} goes beyond what the driven keys may be; expected values"
-            yield ("table", "output"), f"{text} {str(Range(low, high)).removeprefix('of ')}, or `limits`"
+            yield (
+                ("table", "output"),
+                f"{text} {str(Range(low, high)).removeprefix('of ')}, or `limits`",
+            )
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
             yield ("initial",), f"{text}; expected a value within them"
 
     def delay_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
         """Yield a fault (keys in the block, text) of a `delay` that is too short for the steps of the run."""
-        given, delay, step = self.given[name].get("delay"), self.valid_key(name, "delay"), self.setting.step
+        given = self.given[name].get("delay")
+        delay = self.valid_key(name, "delay")
+        step = self.setting.step
         if delay is not None and step is not None and delay < step:
             text = f"{show(given)} is shorter than numerics.step, so a step would read an input that is not known yet"
             yield ("delay",), f"{text}; expected at least {step:g} s, or a shorter step"
@@ -247,11 +293,16 @@ class Blocks:
 
     def sample_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
         """Yield faults (keys in the block, text) of `period` and `offset`."""
-        given, period, offset = self.given[name], self.valid_key(name, "period"), self.valid_key(name, "offset")
+        given = self.given[name]
+        period = self.valid_key(name, "period")
+        offset = self.valid_key(name, "offset")
         if offset and "period" not in given:
             yield ("offset",), "has no effect without `period`; give both keys, or remove this key"
         if offset is not None and period is not None and offset >= period:
-            yield ("offset",), f"{show(given['offset'])} is not below the period; expected less than {period:g} s"
+            yield (
+                ("offset",),
+                f"{show(given['offset'])} is not below the period; expected less than {period:g} s",
+            )
         if period is not None and self.setting.span is not None:
             start, end = self.setting.span
             if (end - start) / period > MOST_SAMPLES:
@@ -271,7 +322,9 @@ def read_controls(reading: Reading, kinds: dict[str, Any]) -> dict[str, Block | 
     """Blocks of a case by name; None for a faulty block. Adds their quantities to `kinds`, as for `read_probe`."""
     for group in ("nodes", "links"):
         if "controls" in reading.raw.table.get(group, {}):
-            reading.fault((group, "controls"), '"controls" is the name of the blocks; expected another name')
+            reading.fault(
+                (group, "controls"), '"controls" is the name of the blocks; expected another name'
+            )
     blocks = Blocks(reading, kinds)
     result = blocks.read()
     kinds["controls"] = {f"{BLOCK_PREFIX}{name}": None for name in reading.raw.table["controls"]}
@@ -299,7 +352,10 @@ def cycle_faults(blocks: dict[str, Block | None]) -> Iterator[tuple[tuple, str]]
         text = f"{name} reads its own output at once" if len(cycle) == 1 else text
         curable = (item for item in cycle if not {*cycle} & {*sound[item].followed})
         remedy = next((f"give [controls.{item}] a `filter`" for item in curable), "")
-        remedy = remedy or "a `filter` does not act on setpoints; expected a setpoint from outside of the cycle"
+        remedy = (
+            remedy
+            or "a `filter` does not act on setpoints; expected a setpoint from outside of the cycle"
+        )
         yield ("controls", name), f"{text}; {remedy}"
 
 
@@ -308,7 +364,11 @@ def needed_at_once(blocks: dict[str, Block], name: str) -> set[str]:
     found: set[str] = set()
     ahead = [name]
     while ahead:
-        more = [other for other in blocks[ahead.pop()].blocks_passed if other in blocks and other not in found]
+        more = [
+            other
+            for other in blocks[ahead.pop()].blocks_passed
+            if other in blocks and other not in found
+        ]
         found.update(more)
         ahead += more
     return found
@@ -317,7 +377,11 @@ def needed_at_once(blocks: dict[str, Block], name: str) -> set[str]:
 def decision_order(blocks: dict[str, Block]) -> list[str]:
     """Names of blocks, each after those whose present outputs it needs; blocks of a cycle are left out."""
     order: list[str] = []
-    while ready := [name for name, block in blocks.items() if name not in order
-                    and all(other in order or other not in blocks for other in block.blocks_passed)]:  # fmt: skip
+    while ready := [
+        name
+        for name, block in blocks.items()
+        if name not in order
+        and all(other in order or other not in blocks for other in block.blocks_passed)
+    ]:
         order += ready
     return order

@@ -24,7 +24,9 @@ def interior_patches(basin: Any, mesh: Mesh) -> dict[str, np.ndarray]:
     from fvsolve.core.mesh.mesh import MeshPoints
 
     faults: list[tuple[tuple, str]] = []
-    faults += [(("patches", name), text) for name in named for text in name_faults(basin, mesh, name)]
+    faults += [
+        (("patches", name), text) for name in named for text in name_faults(basin, mesh, name)
+    ]
     result, points = {}, MeshPoints(mesh)
     for name, patch in named.items():
         x, y = patch.at or np.mean(patch.polygon, axis=0)
@@ -43,7 +45,9 @@ def interior_patches(basin: Any, mesh: Mesh) -> dict[str, np.ndarray]:
             continue
         result[name] = cells if cells.size else np.array([middle])
         if result[name].size == mesh.area.size:
-            faults.append((("patches", name), "contains all cells of the basin; expected cells around it"))
+            faults.append(
+                (("patches", name), "contains all cells of the basin; expected cells around it")
+            )
     faults += [(("patches", name), text) for name, text in overlaps(result, mesh)]
     if faults:
         raise ValueFault(faults)
@@ -81,5 +85,8 @@ def overlaps(cells: dict[str, np.ndarray], mesh: Mesh) -> Iterator[tuple[str, st
         others = sorted({owner[i] for i in own.tolist() if i in owner})
         if others:
             x, y = mesh.centre[next(i for i in own.tolist() if i in owner)]
-            yield name, f"has a cell of {listing(others)} too, at {x:.6g}, {y:.6g} m; expected patches apart"
+            yield (
+                name,
+                f"has a cell of {listing(others)} too, at {x:.6g}, {y:.6g} m; expected patches apart",
+            )
         owner |= {i: name for i in own.tolist() if i not in owner}

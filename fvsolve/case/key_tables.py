@@ -35,14 +35,31 @@ from fvsolve.parts.valve import Sized
 from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
-    "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
-    "compressor": Compressor, "dry friction": DryFriction,
-    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "run-up": RunUp,
-    "grid": OutputGrid, "mesh": BasinMesh,
-    "scalar": Scalar, "reaction": Reaction,
-    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "route": Route, "joint": Joint,
+    "every node": Node,
+    "riding": PlaceOnBody,
+    "every link": TwoPort,
+    "friction": Friction,
+    "connection": Connection,
+    "compressor": Compressor,
+    "dry friction": DryFriction,
+    "wall": Wall,
+    "lining": Lining,
+    "patch": Patch,
+    "start": BasinStart,
+    "line": OutputLine,
+    "run-up": RunUp,
+    "grid": OutputGrid,
+    "mesh": BasinMesh,
+    "scalar": Scalar,
+    "reaction": Reaction,
+    "fluid": FluidSpec,
+    "numerics": Numerics,
+    "output": Output,
+    "energy": EnergyUse,
+    "route": Route,
+    "joint": Joint,
     "attitude": Attitude,
-}  # fmt: skip
+}
 # base class -> part whose table lists its keys in full
 SHARED = {Node: "", PlaceOnBody: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}
 LEFT_OUT = " if left out"
@@ -62,18 +79,31 @@ def key_table(name: str) -> str:
     if name == "culvert inlets":
         return inlets_table()
     if name == "case":
-        top = {"ambient_pressure": (Quantity("pressure", about="absolute ambient pressure"), 101325.0), **TOP}
+        top = {
+            "ambient_pressure": (Quantity("pressure", about="absolute ambient pressure"), 101325.0),
+            **TOP,
+        }
         rows = [row(key, value, default) for key, (value, default) in top.items()]
     else:
         rows = rows_of(name, model_of(name))
-    lines = (" | ".join(cell.replace("|", "\\|") for cell in cells) for cells in (HEAD, ("---",) * len(HEAD), *rows))
+    lines = (
+        " | ".join(cell.replace("|", "\\|") for cell in cells)
+        for cells in (HEAD, ("---",) * len(HEAD), *rows)
+    )
     return "".join(f"| {line} |\n" for line in lines)
 
 
 def materials_table() -> str:
     """Markdown table of materials: range of each property, and the sources."""
-    head = ("material", "modulus [GPa]", "Poisson's ratio", "roughness [mm]", "density [kg/m3]",
-            "specific heat [J/kg/K]", "read in")  # fmt: skip
+    head = (
+        "material",
+        "modulus [GPa]",
+        "Poisson's ratio",
+        "roughness [mm]",
+        "density [kg/m3]",
+        "specific heat [J/kg/K]",
+        "read in",
+    )
     rows = [head, ("---",) * len(head)]
     for name, material in materials().items():
         figures = [material.figures.get(key) for key in SI]
@@ -86,7 +116,11 @@ def materials_table() -> str:
 def inlets_table() -> str:
     """Markdown table of the inlets of culverts, in the order of HDS-5."""
     head = ("inlet", "chart", "scale", "form", "K", "M", "c", "Y", "ke", "shape and edge")
-    rows = [head, ("---",) * len(head), *((f"`{name}`", *map(str, inlet)) for name, inlet in inlets().items())]
+    rows = [
+        head,
+        ("---",) * len(head),
+        *((f"`{name}`", *map(str, inlet)) for name, inlet in inlets().items()),
+    ]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
 
 
@@ -94,8 +128,10 @@ def model_of(name: str) -> type[Table]:
     """Declaration (class) of a type of part, or of another table of the case."""
     known = {**TABLES, **Control.kinds, **KINDS["nodes"], **KINDS["links"]}
     if name not in known:
-        raise FvsolveError(f"unknown table of keys {show(name)}{did_you_mean(name, known)}; expected a type of part, "
-                           f"or one of {', '.join(TABLES)}, case")  # fmt: skip
+        raise FvsolveError(
+            f"unknown table of keys {show(name)}{did_you_mean(name, known)}; expected a type of part, "
+            f"or one of {', '.join(TABLES)}, case"
+        )
     return known[name]
 
 
@@ -110,25 +146,39 @@ def rows_of(name: str, model: type[Table]) -> list[tuple[str, ...]]:
     borrowed: dict[str, str] = {}  # key -> owner
     for base, owner in SHARED.items():
         if issubclass(model, base) and model is not base and name != owner:
-            borrowed |= {key: owner for key, value in base.values().items() if model.values()[key] is value}
+            borrowed |= {
+                key: owner for key, value in base.values().items() if model.values()[key] is value
+            }
     for owner in dict.fromkeys(filter(None, borrowed.values())):
         keys = ", ".join(f"`{key}`" for key, other in borrowed.items() if other == owner)
         rows.append((keys, f"see [{owner.replace('-', ' ')}](#{owner})", "", "", ""))
     fields = {info.alias or key: info for key, info in model.model_fields.items()}
     for key, value in model.values().items():
         if key not in borrowed:
-            default = NEEDED if fields[key].is_required() else fields[key].get_default(call_default_factory=True)
+            default = (
+                NEEDED
+                if fields[key].is_required()
+                else fields[key].get_default(call_default_factory=True)
+            )
             rows.append(row(key, value, default, model.needs))
     return rows
 
 
-def row(key: str, value: Value, default: Any, needs: tuple[tuple[str, ...], ...] = ()) -> tuple[str, ...]:
+def row(
+    key: str, value: Value, default: Any, needs: tuple[tuple[str, ...], ...] = ()
+) -> tuple[str, ...]:
     """Cells of the row of a key: name, accepted values, default, effect of a change, description.
 
     needs : as for `default_cell`
     """
     words, left_out = about(value)
-    return f"`{key}`", value.takes, left_out or default_cell(key, default, needs), value.changes, words
+    return (
+        f"`{key}`",
+        value.takes,
+        left_out or default_cell(key, default, needs),
+        value.changes,
+        words,
+    )
 
 
 def about(value: Value) -> tuple[str, str]:
@@ -136,7 +186,11 @@ def about(value: Value) -> tuple[str, str]:
 
     The default is the part of the description before "if left out", or "".
     """
-    unit = DIMENSIONS[value.dimension].si if isinstance(getattr(value, "dimension", None), str) else "-"
+    unit = (
+        DIMENSIONS[value.dimension].si
+        if isinstance(getattr(value, "dimension", None), str)
+        else "-"
+    )
     words = value.about.replace(f" [{unit}]", "").replace(f"[{unit}]", "").strip("; ")
     if not words.endswith(LEFT_OUT):
         return words, ""

@@ -9,13 +9,30 @@ from typing import TYPE_CHECKING, Any
 
 from fvsolve import exact, units
 from fvsolve.argument_checks import TABLE, validated
-from fvsolve.case import chainage, checks, claims, connections, part_reading, resource_checks, shipped
+from fvsolve.case import (
+    chainage,
+    checks,
+    claims,
+    connections,
+    part_reading,
+    resource_checks,
+    shipped,
+)
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.conduits import water_of_conduits
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
-from fvsolve.case.reading import Raw, Reading, copy_paths, default_faults, defaults_of, override, read_raw, split_key
+from fvsolve.case.reading import (
+    Raw,
+    Reading,
+    copy_paths,
+    default_faults,
+    defaults_of,
+    override,
+    read_raw,
+    split_key,
+)
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output, ViscosityLaw
 from fvsolve.core.fluid import follow_temperature, properties, specific_heat
 from fvsolve.errors import FluidError, did_you_mean
@@ -32,16 +49,47 @@ if TYPE_CHECKING:
     from fvsolve.parts.pump.energy_use import EnergyUse
 
 SCHEMA = 1
-MOST_SCALARS = 500  # each has a value in each cell and at each node, and a default probe at each node
-PRESENCE_KEYS = ("required_pressure", "price")  # keys of parts whose presence alone changes the case
+# each has a value in each cell and at each node, and a default probe at each node
+MOST_SCALARS = 500
+# keys of parts whose presence alone changes the case
+PRESENCE_KEYS = ("required_pressure", "price")
 # Tables with names that other tables refer to.
-NAME_TABLES = ("nodes", "links", "signals", "controls", "scalars", "reactions", "routes", "defaults")
+NAME_TABLES = (
+    "nodes",
+    "links",
+    "signals",
+    "controls",
+    "scalars",
+    "reactions",
+    "routes",
+    "defaults",
+)
 STUDY_KEYS = {"events", "protections"}
 KEYS = (
-    "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "controls", "scalars", "reactions", "defaults", "numerics", "output", "energy", "expect", "compare",
-    "routes", "limits", "exact", "validation",
-)  # fmt: skip
+    "schema",
+    "title",
+    "description",
+    "source",
+    "ambient_pressure",
+    "gravity",
+    "fluid",
+    "nodes",
+    "links",
+    "signals",
+    "controls",
+    "scalars",
+    "reactions",
+    "defaults",
+    "numerics",
+    "output",
+    "energy",
+    "expect",
+    "compare",
+    "routes",
+    "limits",
+    "exact",
+    "validation",
+)
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
     "title": (val.Text(changes=val.VALUE), ""),
@@ -52,14 +100,18 @@ TOP = {
 
 
 @validated(set=TABLE)
-def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None) -> Case:
+def load(
+    source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None
+) -> Case:
     """Read a case from a TOML file, the name of a shipped case, a dict shaped like a file, or another case.
 
     set : values that override keys, such as {"links.main.cells": 400}. Numbers of the result are in SI, pressures
     absolute [Pa]. Raises CaseError with every fault: line, key path, value found, expected value, nearest valid name.
     """
     if isinstance(source, Raw):
-        return read_case(replace(source, table=read_raw(source.table).table, overridden=[]), set or {})
+        return read_case(
+            replace(source, table=read_raw(source.table).table, overridden=[]), set or {}
+        )
     if not isinstance(source, Case):
         return read_case(read_raw(find_source(source)), set or {})
     if not set:
@@ -125,7 +177,9 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     check_unused_signals(reading)
     kinds = part_reading.place_kinds(cut, parts, scalars, bool(reading.faults))
     routes = read_routes(reading, cut, parts.links)
-    kinds["routes"] = {name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()}
+    kinds["routes"] = {
+        name: route and (legs(route, parts.links), parts.links) for name, route in routes.items()
+    }
     kinds["reactions"] = reaction_kinds(reactions) if reactions else {}
     blocks = {}
     if "controls" in reading.raw.table:
@@ -134,14 +188,17 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         blocks = read_controls(reading, kinds)
     output = read_output(reading, numerics, kinds)
     kinds["run_up"] = run_up_kinds(reading, output)
-    expect, compare = claims.read_expectations(reading, kinds, routes), claims.read_comparisons(reading, kinds)
+    expect = claims.read_expectations(reading, kinds, routes)
+    compare = claims.read_comparisons(reading, kinds)
     validation = read_validation_table(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
     check_parts(reading, cut, parts, state, numerics, general["gravity"])
     cells = has_cells(cut.table)
     check_times(reading, cut, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
-    reading.add(checks.scalar_faults(scalars, parts.nodes, parts.links, cut.pieces, reading.raw.table))
+    reading.add(
+        checks.scalar_faults(scalars, parts.nodes, parts.links, cut.pieces, reading.raw.table)
+    )
     reading.add(checks.scalar_range_faults(scalars, reactions, parts.nodes, parts.links))
     links = part_reading.fill_cells(reading, parts.links, state, numerics)
     if None not in (numerics, output, state) and not reading.faults:
@@ -155,12 +212,34 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     reading.stop()
     setting, raw = reading.setting, reading.raw
     case = Case(
-        name=raw.name, path=raw.path, folder=raw.folder, raw=raw.table, **general, ambient_pressure=setting.ambient,
-        fluid=fluid, properties=state, nodes=parts.nodes | waters, links=links, meshes=parts.meshes | lines,
-        lumped=parts.lumped, signals=dict(setting.used), scalars=scalars, numerics=numerics, output=output,
-        expect=expect, compare=compare, routes=routes, limits=limits, controls=blocks, reactions=reactions,
-        exact=named, energy=energy, copies=dict(setting.files), read=reading.read, validation=validation,
-    )  # fmt: skip
+        name=raw.name,
+        path=raw.path,
+        folder=raw.folder,
+        raw=raw.table,
+        **general,
+        ambient_pressure=setting.ambient,
+        fluid=fluid,
+        properties=state,
+        nodes=parts.nodes | waters,
+        links=links,
+        meshes=parts.meshes | lines,
+        lumped=parts.lumped,
+        signals=dict(setting.used),
+        scalars=scalars,
+        numerics=numerics,
+        output=output,
+        expect=expect,
+        compare=compare,
+        routes=routes,
+        limits=limits,
+        controls=blocks,
+        reactions=reactions,
+        exact=named,
+        energy=energy,
+        copies=dict(setting.files),
+        read=reading.read,
+        validation=validation,
+    )
     return case if named is None else with_exact(reading, case)
 
 
@@ -193,18 +272,26 @@ def read_general(reading: Reading) -> dict[str, Any]:
         reading.fault((), f"is a study of a case; fvsolve study {reading.raw.file} runs it")
         reading.stop()
     if "validation" in table and not {"nodes", "links", "controls"} & table.keys():
-        reading.fault((), f"has a validation without a scene; fvsolve validate {reading.raw.file} runs it")
+        reading.fault(
+            (), f"has a validation without a scene; fvsolve validate {reading.raw.file} runs it"
+        )
         reading.stop()
     for key in table:
         if key not in KEYS:
-            reading.fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")
+            reading.fault(
+                (key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}"
+            )
     given = table.get("ambient_pressure", 101325.0)
     with reading.catch("ambient_pressure"):
         ambient, gauge = units.parse(given, "pressure")
         if gauge:
-            raise ValueError(f'{show(given)} is a gauge pressure; expected an absolute pressure, such as "1 atm"')
+            raise ValueError(
+                f'{show(given)} is a gauge pressure; expected an absolute pressure, such as "1 atm"'
+            )
         if ambient <= 0:
-            raise ValueError(f'{show(given)} is not an absolute pressure above 0; expected for example "1 atm"')
+            raise ValueError(
+                f'{show(given)} is not an absolute pressure above 0; expected for example "1 atm"'
+            )
         reading.setting.ambient = ambient
     values = {key: default for key, (_, default) in TOP.items()}
     for key, value in TOP.items():
@@ -221,7 +308,11 @@ def reusable_values(reading: Reading, previous: Case | None) -> dict[tuple, tupl
     """
     if previous is None or previous.ambient_pressure != reading.setting.ambient:
         return {}
-    return previous.read if defaults_of(previous.raw, "pipe") == defaults_of(reading.raw.table, "pipe") else {}
+    return (
+        previous.read
+        if defaults_of(previous.raw, "pipe") == defaults_of(reading.raw.table, "pipe")
+        else {}
+    )
 
 
 def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:
@@ -238,7 +329,9 @@ def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:
             stated["viscosity"] = float(spec.viscosity) * density
             spec = spec.model_copy(update={"viscosity": stated["viscosity"]})
         if isinstance(spec.viscosity, ViscosityLaw):
-            return spec, follow_temperature(properties(**stated | {"viscosity": None}), spec.viscosity.points)
+            return spec, follow_temperature(
+                properties(**stated | {"viscosity": None}), spec.viscosity.points
+            )
         return spec, properties(**stated)
     except FluidError as error:
         reading.fault(("fluid", error.key), error.message + _in_celsius(reading, stated, error.key))
@@ -263,7 +356,10 @@ def _in_celsius(reading: Reading, stated: dict[str, Any], key: str) -> str:
 def check_names(reading: Reading) -> None:
     """Read the signals and check the defaults. Raises CaseError if a table of named parts is not a table."""
     table = reading.raw.table
-    reading.setting.signals, reading.setting.controls = reading.group("signals"), reading.group("controls")
+    reading.setting.signals, reading.setting.controls = (
+        reading.group("signals"),
+        reading.group("controls"),
+    )
     reading.add(default_faults(table, reading.setting))
     tables = [table.get(name, {}) for name in NAME_TABLES]
     tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
@@ -286,7 +382,9 @@ def read_scalars(reading: Reading) -> dict[str, Any]:
     return result
 
 
-def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[str, Any], fluid: Any) -> dict[str, Any]:
+def fill_specific_heats(
+    reading: Reading, scalars: dict[str, Any], links: dict[str, Any], fluid: Any
+) -> dict[str, Any]:
     """Scalars with the specific heat of the fluid where none is stated: with `heat`, and where walls store heat.
 
     Adds a fault for a specific heat that has no effect.
@@ -314,7 +412,9 @@ def fill_specific_heats(reading: Reading, scalars: dict[str, Any], links: dict[s
 def check_unused_signals(reading: Reading) -> None:
     """Add a fault for each signal that no part uses and that is not a schedule of any usual dimension."""
     for name, given in reading.setting.signals.items():
-        if name in reading.setting.used or (isinstance(given, dict) and ("signal" in given or "sum" in given)):
+        if name in reading.setting.used or (
+            isinstance(given, dict) and ("signal" in given or "sum" in given)
+        ):
             continue
         if text := signal_fault(given):
             reading.fault(("signals", name), text)
@@ -333,16 +433,26 @@ def check_unused_signals(reading: Reading) -> None:
 
 def has_cells(table: dict[str, Any]) -> bool:
     """True if a case has pipes or basins, or parts of unknown type. table : nested dicts of the case"""
-    kinds = [kind for group in ("nodes", "links") for kind in part_reading.table_kinds(table, group).values()]
-    return any(kind in (Pipe, None) or is_kind(kind, "basin") or is_kind(kind, "conduit") for kind in kinds)
+    kinds = [
+        kind
+        for group in ("nodes", "links")
+        for kind in part_reading.table_kinds(table, group).values()
+    ]
+    return any(
+        kind in (Pipe, None) or is_kind(kind, "basin") or is_kind(kind, "conduit") for kind in kinds
+    )
 
 
-def read_output(reading: Reading, numerics: Numerics | None, kinds: dict[str, Any]) -> Output | None:
+def read_output(
+    reading: Reading, numerics: Numerics | None, kinds: dict[str, Any]
+) -> Output | None:
     """Table `[output]` with its probes and its interval of rows; None if it is faulty. kinds : as for `read_probe`"""
     output = reading.table("output", Output)
     valid = output if output is not None else reading.valid_keys("output", Output)
     kinds["sections"] = {}
-    names_basins = any((valid.gauges, valid.sections, valid.lines, valid.run_up, valid.grids, valid.maxima))
+    names_basins = any(
+        (valid.gauges, valid.sections, valid.lines, valid.run_up, valid.grids, valid.maxima)
+    )
     if names_basins:
         from fvsolve.case import basins  # only output of basins needs it
 
@@ -386,7 +496,12 @@ def valid_times(reading: Reading) -> Numerics | None:
 
 
 def check_parts(
-    reading: Reading, cut: chainage.CutTable, parts: Parts, state: Any, numerics: Numerics | None, gravity: float
+    reading: Reading,
+    cut: chainage.CutTable,
+    parts: Parts,
+    state: Any,
+    numerics: Numerics | None,
+    gravity: float,
 ) -> None:
     """Check connections, and each part in the context of the others. state : properties of the fluid, None if faulty"""
     if cut.connections_known:
@@ -437,11 +552,15 @@ def fill_numerics(
     pools = [parts.nodes[name] for name in parts.meshes]
     carries = bool(scalars) and any(pool.physics_type.carries for pool in pools)
     rubs = any(pool.physics_type.has_friction(pool) for pool in pools)
-    rubs = rubs or any(getattr(link, "manning", 0.0) for link in parts.links.values() if is_kind(link, "conduit"))
+    rubs = rubs or any(
+        getattr(link, "manning", 0.0) for link in parts.links.values() if is_kind(link, "conduit")
+    )
     return numerics.filled(cells, carries, rubs, checks.follows_cavities(fluid, cells))
 
 
-def size_faults(numerics: Any, output: Any, links: dict, meshes: dict, state: Any) -> Iterator[tuple[tuple, str]]:
+def size_faults(
+    numerics: Any, output: Any, links: dict, meshes: dict, state: Any
+) -> Iterator[tuple[tuple, str]]:
     """Faults (key path, message) of cells or rows that need too much memory, and of too short steps.
 
     Steps and output intervals must exceed the rounding of the time.
@@ -449,7 +568,11 @@ def size_faults(numerics: Any, output: Any, links: dict, meshes: dict, state: An
     """
     yield from resource_checks.find_faults(numerics, output, links, meshes)
     # travel times of a wave through a cell; in basins a wave speed of 1 m/s is assumed
-    times = [link.length / link.cells / wave_speed(link, state) for link in links.values() if link.kind == "pipe"]
+    times = [
+        link.length / link.cells / wave_speed(link, state)
+        for link in links.values()
+        if link.kind == "pipe"
+    ]
     times += [float(mesh.area.min()) ** 0.5 for mesh in meshes.values()]
     yield from resource_checks.rounding_faults(numerics, min(times, default=math.inf))
 
@@ -475,7 +598,9 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
     Names, types, connections, probes, expectations and all other tables are kept.
     """
     raw, setting = reading.raw, reading.setting
-    if not is_self_contained(previous) or not all(is_number_key(raw, keys) for keys in raw.overridden):
+    if not is_self_contained(previous) or not all(
+        is_number_key(raw, keys) for keys in raw.overridden
+    ):
         return None
     setting.ambient, reading.read = previous.ambient_pressure, dict(previous.read)
     parts = {}
@@ -487,13 +612,17 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
                 return None
             if known[0] is not given:
                 try:
-                    part = part_reading.read_part(reading, raw.table, type(known[1]), read_before(given, *known))
+                    part = part_reading.read_part(
+                        reading, raw.table, type(known[1]), read_before(given, *known)
+                    )
                     known = given, part
                 except ValueError:
                     return None
                 reading.read[group, name] = known
             parts[group][name] = known[1]
-    nodes, links, numerics = part_reading.inherit_elevations(**parts), parts["links"], previous.numerics
+    nodes = part_reading.inherit_elevations(**parts)
+    links = parts["links"]
+    numerics = previous.numerics
     about = previous.ambient_pressure, previous.gravity, previous.properties, raw
     reading.add(checks.part_faults(nodes, links, *about, numerics.start, {}, {}))
     links = part_reading.fill_cells(reading, links, previous.properties, numerics)
@@ -512,8 +641,13 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
     given, before : keys of the part as in the file, now and earlier; part : part as read earlier
     """
     values = vars(part)
-    same = {key: schedule for key, value in given.items() if isinstance(schedule := values.get(key), Schedule)
-            and isinstance(value, dict) and before.get(key) is value}  # fmt: skip
+    same = {
+        key: schedule
+        for key, value in given.items()
+        if isinstance(schedule := values.get(key), Schedule)
+        and isinstance(value, dict)
+        and before.get(key) is value
+    }
     return {**given, **same}
 
 
@@ -522,10 +656,21 @@ def is_self_contained(case: Case) -> bool:
 
     An exact solution, if the case has one, must also be stated in its file.
     """
-    outer = case.signals or case.controls or case.scalars or case.compare or case.copies or case.equilibrium_nodes
+    outer = (
+        case.signals
+        or case.controls
+        or case.scalars
+        or case.compare
+        or case.copies
+        or case.equilibrium_nodes
+    )
     no_outer_input = not (chainage.placed(chainage.add_bends(case.raw)) or outer)
     exact_in_file = case.exact is None or "exact" in case.raw
-    return no_outer_input and exact_in_file and not any(is_kind(node, "basin") for node in case.nodes.values())
+    return (
+        no_outer_input
+        and exact_in_file
+        and not any(is_kind(node, "basin") for node in case.nodes.values())
+    )
 
 
 def is_number_key(raw: Any, keys: tuple) -> bool:
@@ -543,4 +688,6 @@ def is_number_key(raw: Any, keys: tuple) -> bool:
 def number_keys(kind: type | None) -> frozenset[str]:
     """Keys of a type of part that are numbers or schedules."""
     values = {} if kind is None else kind.values()
-    return frozenset(key for key, value in values.items() if isinstance(value, (val.Quantity, Scheduled)))
+    return frozenset(
+        key for key, value in values.items() if isinstance(value, (val.Quantity, Scheduled))
+    )

@@ -61,7 +61,13 @@ def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
 
 
 def moving_wall_faults(
-    name: str, basin: Any, mesh: Any, nodes: dict[str, Any], joined: set[str], times: tuple[float, float], named: Any
+    name: str,
+    basin: Any,
+    mesh: Any,
+    nodes: dict[str, Any],
+    joined: set[str],
+    times: tuple[float, float],
+    named: Any,
 ) -> Iterator[tuple[tuple, str]]:
     """Faults (key path, message) of the moving walls of a basin.
 
@@ -71,16 +77,28 @@ def moving_wall_faults(
     key = ("nodes", name, "patches")
     for patch, options in basin.patches.items():
         if options.zone is not None and not options.moves:
-            yield (*key, patch, "zone"), "applies only to a moving wall; give `body` or `travel` too"
-    walls = {patch: options for patch, options in moving_walls(basin).items() if patch in mesh.patches[:-1]}
+            yield (
+                (*key, patch, "zone"),
+                "applies only to a moving wall; give `body` or `travel` too",
+            )
+    walls = {
+        patch: options
+        for patch, options in moving_walls(basin).items()
+        if patch in mesh.patches[:-1]
+    }
     for patch, options in walls.items():
         for below, text in wall_faults(basin, mesh, patch, options, nodes, times, named):
             yield (*key, patch, *below), text
         if f"{name}.{patch}" in joined:
-            yield (*key, patch), "a link joins here, and this is a moving wall; join the link to a fixed patch"
+            yield (
+                (*key, patch),
+                "a link joins here, and this is a moving wall; join the link to a fixed patch",
+            )
     yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls, times))
     if walls and basin.holes:
-        text = "would be deformed by the moving mesh; expected no holes in a basin with a moving wall"
+        text = (
+            "would be deformed by the moving mesh; expected no holes in a basin with a moving wall"
+        )
         yield ("nodes", name, "holes"), text
 
 
@@ -92,16 +110,24 @@ def wall_faults(
     patch, options : name and keys of the patch; other arguments as for `find_faults`
     """
     if not basin.physics_type.moves:
-        yield (), f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`"
+        yield (
+            (),
+            f"physics {show(basin.physics)} does not support moving walls; leave out `body` or `travel`",
+        )
     for other in (*options.boundary_keys, "scalars"):
         if getattr(options, other):
-            yield (other,), "applies only to an open boundary, and this is a moving wall; leave this key out"
+            yield (
+                (other,),
+                "applies only to an open boundary, and this is a moving wall; leave this key out",
+            )
     if options.span is not None:
         yield ("span",), "a moving wall is a whole side; leave out `span`"
     if options.body is not None and (
         options.body in nodes or options.body not in named
     ):  # otherwise the body itself is faulty
-        yield from ((("body",), text) for text in body_faults(options.body, nodes, outward(mesh, patch)[0]))
+        yield from (
+            (("body",), text) for text in body_faults(options.body, nodes, outward(mesh, patch)[0])
+        )
     normals = mesh.normal[mesh.patch(patch)]
     if np.ptp(normals, axis=0).max() > 1e-9 or np.abs(normals[0]).max() < 1.0 - 1e-9:
         text = "is not perpendicular to x or y; expected a straight wall perpendicular to the axis along which it moves"
@@ -111,7 +137,10 @@ def wall_faults(
     at = mesh.points[:, axis]
     end = at.max() if side > 0.0 else at.min()
     if np.abs(at[mesh.ends[mesh.patch(patch)]] - end).max() > NEAR * np.ptp(at):
-        yield (), f"does not lie where the basin ends along {'xy'[axis]}, at {end:g} m; expected a wall there"
+        yield (
+            (),
+            f"does not lie where the basin ends along {'xy'[axis]}, at {end:g} m; expected a wall there",
+        )
         return
     size, zone = float(np.ptp(at)), options.zone or float(np.ptp(at))
     if zone > size * (1.0 + 1e-9):
@@ -119,7 +148,10 @@ def wall_faults(
         yield ("zone",), f"{text}; expected a narrower zone"
     if options.travel is not None:
         per = area_growth(mesh, axis, weights(basin, mesh, patch, at))
-        yield from ((("travel",), text) for text in travel_faults(options.travel, side, zone, times, mesh, per))
+        yield from (
+            (("travel",), text)
+            for text in travel_faults(options.travel, side, zone, times, mesh, per)
+        )
     if isinstance(getattr(basin, "bed", None), SpatialField):
         yield from bed_faults(basin, mesh, patch)
     yield from outline_faults(basin, mesh, patch)
@@ -131,7 +163,9 @@ def body_faults(name: str, nodes: dict[str, Any], axis: int) -> Iterator[str]:
     The node must be a mass, or a body that slides along the axis of the wall.
     axis : axis of motion of the wall, 0 for x, 1 for y
     """
-    known = [other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")]
+    known = [
+        other for other, node in nodes.items() if getattr(node, "kind", "") in ("mass", "body")
+    ]
     node = nodes.get(name)
     if node is None:
         yield f"no mass or body named {show(name)}; the case has {listing(known) or 'none'}{did_you_mean(name, known)}"
@@ -161,7 +195,9 @@ def slide_direction(body: Any) -> np.ndarray:
     return body.joint.attitude.rotation @ body.joint.unit_axis
 
 
-def travel_faults(travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray) -> Iterator[str]:
+def travel_faults(
+    travel: Any, side: float, zone: float, times: tuple, mesh: Any, per: np.ndarray
+) -> Iterator[str]:
     """Yield fault texts for the travel of a wall: jumps, travel beyond its zone, and inverted cells.
 
     travel : schedule [m]; side : sign of the outward normal; zone : width of the deformed zone [m]
@@ -190,7 +226,11 @@ def outline_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, s
     outer = np.arange(mesh.inner, mesh.left.size)
     own = mesh.patch(patch)
     goes = (weights(basin, mesh, patch, mesh.points[:, axis])[mesh.ends[outer]] > 0.0).any(axis=1)
-    leans = (np.abs(mesh.normal[outer, axis]) > NEAR) & goes & ~((outer >= own.start) & (outer < own.stop))
+    leans = (
+        (np.abs(mesh.normal[outer, axis]) > NEAR)
+        & goes
+        & ~((outer >= own.start) & (outer < own.stop))
+    )
     if leans.any() and not basin.holes:
         x, y = mesh.middle[outer[np.flatnonzero(leans)[0]]]
         text = f"would move the outline at {x:.6g},{y:.6g} m, which is not parallel to {'xy'[axis]}"
@@ -206,12 +246,18 @@ def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]
     x, y = mesh.points[np.unique(corners[cells])].T
     heights = np.append(basin.bed.at(x, y), basin.bed.at(*mesh.centre[cells].T))
     if np.ptp(heights) > FLAT * max(np.abs(heights).max(), 1.0):
-        zone = f"from {x.min():g} to {x.max():g} m" if axis == 0 else f"from {y.min():g} to {y.max():g} m"
+        zone = (
+            f"from {x.min():g} to {x.max():g} m"
+            if axis == 0
+            else f"from {y.min():g} to {y.max():g} m"
+        )
         text = f"the bed is not flat in the zone, {'xy'[axis]} {zone}; expected a flat bed, or a shorter zone"
         yield ("zone",), text
 
 
-def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
+def faults_between(
+    basin: Any, mesh: Any, walls: dict[str, Any], times: tuple
+) -> Iterator[tuple[tuple, str]]:
     """Faults of several walls together: different axes, inverted cells, fixed patches on the side of a moving wall.
 
     walls : name of a patch -> its keys, of moving walls; times : start and end of the run [s]
@@ -228,12 +274,19 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
             continue
         for wall, (axis, side) in axes.items():
             end = mesh.points[:, axis].max() if side > 0.0 else mesh.points[:, axis].min()
-            lies = np.abs(mesh.middle[mesh.patch(patch), axis] - end) < 1e-9 * np.ptp(mesh.points[:, axis])
+            lies = np.abs(mesh.middle[mesh.patch(patch), axis] - end) < 1e-9 * np.ptp(
+                mesh.points[:, axis]
+            )
             if lies.any():
-                yield (patch,), f"lies on the side of the moving wall {wall}; expected a patch on a fixed side"
+                yield (
+                    (patch,),
+                    f"lies on the side of the moving wall {wall}; expected a patch on a fixed side",
+                )
 
 
-def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
+def crossing_faults(
+    basin: Any, mesh: Any, walls: dict[str, Any], times: tuple
+) -> Iterator[tuple[tuple, str]]:
     """Yield a fault if the motions of several walls together invert a cell, although each motion alone does not.
 
     walls, times : as for `faults_between`
@@ -242,16 +295,23 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
     if len(driven) < 2 or len({outward(mesh, patch)[0] for patch in driven}) > 1:
         return
     inside = np.concatenate([item.time for item in driven.values()])
-    at = np.unique([*np.linspace(*times, SAMPLES), *inside[(inside > times[0]) & (inside < times[1])]])
+    at = np.unique(
+        [*np.linspace(*times, SAMPLES), *inside[(inside > times[0]) & (inside < times[1])]]
+    )
     wide, alone = np.ones((mesh.area.size, at.size)), np.ones(len(driven), bool)
     for k, (patch, travel) in enumerate(driven.items()):
         axis, _ = outward(mesh, patch)
         places = value(travel, at)
-        grown = np.outer(area_growth(mesh, axis, weights(basin, mesh, patch, mesh.points[:, axis])), places - places[0])
+        grown = np.outer(
+            area_growth(mesh, axis, weights(basin, mesh, patch, mesh.points[:, axis])),
+            places - places[0],
+        )
         wide += grown
         alone[k] = grown.min() > -1.0
     if alone.all() and wide.min() <= 0.0:
         last, first = list(driven)[-1], next(iter(driven))
         when = at[np.argmax(wide.min(axis=0) <= 0.0)]
-        text = f"collides with {first}: their motions together invert a cell from t = {when:.4g} s on"
+        text = (
+            f"collides with {first}: their motions together invert a cell from t = {when:.4g} s on"
+        )
         yield (last, "travel"), f"{text}; expected less travel, or a wider basin"

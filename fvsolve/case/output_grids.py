@@ -33,9 +33,15 @@ def grid_faults(spec: Any, pool: Any, frames: int) -> Iterator[tuple[tuple, str]
     if not spec.fields:
         yield ("fields",), f"names no field; expected some of {listing(known)}"
     if frames == 0 and any(name in pool.fields and name not in recorded for name in spec.fields):
-        yield ("fields",), "are written from frames, but `output.fields` is 0; expected `fields = 1` or more"
+        yield (
+            ("fields",),
+            "are written from frames, but `output.fields` is 0; expected `fields = 1` or more",
+        )
     if pool.basin.on is not None or any(patch.moves for patch in pool.basin.patches.values()):
-        yield ("basin",), f"{show(spec.basin)} has cells that move; expected a basin without moving walls, on no body"
+        yield (
+            ("basin",),
+            f"{show(spec.basin)} has cells that move; expected a basin without moving walls, on no body",
+        )
     try:
         nx, ny = pixel_counts(pool.mesh, spec.cell)
         check_count("the grid", nx, ny * (frames if spec.format == "netcdf" and frames else 1))

@@ -37,9 +37,12 @@ def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> c
         return chainage.CutTable(reading.raw.table, frozenset())
     for group, name, part in chainage.placed(table):
         part_kind(reading, group, name, part)
-    reading.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
-                      for name, item in table["links"].items() if chainage.is_pipe(item)
-                      for k in range(len(item["bends"]) if isinstance(item.get("bends"), list) else 0)}  # fmt: skip
+    reading.origin = {
+        ("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
+        for name, item in table["links"].items()
+        if chainage.is_pipe(item)
+        for k in range(len(item["bends"]) if isinstance(item.get("bends"), list) else 0)
+    }
     odd = list(chainage.faults(table))
     reading.add(odd)
     astray = {keys[:2] for keys, _ in odd}
@@ -70,24 +73,35 @@ def read_parts(reading: Reading, cut: chainage.CutTable) -> Parts:
 
             with reading.catch("nodes", name):
                 read_mesh = functools.partial(basins.mesh_of, node, reading.setting)
-                (lumped if node.lumped else meshes)[name] = reading.reuse(("meshes", name), node, read_mesh)
-    sound = {name: node for name, node in nodes.items()
-             if not is_kind(node, "basin") or name in (*meshes, *lumped)}  # fmt: skip
+                (lumped if node.lumped else meshes)[name] = reading.reuse(
+                    ("meshes", name), node, read_mesh
+                )
+    sound = {
+        name: node
+        for name, node in nodes.items()
+        if not is_kind(node, "basin") or name in (*meshes, *lumped)
+    }
     return Parts(sound, links, meshes, lumped)
 
 
 def _read_group(reading: Reading, cut: chainage.CutTable, group: str) -> dict[str, Any]:
     """Nodes or links without faults; group : "nodes" or "links"."""
     table = cut.table
-    alone = any(connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values())
+    alone = any(
+        connections.kind_name(node) in (*LINKLESS, None) for node in table.get("nodes", {}).values()
+    )
     alone = alone or reading.needs_no_fluid
-    if group not in table and not (group == "links" and alone or "controls" in table and not table.get("links")):
+    if group not in table and not (
+        group == "links" and alone or "controls" in table and not table.get("links")
+    ):
         reading.fault((), f"[{group}] is missing: {GROUPS[group]}")
     result = {}
     for name, part in table.get(group, {}).items():
         reading.add(((group, name), text) for text in resource_checks.name_faults(name))
         if not isinstance(part, dict):
-            reading.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
+            reading.fault(
+                (group, name), f"{show(part)} is not a table; expected a table with a type"
+            )
             continue
         kind = part_kind(reading, group, name, part)
         if kind is not None and (group, name) not in cut.unreadable:
@@ -101,7 +115,9 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
     """Class of a part from its keys in the file; None, with a fault, if its type is missing or unknown."""
     known = KINDS[group]
     if "type" not in part:
-        return reading.fault((group, name), f"type is missing; expected one of {listing(sorted(known))}")
+        return reading.fault(
+            (group, name), f"type is missing; expected one of {listing(sorted(known))}"
+        )
     kind = part["type"]
     if isinstance(kind, str) and kind in known:
         return known[kind]
@@ -109,7 +125,9 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
     hint = did_you_mean(str(kind), known)
     if isinstance(kind, str) and kind in KINDS[other]:
         hint = f"; it belongs under [{other}]"
-    synonym = read_table("part_synonyms").get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+    synonym = read_table("part_synonyms").get(
+        str(kind).casefold().replace("_", "-").replace(" ", "-")
+    )
     hint = f"; use {synonym}" if synonym else f"; types are {listing(known)}{hint}"
     return reading.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
 
@@ -136,7 +154,9 @@ def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str
                 continue
             given = {"elevation": float(profile.elevation[end])}
             given |= {} if profile.plan is None else {"position": tuple(profile.plan[end].tolist())}
-            missing = {key: value for key, value in given.items() if getattr(node, key, value) is None}
+            missing = {
+                key: value for key, value in given.items() if getattr(node, key, value) is None
+            }
             if missing:
                 result[name] = node.model_copy(update=missing)
     return {name: result.get(name, node) for name, node in nodes.items()} if result else nodes
@@ -145,10 +165,15 @@ def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str
 def table_kinds(table: dict[str, Any], group: str) -> dict[str, Any]:
     """Class of each node or link of a case by name; None for an unknown type. table : nested dicts as in the file"""
     kinds = {name: connections.kind_of(group, part) for name, part in table.get(group, {}).items()}
-    return {name: kind and kind.variant(with_defaults(table, table[group][name])) for name, kind in kinds.items()}
+    return {
+        name: kind and kind.variant(with_defaults(table, table[group][name]))
+        for name, kind in kinds.items()
+    }
 
 
-def place_kinds(cut: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool) -> dict[str, Any]:
+def place_kinds(
+    cut: chainage.CutTable, parts: Parts, scalars: dict[str, Any], faulty: bool
+) -> dict[str, Any]:
     """Kinds of places and parts that probes may name, as for `read_probe`, without routes.
 
     faulty : True if faults were found, so that points, patches or pieces of some parts may be unknown
@@ -156,10 +181,17 @@ def place_kinds(cut: chainage.CutTable, parts: Parts, scalars: dict[str, Any], f
     table = cut.table
     nodes, links = table_kinds(table, "nodes"), table_kinds(table, "links")
     bare = [
-        name for name, kind in nodes.items() if is_kind(kind, "basin") and name not in (*parts.meshes, *parts.lumped)
+        name
+        for name, kind in nodes.items()
+        if is_kind(kind, "basin") and name not in (*parts.meshes, *parts.lumped)
     ]
-    nodes |= {f"{name}.{place}": Chamber for name, kind in links.items() if kind
-              for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
+    nodes |= {
+        f"{name}.{place}": Chamber
+        for name, kind in links.items()
+        if kind
+        for place, domain in kind.owns.items()
+        if domain == "hydraulic"
+    }
     if shafts := connections.joined_shafts(table.get("links", {})):
         from fvsolve.parts.rotation import ShaftPlace
 
@@ -178,15 +210,31 @@ def place_kinds(cut: chainage.CutTable, parts: Parts, scalars: dict[str, Any], f
     for name in (*parts.meshes, *parts.lumped):
         from fvsolve.case import basins
 
-        nodes |= basins.probe_kinds(name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars)
+        nodes |= basins.probe_kinds(
+            name, parts.nodes[name], parts.meshes.get(name), parts.lumped.get(name), scalars
+        )
     pipes = {name: link for name, link in parts.links.items() if getattr(link, "along", None)}
     uncut: list[str] = []
     if faulty:  # pipes with unknown pieces, and parts with unknown points, patches or chambers
         groups = table.get("nodes", {}), table.get("links", {})
-        uncut += [name for name, link in groups[1].items()
-                  if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
-        uncut += [name for group in groups for name in group if connections.has_unknown_places(name, *groups)]
-    return {"nodes": nodes, "links": links, "scalars": scalars, "uncut": dict.fromkeys(uncut), "pipes": pipes}
+        uncut += [
+            name
+            for name, link in groups[1].items()
+            if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)
+        ]
+        uncut += [
+            name
+            for group in groups
+            for name in group
+            if connections.has_unknown_places(name, *groups)
+        ]
+    return {
+        "nodes": nodes,
+        "links": links,
+        "scalars": scalars,
+        "uncut": dict.fromkeys(uncut),
+        "pipes": pipes,
+    }
 
 
 def network_table(cut: chainage.CutTable, parts: Parts) -> dict[str, Any]:
@@ -201,22 +249,34 @@ def network_table(cut: chainage.CutTable, parts: Parts) -> dict[str, Any]:
         from fvsolve.case import basins
 
         patches[name] = basins.patch_names(mesh)
-    lost = [name for name, part in nodes.items()
-            if connections.has_mesh_file(part) and name not in (*parts.meshes, *parts.lumped)]  # fmt: skip
+    lost = [
+        name
+        for name, part in nodes.items()
+        if connections.has_mesh_file(part) and name not in (*parts.meshes, *parts.lumped)
+    ]
     patches |= {name: connections.named_places(name, links) for name in lost}
     if not patches and not cut.unreadable:
         return cut.table
     own = {}
     for name, names in patches.items():
         given = nodes[name].get("patches")  # a value of another type is a fault of its own
-        own[name] = {**nodes[name], "patches": dict.fromkeys(names, {}) | (given if isinstance(given, dict) else {})}
+        own[name] = {
+            **nodes[name],
+            "patches": dict.fromkeys(names, {}) | (given if isinstance(given, dict) else {}),
+        }
     own |= {name: {"type": "junction"} for group, name in cut.unreadable if group == "nodes"}
-    unfit = [name for group, name in cut.unreadable if group == "links" and not chainage.is_pipe(links[name])]
+    unfit = [
+        name
+        for group, name in cut.unreadable
+        if group == "links" and not chainage.is_pipe(links[name])
+    ]
     links = {name: part for name, part in links.items() if name not in unfit}
     return {**cut.table, "nodes": {**nodes, **own}, "links": links}
 
 
-def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:
+def fill_cells(
+    reading: Reading, links: dict[str, Any], properties: Any, numerics: Numerics | None
+) -> dict[str, Any]:
     """Links in which pipes have their default number of cells; unchanged if the fluid or numerics are faulty."""
     if properties is None or numerics is None:
         return links
@@ -227,6 +287,9 @@ def fill_cells(reading: Reading, links: dict[str, Any], properties: Any, numeric
         text = f"would cut {worst} into {counts[worst]:.3g} cells, more than {MOST_CELLS:.0e}; expected a longer time"
         reading.fault(("numerics", "cell_time"), text)
         return links
-    filled = {name: links[name].model_copy(update={"cells": count}) for name, count in counts.items()
-              if count != links[name].cells}  # fmt: skip
+    filled = {
+        name: links[name].model_copy(update={"cells": count})
+        for name, count in counts.items()
+        if count != links[name].cells
+    }
     return {name: filled.get(name, link) for name, link in links.items()}

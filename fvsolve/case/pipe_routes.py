@@ -28,9 +28,19 @@ class PipeNames(Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f'{show(given)} is not a list; expected for example ["suction", "main"]')
-        faults = [((k,), f"{show(item)} is not a name") for k, item in enumerate(given) if not isinstance(item, str)]
-        faults += [((k,), f"{show(item)} is given twice") for k, item in enumerate(given) if item in given[:k]]
+            raise ValueError(
+                f'{show(given)} is not a list; expected for example ["suction", "main"]'
+            )
+        faults = [
+            ((k,), f"{show(item)} is not a name")
+            for k, item in enumerate(given)
+            if not isinstance(item, str)
+        ]
+        faults += [
+            ((k,), f"{show(item)} is given twice")
+            for k, item in enumerate(given)
+            if item in given[:k]
+        ]
         if faults:
             raise ValueFault(faults)
         return tuple(given)
@@ -40,10 +50,15 @@ class Route(Table):
     """Table `[routes.NAME]`: consecutive pipes with one running chainage."""
 
     pipes: Annotated[tuple[str, ...], PipeNames()]
-    start: Annotated[float | None, Quantity(
-        "length", about="chainage of the start of the route [m]; "
-        "that of its first pipe (0 if reversed or without `profile`) if left out", changes=VALUE,
-    )] = None  # fmt: skip
+    start: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            about="chainage of the start of the route [m]; "
+            "that of its first pipe (0 if reversed or without `profile`) if left out",
+            changes=VALUE,
+        ),
+    ] = None
 
 
 class Leg(NamedTuple):
@@ -88,22 +103,33 @@ def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, A
     options = []
     for turned in itertools.product((1, -1), repeat=len(cut)):
         ways_of = dict(zip(cut, turned, strict=True))
-        names = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
+        names = [
+            pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes
+        ]
         options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*names))}))
-        if not cut or (all(pipe in links for pipe in options[-1].pipes) and first_gap(options[-1], links) is None):
+        if not cut or (
+            all(pipe in links for pipe in options[-1].pipes)
+            and first_gap(options[-1], links) is None
+        ):
             return options[-1]
     return options[0]
 
 
 def route_faults(
-    routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
+    routes: dict[str, Route | None],
+    links: dict[str, Any],
+    named: dict[str, Any],
+    pieces: dict[str, list[str]],
 ) -> Iterator[tuple]:
     """Faults (key path, message) of routes: names that are not pipes, and pipes that are not consecutive.
 
     named : links as in the file, also faulty links; pieces : cut pipe -> names of its pieces
     """
-    pipes = [item for item, given in named.items()
-             if item not in links and (is_pipe(given) or kind_of("links", given) is None)]  # fmt: skip
+    pipes = [
+        item
+        for item, given in named.items()
+        if item not in links and (is_pipe(given) or kind_of("links", given) is None)
+    ]
     pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:
@@ -116,7 +142,10 @@ def route_faults(
                 continue
             unknown = True
             if pipe in links:
-                yield place, f"{show(pipe)} is {article(links[pipe].kind)}, not a pipe; leave this name out"
+                yield (
+                    place,
+                    f"{show(pipe)} is {article(links[pipe].kind)}, not a pipe; leave this name out",
+                )
             else:
                 known = [*pipes, *pieces]
                 near = did_you_mean(pipe, known) or f"; pipes are {listing(known)}"
@@ -142,21 +171,33 @@ def index_in_file(route: Route, pieces: dict[str, list[str]], k: int) -> int:
     return sum(following != before for following, before in itertools.pairwise(names))
 
 
-def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
+def joined_places(links: dict[str, Any], named: dict[str, Any] | None = None) -> dict[str, str]:
     """Names of nodes that links other than pipes join : name of a node -> common name of its group of joined nodes.
 
     Links with other ports than `from` and `to` do not count. links : links by name
     named : links as in the file, also faulty links, which are assumed to join their nodes
     """
-    pairs = [(link.ports["from"], link.ports["to"]) for link in links.values()
-             if link.kind != "pipe" and set(link.ports) == {"from", "to"}]  # fmt: skip
-    pairs += [(given.get("from"), given.get("to")) for name, given in named.items()
-              if name not in links and isinstance(given, dict) and not is_pipe(given)]  # fmt: skip
-    known = {str(k): [*pair] for k, pair in enumerate(pairs) if all(isinstance(place, str) for place in pair)}
+    pairs = [
+        (link.ports["from"], link.ports["to"])
+        for link in links.values()
+        if link.kind != "pipe" and set(link.ports) == {"from", "to"}
+    ]
+    pairs += [
+        (given.get("from"), given.get("to"))
+        for name, given in (named or {}).items()
+        if name not in links and isinstance(given, dict) and not is_pipe(given)
+    ]
+    known = {
+        str(k): [*pair]
+        for k, pair in enumerate(pairs)
+        if all(isinstance(place, str) for place in pair)
+    }
     return {name: group[0] for group in islands(known) for name in group}
 
 
-def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
+def directions(
+    route: Route, links: dict[str, Any], named: dict[str, Any] | None = None
+) -> list[list[tuple[int, bool]]]:
     """Possible directions of the pipes of a route : for each pipe a list with a pair for each possible direction.
 
     A pair is (k, True if the pipe is passed backwards); k is the index, in the list of the previous pipe, of a
@@ -164,13 +205,20 @@ def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) 
     named : as for `joined_places`
     """
     root = joined_places(links, named)
-    ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
+    ends = [
+        [root.get(place, place) for place in (links[pipe].from_, links[pipe].to)]
+        for pipe in route.pipes
+    ]
     result: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
     for k in range(1, len(ends)):
         now = []
         for backwards in (False, True):
             into = ends[k][1 if backwards else 0]
-            before = [j for j, (_, turned) in enumerate(result[-1]) if ends[k - 1][0 if turned else 1] == into]
+            before = [
+                j
+                for j, (_, turned) in enumerate(result[-1])
+                if ends[k - 1][0 if turned else 1] == into
+            ]
             now += [(before[0], backwards)] if before else []
         result.append(now)
         if not now:
@@ -178,7 +226,9 @@ def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) 
     return result
 
 
-def first_gap(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
+def first_gap(
+    route: Route, links: dict[str, Any], named: dict[str, Any] | None = None
+) -> int | None:
     """Index of the first pipe of a route that is not connected to the previous pipe; None for a route without gaps.
 
     named : as for `joined_places`
@@ -217,7 +267,9 @@ def read_routes(reading: Reading, cut: CutTable, links: dict[str, Any]) -> dict[
             reading.fault(("routes", name), text)
             continue
         with reading.catch("routes", name):
-            result[name] = expand_pieces(Route.model_validate(given, context=reading.setting), cut.pieces, links)
+            result[name] = expand_pieces(
+                Route.model_validate(given, context=reading.setting), cut.pieces, links
+            )
             continue
         odd.add(name)
         with suppress(KeyError, TypeError, ValueError):
@@ -227,6 +279,9 @@ def read_routes(reading: Reading, cut: CutTable, links: dict[str, Any]) -> dict[
     reading.add(faulty)
     lost = odd | {keys[1] for keys, _ in faulty}
     pipes = {name for name, link in links.items() if link.kind == "pipe"}
-    lost |= {name for name, route in result.items()
-             if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)}  # fmt: skip
+    lost |= {
+        name
+        for name, route in result.items()
+        if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)
+    }
     return {name: None if name in lost else route for name, route in result.items()}

@@ -24,7 +24,12 @@ DEFAULT_OF_NODES = ("pressure", "head", "level", "position", "velocity", "angle"
 DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 PROBED = ("nodes", "links", "controls", "reactions", "sections")
 ALL = {"pipes": "links", "nodes": "nodes"}  # words for all parts of a kind
-OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "pressure_head": "head"}
+OF_PRESSURE = {
+    "pressure": "pressure",
+    "gauge_pressure": "gauge_pressure",
+    "head": "head",
+    "pressure_head": "head",
+}
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,9 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
-        raise ValueError(f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"')
+        raise ValueError(
+            f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"'
+        )
     part, name, quantity, place = match.groups()
     parts = [part] if part else PROBED
     parts = [part for part in parts if name in kinds.get(part, ())]
@@ -78,7 +85,9 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
         groups = PROBED if part is None else (part,)
         names = [name for group in groups for name in kinds.get(group, ())]
         noun = {"nodes": "node", "links": "link"}.get(part or "", "part")
-        raise ValueError(f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}")
+        raise ValueError(
+            f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}"
+        )
     if any(kinds[part][name] is None for part in parts):
         return None
     probes, problems = [], []
@@ -90,9 +99,12 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if not probes:
         raise ValueError("; ".join(problems))
     if len(probes) > 1:
-        raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
+        raise ValueError(
+            f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}"
+        )
     probe = probes[0]
-    return None if probe is None or not probe.dimension else probe  # of a control whose input is faulty
+    # of a control whose input is faulty
+    return None if probe is None or not probe.dimension else probe
 
 
 def may_be_piece(name: str, kinds: Kinds) -> bool:
@@ -103,7 +115,9 @@ def may_be_piece(name: str, kinds: Kinds) -> bool:
     return any(name.startswith((f"{pipe}-", f"{pipe}.")) for pipe in kinds.get("uncut", ()))
 
 
-def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
+def route_probe(
+    text: str, name: str, quantity: str, place: str | None, kinds: Kinds
+) -> Probe | None:
     """Probe of a quantity on a route; None if the route is faulty. Raises ValueError.
 
     text : text of the probe; name : name of the route; kinds : as for `read_probe`
@@ -112,22 +126,36 @@ def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: K
     along = Pipe.along | _scalars_of(Pipe, kinds, "along")
     if quantity not in along:
         near = did_you_mean(quantity, along)
-        raise ValueError(f"{name} is a route, which has no {show(quantity)}; it has {', '.join(along)}{near}")
+        raise ValueError(
+            f"{name} is a route, which has no {show(quantity)}; it has {', '.join(along)}{near}"
+        )
     if kinds["routes"][name] is None:
         return None
     legs, _ = kinds["routes"][name]
     if place is None and quantity not in Pipe.quantities:
-        raise ValueError(f'{name} is a route, and a probe of it needs a place, for example "{name}.{quantity}@0.5"')
+        raise ValueError(
+            f'{name} is a route, and a probe of it needs a place, for example "{name}.{quantity}@0.5"'
+        )
     begin, end = legs[0].begin, legs[-1].end
     at = begin + fraction_of(place or "0", end - begin, begin) * (end - begin)
     leg = next((item for item in legs if at <= item.end), legs[-1])
     if leg.backwards and quantity in ("flow", "velocity"):
         text = f"{name} runs against the direction of {leg.pipe} at this place"
-        raise ValueError(f"{text}; expected a probe of the pipe, for example {leg.pipe}.{quantity}@0.5")
+        raise ValueError(
+            f"{text}; expected a probe of the pipe, for example {leg.pipe}.{quantity}@0.5"
+        )
     share = min(max((at - leg.begin) / (leg.end - leg.begin), 0.0), 1.0)
     share = 1.0 - share if leg.backwards else share
     scalar = kinds["scalars"].get(quantity)
-    return Probe(text, "links", leg.pipe, quantity, share, along[quantity], unit="" if scalar is None else scalar.unit)
+    return Probe(
+        text,
+        "links",
+        leg.pipe,
+        quantity,
+        share,
+        along[quantity],
+        unit="" if scalar is None else scalar.unit,
+    )
 
 
 def fraction_of(place: str, length: float | None, begin: float) -> float:
@@ -146,7 +174,11 @@ def fraction_of(place: str, length: float | None, begin: float) -> float:
         except ValueError:
             text = f'"@{place}" is not a fraction of the length; expected 0 to 1, or a chainage with its unit'
             raise ValueError(text) from None
-        text = "" if length is None else f'"@{place}" is outside {begin:.10g} m to {begin + length:.10g} m'
+        text = (
+            ""
+            if length is None
+            else f'"@{place}" is outside {begin:.10g} m to {begin + length:.10g} m'
+        )
     if not -1e-12 <= share <= 1.0 + 1e-12:
         raise ValueError(text or f'"@{place}" is not a fraction of the length; expected 0 to 1')
     return min(max(share, 0.0), 1.0)
@@ -162,7 +194,11 @@ def default_probes(kinds: Kinds) -> list[Probe]:
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
             known = {} if kind is None else kind.quantities
-            own = [key for key in quantities if key in known and key not in getattr(kind, "on_request", ())]
+            own = [
+                key
+                for key in quantities
+                if key in known and key not in getattr(kind, "on_request", ())
+            ]
             own += [key for key in getattr(kind, "main_quantities", ()) if key not in own]
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
@@ -183,7 +219,9 @@ def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict
     return dict.fromkeys(kinds["scalars"] if has else (), "number")
 
 
-def _probe(text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe:
+def _probe(
+    text: str, part: str, name: str, quantity: str, place: str | None, kinds: Kinds
+) -> Probe:
     kind = kinds[part][name]
     if part == "reactions":
         return reaction_probe(text, name, quantity, place, kinds)
@@ -197,11 +235,15 @@ def _probe(text: str, part: str, name: str, quantity: str, place: str | None, ki
     pipe = kinds.get("pipes", {}).get(name) if part == "links" else None
     profile = getattr(pipe, "profile", None)
     begin = 0.0 if profile is None else float(profile.chainage[0])
-    fraction, dimension = _quantity(kind, along, quantities, name, quantity, place, pipe and pipe.length, begin)
+    fraction, dimension = _quantity(
+        kind, along, quantities, name, quantity, place, pipe and pipe.length, begin
+    )
     return Probe(text, part, name, quantity, fraction, dimension, unit=unit)
 
 
-def reaction_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
+def reaction_probe(
+    text: str, name: str, quantity: str, place: str | None, kinds: Kinds
+) -> Probe | None:
     """Probe of a reaction; None if its place is faulty. Raises ValueError.
 
     text : text of the probe; name : name of the reaction with its prefix; kinds : as for `read_probe`
@@ -244,7 +286,9 @@ def _quantity(
             raise ValueError(text)
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
-        raise ValueError(f"{name} is {article(kind.kind)}, and {quantity} has no place along it; leave @{place} out")
+        raise ValueError(
+            f"{name} is {article(kind.kind)}, and {quantity} has no place along it; leave @{place} out"
+        )
     return fraction_of(place, length, begin), known[quantity]
 
 
@@ -264,7 +308,9 @@ class Extent:
     def probes(self, links: Mapping[str, Any]) -> Iterator[Probe]:
         """Probes whose extremes give those of the extent, together with the extreme pressures of all pipe cells."""
         pressed = self.quantity in OF_PRESSURE
-        quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
+        quantity, dimension = (
+            ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
+        )
         for group, name in self.parts:
             pipe = links.get(name) if group == "links" else None
             if pipe is None or quantity not in pipe.along:
@@ -281,7 +327,15 @@ def along(pipe: str, quantity: str, share: float, dimension: str) -> Probe:
 
     quantity, dimension : as in `Probe`
     """
-    return Probe(f"links.{pipe}.{quantity}@{share!r}", "links", pipe, quantity, share, dimension, straight=True)
+    return Probe(
+        f"links.{pipe}.{quantity}@{share!r}",
+        "links",
+        pipe,
+        quantity,
+        share,
+        dimension,
+        straight=True,
+    )
 
 
 def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
@@ -293,14 +347,20 @@ def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
                 yield along(name, "pressure", share, "pressure")
 
 
-def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> Extent | None:
+def read_extent(
+    given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]
+) -> Extent | None:
     """Read a quantity in the parts or routes that `given` (a name or a list) names; None if one of the parts is faulty.
 
     kinds : as for `read_probe`; routes : by name. Raises ValueError for unknown names, and ValueFault (at the key
     `quantity`) if a part does not have the quantity.
     """
     names = [given] if isinstance(given, str) else given
-    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(word, str) for word in names):
+    if (
+        not isinstance(names, (list, tuple))
+        or not names
+        or not all(isinstance(word, str) for word in names)
+    ):
         text = f'{show(given)} is not a name; expected a part, a route, "pipes" or "nodes", or a list of names'
         raise ValueError(text)
     parts: dict[tuple[str, str], None] = {}
@@ -327,7 +387,11 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     if lacking:
         group, name, known = lacking[0]
         more = f", and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        has = f"has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "has no quantities"
+        has = (
+            f"has {', '.join(known)}{did_you_mean(quantity, known)}"
+            if known
+            else "has no quantities"
+        )
         verb = "have" if more else "has"
         text = f"{name}{more} {verb} no {show(quantity)}: {name} is {article(kinds[group][name].kind)} and {has}"
         raise ValueFault([(("quantity",), text)])
@@ -336,7 +400,9 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     return Extent(tuple(names), tuple(parts), quantity, dimensions.pop())
 
 
-def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> list[tuple[str, str]] | None:
+def parts_of(
+    name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]
+) -> list[tuple[str, str]] | None:
     """Pairs (group, name) of the parts denoted by `name`: a part, the pipes of a route, all "pipes" or all "nodes".
 
     None if a part is faulty. Raises ValueError for an unknown name or a missing quantity. kinds : as for `read_probe`
@@ -346,13 +412,17 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
         return None if kinds[group][rest] is None else [(group, rest)]
     groups = [group for group in ("nodes", "links") if name in kinds[group]]
     if len(groups) > 1:
-        raise ValueError(f"a node and a link are named {show(name)}; write nodes.{name} or links.{name}")
+        raise ValueError(
+            f"a node and a link are named {show(name)}; write nodes.{name} or links.{name}"
+        )
     if groups:
         return None if kinds[groups[0]][name] is None else [(groups[0], name)]
     if name in routes:
         if quantity not in (known := quantities_of(Pipe)):
             has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
-            raise ValueFault([(("quantity",), f"{name} has no {show(quantity)}: it is a route; {has}")])
+            raise ValueFault(
+                [(("quantity",), f"{name} has no {show(quantity)}: it is a route; {has}")]
+            )
         return None if routes[name] is None else [("links", pipe) for pipe in routes[name].pipes]
     if may_be_piece(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
         return None
@@ -361,8 +431,12 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
         if name == "pipes":
             matches = [(ALL[name], part) for part, kind in known.items() if issubclass(kind, Pipe)]
         else:  # without reservoirs, whose pressure is given
-            matches = [(ALL[name], part) for part, kind in known.items() if quantity in quantities_of(kind)
-                       and not (kind is Reservoir and quantity in OF_PRESSURE)]  # fmt: skip
+            matches = [
+                (ALL[name], part)
+                for part, kind in known.items()
+                if quantity in quantities_of(kind)
+                and not (kind is Reservoir and quantity in OF_PRESSURE)
+            ]
         if not matches:
             if name == "pipes":
                 raise ValueError(f"{show(name)} means all pipes, but the case has none")
@@ -381,7 +455,9 @@ def quantities_of(kind: Any) -> dict[str, str]:
 
 def only_dimension(quantity: str) -> str | None:
     """Dimension of a quantity in all types of parts; None if no type has it, or if the dimensions differ."""
-    dimensions = _dimensions(tuple(kind for group in KINDS.values() for kind in group)).get(quantity, ())
+    dimensions = _dimensions(tuple(kind for group in KINDS.values() for kind in group)).get(
+        quantity, ()
+    )
     return next(iter(dimensions)) if len(dimensions) == 1 else None
 
 

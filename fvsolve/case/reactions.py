@@ -37,7 +37,10 @@ def read_reactions(reading: Reading, scalars: Mapping[str, Any]) -> dict[str, Re
         return {}
     for group in ("nodes", "links"):
         if "reactions" in reading.raw.table.get(group, {}):
-            reading.fault((group, "reactions"), '"reactions" is the name of the reactions; expected another name')
+            reading.fault(
+                (group, "reactions"),
+                '"reactions" is the name of the reactions; expected another name',
+            )
     result: dict[str, Reaction | None] = {}
     units_checked: set[str] = set()
     for name, given in reading.group("reactions").items():
@@ -72,10 +75,14 @@ def faults_of_scalars(
             yield (*place, "rate"), str(error)
 
 
-def reaction_kinds(reactions: Mapping[str, Reaction | None]) -> dict[str, ReactionQuantities | None]:
+def reaction_kinds(
+    reactions: Mapping[str, Reaction | None],
+) -> dict[str, ReactionQuantities | None]:
     """Quantities of reactions, as for `read_probe`; None for a faulty reaction."""
-    return {f"{PREFIX}{name}": item and ReactionQuantities(item.sides.names[0], missing_port(item))
-            for name, item in reactions.items()}  # fmt: skip
+    return {
+        f"{PREFIX}{name}": item and ReactionQuantities(item.sides.names[0], missing_port(item))
+        for name, item in reactions.items()
+    }
 
 
 def missing_port(reaction: Reaction) -> str:

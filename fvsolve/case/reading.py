@@ -31,7 +31,8 @@ DEEPEST = 40  # levels of tables
 MOST_BYTES = 20_000_000  # of a TOML file; a network of 10 000 pipes has 2 MB
 WITH_DEFAULTS = {"pipe": Pipe}  # types of links that may have defaults
 NOT_DEFAULT = ("from", "to")  # keys that each part must state itself
-COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked only with their part
+# tables that other keys may complete: checked only with their part
+COMPLETED = ("wall", "friction")
 
 
 @dataclass
@@ -89,7 +90,13 @@ def read_raw(source: Any) -> Raw:
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
-        raise CaseError([Fault("", f"{article(type(source).__name__)} is not a case; expected a path or a dict")])
+        raise CaseError(
+            [
+                Fault(
+                    "", f"{article(type(source).__name__)} is not a case; expected a path or a dict"
+                )
+            ]
+        )
     path = Path(source)
     table, content = read_toml(path)
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), content)
@@ -99,16 +106,21 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     """Table and text of a TOML file. Raises CaseError for a file that cannot be read, is too large or is not TOML."""
     content = _read_text(path)
     if (line := text.find_long_key(content, DEEPEST)) is not None:
-        message = f"a key has more than {DEEPEST} names; expected at most {DEEPEST} levels of tables"
+        message = (
+            f"a key has more than {DEEPEST} names; expected at most {DEEPEST} levels of tables"
+        )
         raise CaseError([Fault("", message, line)], path.name)
     try:
         return tomllib.loads(content), content
     except RecursionError:
         raise CaseError(
-            [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")], path.name
+            [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")],
+            path.name,
         ) from None
     except ValueError as error:
-        if re.search(r"^[ \t]*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", content, re.MULTILINE | re.IGNORECASE):
+        if re.search(
+            r"^[ \t]*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", content, re.MULTILINE | re.IGNORECASE
+        ):
             message = f"is an EPANET network, not a case; fvsolve import {path} translates it"
             raise CaseError([Fault("", message)], path.name) from None
         raise CaseError([syntax_fault(error, content)], path.name) from None
@@ -149,7 +161,9 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives_of: Callable) -
     alternatives = alternatives_of(raw.table) if settings else []
     for keys in raw.overridden:
         for other in (other for others in alternatives if keys[-1] in others for other in others):
-            if (*keys[:-1], other) not in raw.overridden and isinstance(table := raw.get(keys[:-1]), dict):
+            if (*keys[:-1], other) not in raw.overridden and isinstance(
+                table := raw.get(keys[:-1]), dict
+            ):
                 table.pop(other, None)
     for keys in raw.overridden:
         group, name = (*keys, "", "")[:2]
@@ -157,7 +171,11 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives_of: Callable) -
             part = raw.get((group, name))
             if not isinstance(part, dict) or "type" not in part:
                 hint = did_you_mean(name, before[group])
-                faults.append(Fault(".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True))
+                faults.append(
+                    Fault(
+                        ".".join(keys), f"no {group[:-1]} named {show(name)}{hint}", override=True
+                    )
+                )
                 raw.table[group].pop(name, None)
     return faults
 
@@ -180,7 +198,8 @@ def locate_faults(error: CaseError, case: Any) -> CaseError:
         keys = default_place(case.raw, tuple(fault.place.split(".")))
         fault = replace(fault, place=".".join(keys))
         value, before = now.get(keys), source.get(keys)
-        is_part = len(keys) == 2 and isinstance(value, dict)  # some other key of the part may have been set
+        # some other key of the part may have been set
+        is_part = len(keys) == 2 and isinstance(value, dict)
         if value is not None and (before is None or (value != before and not is_part)):
             faults.append(replace(fault, override=True))
         else:
@@ -227,7 +246,9 @@ def syntax_fault(error: ValueError, text: str) -> Fault:
         message = "this key is given twice"
     elif message.startswith("cannot declare"):
         message = "this table is given twice"
-    return Fault("", f"TOML: {message}: {show(line_text)}" if line_text else f"TOML: {message}", line)
+    return Fault(
+        "", f"TOML: {message}: {show(line_text)}" if line_text else f"TOML: {message}", line
+    )
 
 
 def _bare_name(line_text: str) -> str:
@@ -244,7 +265,8 @@ def _bare_name(line_text: str) -> str:
     joined = re.sub(r"\s+", "_", odd)
     if joined != odd:
         return (
-            f"an unquoted name has no blank; write {joined} (a quoted key may have a blank, the name of a part may not)"
+            f"an unquoted name has no blank; write {joined} (a quoted key may "
+            "have a blank, the name of a part may not)"
         )
     return f"an unquoted name has only letters, digits, _ and -; expected quotes: {show(odd)}"
 
@@ -256,7 +278,9 @@ def _copy(value: Any, keys: KeyPath = ()) -> Any:
     keys : key path of the value
     """
     if len(keys) > DEEPEST:
-        raise CaseError([Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")])
+        raise CaseError(
+            [Fault("", f"tables or lists are nested too deep; expected at most {DEEPEST} levels")]
+        )
     if isinstance(value, Mapping):
         return {str(key): _copy(item, (*keys, str(key))) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -308,20 +332,28 @@ def _put(table: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
     for key in keys[:-1]:
         inner = table.setdefault(key, {})
         if not isinstance(inner, dict):
-            raise ValueError(f"{show(key)} is {show(inner)}, not a table; no key can be set below it")
+            raise ValueError(
+                f"{show(key)} is {show(inner)}, not a table; no key can be set below it"
+            )
         table = inner
     table[keys[-1]] = value
 
 
 def default_values(kind: str) -> dict[str, Value]:
     """Declarations of the keys that may have a default in a type of part : key -> declaration."""
-    return {key: value for key, value in WITH_DEFAULTS[kind].values().items() if key not in NOT_DEFAULT}
+    return {
+        key: value for key, value in WITH_DEFAULTS[kind].values().items() if key not in NOT_DEFAULT
+    }
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
     """Keys and values in `[defaults]` for a type of part; empty if there are none or if they are not a table."""
     result, numerics = table.get("defaults"), table.get("numerics")
-    result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in WITH_DEFAULTS else None
+    result = (
+        result.get(kind)
+        if isinstance(result, dict) and isinstance(kind, str) and kind in WITH_DEFAULTS
+        else None
+    )
     result = result if isinstance(result, dict) else {}
     if kind == "pipe" and isinstance(numerics, dict) and numerics.get("pipe_model") == QUASI_STEADY:
         return {"pipe_model": QUASI_STEADY, **result}  # a part of its own
@@ -336,10 +368,14 @@ def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, 
     general = defaults_of(table, given.get("type"))
     if not general:
         return given
-    known = WITH_DEFAULTS[given["type"]].keys()  # unknown keys are reported once, as faults of the defaults
+    # unknown keys are reported once, as faults of the defaults
+    known = WITH_DEFAULTS[given["type"]].keys()
     groups = WITH_DEFAULTS[given["type"]].alternatives
     stated = {key for group in groups if any(word in given for word in group) for key in group}
-    return {**{key: value for key, value in general.items() if key in known and key not in stated}, **given}
+    return {
+        **{key: value for key, value in general.items() if key in known and key not in stated},
+        **given,
+    }
 
 
 def raw_link(table: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -355,7 +391,8 @@ def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
 def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
     """Copy of a case, as nested dicts, with the defaults written into every pipe and without the table `defaults`."""
     links = {
-        name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
+        name: with_defaults(table, link) if isinstance(link, dict) else link
+        for name, link in table["links"].items()
     }
     return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
 
@@ -384,10 +421,15 @@ def default_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[t
         elif not isinstance(keys, dict):
             yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
         else:
-            yield from ((("defaults", kind, *below), text) for below, text in _faults_of_keys(kind, keys, setting))
+            yield from (
+                (("defaults", kind, *below), text)
+                for below, text in _faults_of_keys(kind, keys, setting)
+            )
 
 
-def _faults_of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
+def _faults_of_keys(
+    kind: str, given: dict[str, Any], setting: ReadContext
+) -> Iterator[tuple[tuple, str]]:
     known = default_values(kind)
     for group in WITH_DEFAULTS[kind].alternatives:
         yield from exclusive_key_faults(given, group)
@@ -403,7 +445,11 @@ def _faults_of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> I
             yield (key,), f"cannot be a default; each {kind} states its own value"
         else:
             hint = WITH_DEFAULTS[kind].synonyms.get(key)
-            near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
+            near = (
+                f"; use {hint}"
+                if hint
+                else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
+            )
             yield (key,), f"unknown key{near}"
 
 
@@ -412,7 +458,7 @@ GROUPS = {
     "nodes": "places",
     "links": "parts between the places",
     "numerics": "settings of the solver",
-}  # fmt: skip
+}
 
 
 class Reading:
@@ -499,7 +545,9 @@ class Reading:
             return self.fault((), f"[{name}] is missing: {GROUPS[name]}")
         with self.catch(name):
             table = {} if given is None and name not in self.raw.table else given
-            return self.reuse((name, "table"), given, lambda: model.model_validate(table, context=self.setting))
+            return self.reuse(
+                (name, "table"), given, lambda: model.model_validate(table, context=self.setting)
+            )
 
     @property
     def needs_no_fluid(self) -> bool:
@@ -510,11 +558,25 @@ class Reading:
         nodes, links = (table.get(group) for group in ("nodes", "links"))
         if not (isinstance(nodes, dict) and isinstance(links, dict)):
             return False
-        kinds = [KINDS["nodes"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in nodes.values()]
-        domains = {kind.domain for kind in kinds if kind is not None}  # an unknown type is a fault of its own
-        found = [KINDS["links"].get(str(part.get("type")) if isinstance(part, dict) else "") for part in links.values()]
-        dry = all(kind is None or "hydraulic" not in {*kind.joins.values(), *kind.owns.values()} for kind in found)
-        return bool(domains & {*NETWORK_DOMAINS}) and domains <= {*NETWORK_DOMAINS, "translational"} and dry
+        kinds = [
+            KINDS["nodes"].get(str(part.get("type")) if isinstance(part, dict) else "")
+            for part in nodes.values()
+        ]
+        # an unknown type is a fault of its own
+        domains = {kind.domain for kind in kinds if kind is not None}
+        found = [
+            KINDS["links"].get(str(part.get("type")) if isinstance(part, dict) else "")
+            for part in links.values()
+        ]
+        dry = all(
+            kind is None or "hydraulic" not in {*kind.joins.values(), *kind.owns.values()}
+            for kind in found
+        )
+        return (
+            bool(domains & {*NETWORK_DOMAINS})
+            and domains <= {*NETWORK_DOMAINS, "translational"}
+            and dry
+        )
 
     def valid_keys(self, name: str, model: Any) -> Any:
         """Instance of `model` with the valid keys of the table `name`, without checks of the table.
@@ -537,7 +599,9 @@ def driven_keys(table: Any, word: str, name: str = "") -> Iterator[tuple[Any, ..
     return (keys for followed, keys in followers(table, word) if name in ("", followed))
 
 
-def followers(table: Any, word: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[str, tuple[Any, ...]]]:
+def followers(
+    table: Any, word: str, keys: tuple[Any, ...] = ()
+) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Name of the signal or control, and key path, of each value that follows one; arguments as in `driven_keys`.
 
     keys : key path of `table`, which is the case or a part of it

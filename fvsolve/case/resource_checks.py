@@ -33,7 +33,8 @@ def find_faults(
     implicit = method is None or not method.explicit
     cells = sum(pipe.cells or 0 for pipe in pipes.values())
     memory = (
-        cells * (IMPLICIT_CELL if implicit else CELL) + sum(len(mesh.cells) for mesh in meshes.values()) * BASIN_CELL
+        cells * (IMPLICIT_CELL if implicit else CELL)
+        + sum(len(mesh.cells) for mesh in meshes.values()) * BASIN_CELL
     )
     if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)

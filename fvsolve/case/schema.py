@@ -33,7 +33,11 @@ def schema() -> dict[str, Any]:
 
 def schema_text(content: dict[str, Any]) -> str:
     """JSON text of a schema; flat lists and bare references are written on one line."""
-    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda match: f"[{' '.join(match[1].split())}]", dumps(content, indent=2))
+    text = re.sub(
+        r"\[\s+([^][{}]*?)\s+\]",
+        lambda match: f"[{' '.join(match[1].split())}]",
+        dumps(content, indent=2),
+    )
     return re.sub(r'\{\s+("\$ref": "[^"]*")\s+\}', r"{ \1 }", text)
 
 
@@ -43,7 +47,13 @@ def full_schema() -> dict[str, Any]:
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
     properties["ambient_pressure"] = Quantity("pressure").json()
-    tables = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "energy": EnergyUse, "exact": ExactSpec}
+    tables = {
+        "fluid": FluidSpec,
+        "numerics": Numerics,
+        "output": Output,
+        "energy": EnergyUse,
+        "exact": ExactSpec,
+    }
     for name, model in tables.items():
         properties[name] = _with_shared_definitions(model, definitions)
     for group, kinds in KINDS.items():
@@ -59,7 +69,10 @@ def full_schema() -> dict[str, Any]:
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
     properties["validation"] = validation_table.schema()
-    properties["expect"] = properties["compare"] = {"type": "object", "additionalProperties": {"type": "object"}}
+    properties["expect"] = properties["compare"] = {
+        "type": "object",
+        "additionalProperties": {"type": "object"},
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "fvsolve case",
@@ -70,7 +83,11 @@ def full_schema() -> dict[str, Any]:
             {
                 "required": ["numerics", "nodes", "links"],
                 "properties": {
-                    "nodes": {"additionalProperties": {"properties": {"type": {"enum": nodes_without_fluid()}}}}
+                    "nodes": {
+                        "additionalProperties": {
+                            "properties": {"type": {"enum": nodes_without_fluid()}}
+                        }
+                    }
                 },
             },
             {
@@ -78,12 +95,16 @@ def full_schema() -> dict[str, Any]:
                 "not": {"anyOf": [{"required": ["nodes"]}, {"required": ["links"]}]},
             },
             {"required": ["validation"]},  # the rest is that of another case, or of a program
-        ],  # fmt: skip
+        ],
         "if": {
             "required": ["nodes"],
             "not": {"required": ["controls"]},
             "properties": {
-                "nodes": {"additionalProperties": {"properties": {"type": {"not": {"enum": list(LINKLESS)}}}}}
+                "nodes": {
+                    "additionalProperties": {
+                        "properties": {"type": {"not": {"enum": list(LINKLESS)}}}
+                    }
+                }
             },
         },
         "then": {"required": ["links"]},  # without a basin, a body or a control
@@ -94,7 +115,11 @@ def full_schema() -> dict[str, Any]:
 
 def nodes_without_fluid() -> list[str]:
     """Types of nodes of cases that need no fluid: of rotation, electricity and heat, and of masses on an axis."""
-    return sorted(name for name, kind in KINDS["nodes"].items() if kind.domain in (*NETWORK_DOMAINS, "translational"))
+    return sorted(
+        name
+        for name, kind in KINDS["nodes"].items()
+        if kind.domain in (*NETWORK_DOMAINS, "translational")
+    )
 
 
 def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
@@ -109,19 +134,28 @@ def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
             if times[text] > 1:  # its inner parts are counted already
                 return
             names[text] = _name(part) or key
-        for word, inner in part.items() if isinstance(part, dict) else [(key, inner) for inner in part]:
+        for word, inner in (
+            part.items() if isinstance(part, dict) else [(key, inner) for inner in part]
+        ):
             if isinstance(inner, (dict, list)):
                 count(inner, key if word in SCHEMA_WORDS else word)
 
     count(full, "case")
     names = _numbered(
-        {text: names[text] for text, times_used in times.items() if times_used > 1 and len(text) > SHARED_LENGTH}
+        {
+            text: names[text]
+            for text, times_used in times.items()
+            if times_used > 1 and len(text) > SHARED_LENGTH
+        }
     )
 
     def replaced(part: Any, whole: bool = False) -> Any:
         if isinstance(part, dict):
             if not whole and (name := names.get(dumps(_without_siblings(part), sort_keys=True))):
-                return {"$ref": f"#/$defs/{name}", **{key: part[key] for key in SIBLING_WORDS if key in part}}
+                return {
+                    "$ref": f"#/$defs/{name}",
+                    **{key: part[key] for key in SIBLING_WORDS if key in part},
+                }
             return {key: replaced(inner) for key, inner in part.items()}
         return [replaced(inner) for inner in part] if isinstance(part, list) else part
 
@@ -175,10 +209,14 @@ def _without_titles(part: Any) -> Any:
         return [_without_titles(item) for item in part]
     if not isinstance(part, dict):
         return part
-    result = {key: _without_titles(item) for key, item in part.items() if (key, item) != ("default", None)}
+    result = {
+        key: _without_titles(item) for key, item in part.items() if (key, item) != ("default", None)
+    }
     if isinstance(result.get("properties"), dict):
-        result["properties"] = {key: {word: value for word, value in item.items() if word != "title"}
-                              for key, item in result["properties"].items()}  # fmt: skip
+        result["properties"] = {
+            key: {word: value for word, value in item.items() if word != "title"}
+            for key, item in result["properties"].items()
+        }
     return result
 
 
@@ -194,7 +232,9 @@ def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
     result = {}
     for kind, model in WITH_DEFAULTS.items():
         keys = _with_shared_definitions(model, definitions)["properties"]
-        own = {key: _without_siblings(value) for key, value in keys.items() if key not in NOT_DEFAULT}
+        own = {
+            key: _without_siblings(value) for key, value in keys.items() if key not in NOT_DEFAULT
+        }
         result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
     return {"type": "object", "properties": result, "additionalProperties": False}
 

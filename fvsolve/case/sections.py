@@ -21,7 +21,16 @@ from fvsolve.exact import NAMES
 from fvsolve.parts import value as val
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
-from fvsolve.parts.value import BY_CELLS, SHAPE, VALUE, Choice, Number, Quantity, ReadContext, positive
+from fvsolve.parts.value import (
+    BY_CELLS,
+    SHAPE,
+    VALUE,
+    Choice,
+    Number,
+    Quantity,
+    ReadContext,
+    positive,
+)
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")
@@ -31,11 +40,13 @@ CAVITY_SCHEMES = tuple(name for name, entry in SCHEMES.items() if entry.cavities
 # control without cells.
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
-DEFAULT_METHOD_SSP = "ssp-rk3"  # for basins with scalars (rk4 violates their bounds) or with friction
+# for basins with scalars (rk4 violates their bounds) or with friction
+DEFAULT_METHOD_SSP = "ssp-rk3"
 CAVITY_SCHEME, CAVITY_METHOD, CAVITY_COURANT = "muscl", "ssp-rk2", 0.5  # with cavities in pipes
 CAVITY_AIR = 1e-7  # air fraction of a degassed liquid: nuclei of cavities
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
-DEFAULT_CELLS = 100  # in the pipe with the longest travel time; other pipes get cells of the same travel time
+# in the pipe with the longest travel time; other pipes get cells of the same travel time
+DEFAULT_CELLS = 100
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
 DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
@@ -62,7 +73,10 @@ class Walther(val.Value):
     def read(self, given: Any, setting: ReadContext) -> Any:
         if not isinstance(given, dict):
             return self.number.read(given, setting)
-        keys = {"law": (Choice("viscosity law", (ASTM_D341,)), val.NEEDED), "points": (WaltherPoints(), ())}
+        keys = {
+            "law": (Choice("viscosity law", (ASTM_D341,)), val.NEEDED),
+            "points": (WaltherPoints(), ()),
+        }
         return ViscosityLaw(**read_keys(given, keys, setting))
 
     @property
@@ -70,9 +84,16 @@ class Walther(val.Value):
         return f'{self.number.takes}, or `{{ law = "{ASTM_D341}", points = [[TEMPERATURE, VISCOSITY], ...] }}`'
 
     def json(self) -> dict[str, Any]:
-        points = {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}}
-        table = {"type": "object", "properties": {"law": {"const": ASTM_D341}, "points": points}, "required": ["law"],
-                 "additionalProperties": False}  # fmt: skip
+        points = {
+            "type": "array",
+            "items": {"type": "array", "items": {"type": ["number", "string"]}},
+        }
+        table = {
+            "type": "object",
+            "properties": {"law": {"const": ASTM_D341}, "points": points},
+            "required": ["law"],
+            "additionalProperties": False,
+        }
         return {"anyOf": [self.number.json(), table]}
 
 
@@ -81,7 +102,9 @@ class WaltherPoints(val.Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, float], ...]:
         example = 'expected [[TEMPERATURE, VISCOSITY], ...], such as [["40 degC", "46 cSt"], ["100 degC", "6.8 cSt"]]'
-        pairs = isinstance(given, (list, tuple)) and all(isinstance(item, (list, tuple)) for item in given)
+        pairs = isinstance(given, (list, tuple)) and all(
+            isinstance(item, (list, tuple)) for item in given
+        )
         if not pairs or [len(item) for item in given] != [2, 2]:
             raise ValueError(f"{show(given)} are not two points; {example}")
         temperature, viscosity = Quantity("temperature", positive), Quantity("viscosity", positive)
@@ -100,44 +123,87 @@ class ViscosityLaw:
 
     def table(self) -> dict[str, Any]:
         """Table of a case file."""
-        points = [[a, f"{float(b)!r} m2/s" if isinstance(b, units.Kinematic) else b] for a, b in self.points]
+        points = [
+            [a, f"{float(b)!r} m2/s" if isinstance(b, units.Kinematic) else b]
+            for a, b in self.points
+        ]
         return {"law": self.law} | ({"points": points} if points else {})
 
 
 class FluidSpec(Table):
     """Table `[fluid]`: fluid, its state and its density law. Stated properties replace the properties from CoolProp."""
 
-    name: Annotated[str, val.Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)]
+    name: Annotated[
+        str, val.Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)
+    ]
     temperature: Annotated[
-        float, Quantity("temperature", positive, "temperature at which properties are evaluated [K]", changes=BY_CELLS)
+        float,
+        Quantity(
+            "temperature",
+            positive,
+            "temperature at which properties are evaluated [K]",
+            changes=BY_CELLS,
+        ),
     ] = 293.15
     pressure: Annotated[
-        float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=BY_CELLS)
+        float,
+        Quantity(
+            "pressure",
+            positive,
+            "pressure at which properties are evaluated [Pa]",
+            changes=BY_CELLS,
+        ),
     ] = 101325.0
-    law: Annotated[str, Choice(
-        "density law", tuple(LAWS), "density law of the whole case; linear (mixture with cavitation) if left out",
-    )] = "linear"  # fmt: skip
-    density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)] = None
-    bulk_modulus: Annotated[
-        float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
+    law: Annotated[
+        str,
+        Choice(
+            "density law",
+            tuple(LAWS),
+            "density law of the whole case; linear (mixture with cavitation) if left out",
+        ),
+    ] = "linear"
+    density: Annotated[
+        float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)
     ] = None
-    viscosity: Annotated[float | ViscosityLaw | None, Walther(
-        Quantity("viscosity", val.nonnegative, "", VISCOSITIES),
-        "dynamic viscosity [Pa s], or its law over the temperature, which friction of pipes follows",
-    )] = None  # fmt: skip
-    vapor_pressure: Annotated[float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")] = None
-    air_fraction: Annotated[float | None, Number(
-        val.between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
-    )] = None  # fmt: skip
+    bulk_modulus: Annotated[
+        float | None,
+        Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS),
+    ] = None
+    viscosity: Annotated[
+        float | ViscosityLaw | None,
+        Walther(
+            Quantity("viscosity", val.nonnegative, "", VISCOSITIES),
+            "dynamic viscosity [Pa s], or its law over the temperature, which friction of pipes follows",
+        ),
+    ] = None
+    vapor_pressure: Annotated[
+        float | None, Quantity("pressure", val.nonnegative, "vapour pressure [Pa]")
+    ] = None
+    air_fraction: Annotated[
+        float | None,
+        Number(
+            val.between(0, 1),
+            f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out",
+        ),
+    ] = None
     gas_exponent: Annotated[
         float | None,
-        Number(val.between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic"),
+        Number(
+            val.between(1, 2),
+            "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic",
+        ),
     ] = None
     saturation_pressure: Annotated[
-        float | None, Quantity("pressure", positive, "pressure above which all gas is dissolved, law mixture [Pa]")
+        float | None,
+        Quantity(
+            "pressure", positive, "pressure above which all gas is dissolved, law mixture [Pa]"
+        ),
     ] = None
     cavitation: Annotated[
-        bool | None, val.Flag("cavities of gas and vapour: vapour pressure is added to the gas pressure, law mixture")
+        bool | None,
+        val.Flag(
+            "cavities of gas and vapour: vapour pressure is added to the gas pressure, law mixture"
+        ),
     ] = None
 
     @classmethod
@@ -155,7 +221,9 @@ class FluidSpec(Table):
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         given = [(("temperature",), self.temperature, TEMPERATURES)] * (self.name == "user")
-        given += [(("viscosity", "points"), a, OILS) for a, _ in getattr(self.viscosity, "points", ())]
+        given += [
+            (("viscosity", "points"), a, OILS) for a, _ in getattr(self.viscosity, "points", ())
+        ]
         for keys, value, usual in given:
             if not usual.least <= value <= usual.greatest:
                 text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.source}"
@@ -209,56 +277,107 @@ class Numerics(Table):
 
     end: Annotated[float, Quantity("time", about="end time of the run [s]")]
     start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
-    initial: Annotated[str, Choice(
-        "start", STARTS,
-        "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
-        "moves and bodies and masses are placed where their forces balance; rest: no flow", changes=val.PROFILE,
-    )] = "steady"  # fmt: skip
-    scheme: Annotated[str | None, Choice(
-        "scheme", tuple(SCHEMES),
-        f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
-    )] = None  # fmt: skip
-    limiter: Annotated[str, Choice("limiter", LIMITERS, "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
-    method: Annotated[str | None, MethodChoice(
-        "method", MethodNames(),
-        f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
-        f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out", changes=val.PROFILE,
-    )] = None  # fmt: skip
-    courant: Annotated[float | None, Number(
-        positive, f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
-        f"(with cavitation {CAVITY_COURANT}) if left out", changes=VALUE,
-    )] = None  # fmt: skip
-    step: Annotated[float | None, Quantity("time", positive, "fixed step [s]", changes=VALUE)] = None
-    rtol: Annotated[float | None, Number(
-        val.between(0, 1, open=True),
-        f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
-        "implicit methods) if left out", usual=val.UsualRange(0.0, 1e-2, "for errors of a few percent at most"),
-    )] = None  # fmt: skip
-    linear_algebra: Annotated[str | None, Choice(
-        "linear algebra", KINDS, "linear solver of implicit steps; chosen by the structure of the case if left out",
-        changes=VALUE,
-    )] = None  # fmt: skip
-    cell_time: Annotated[float | None, Quantity(
-        "time", positive,
-        f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
-        f"{DEFAULT_CELLS} if left out", changes=SHAPE,
-    )] = None  # fmt: skip
+    initial: Annotated[
+        str,
+        Choice(
+            "start",
+            STARTS,
+            "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
+            "moves and bodies and masses are placed where their forces balance; rest: no flow",
+            changes=val.PROFILE,
+        ),
+    ] = "steady"
+    scheme: Annotated[
+        str | None,
+        Choice(
+            "scheme",
+            tuple(SCHEMES),
+            f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
+        ),
+    ] = None
+    limiter: Annotated[str, Choice("limiter", LIMITERS, "slope limiter of the scheme muscl")] = (
+        DEFAULT_LIMITER
+    )
+    method: Annotated[
+        str | None,
+        MethodChoice(
+            "method",
+            MethodNames(),
+            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
+            f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out",
+            changes=val.PROFILE,
+        ),
+    ] = None
+    courant: Annotated[
+        float | None,
+        Number(
+            positive,
+            f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
+            f"(with cavitation {CAVITY_COURANT}) if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    step: Annotated[float | None, Quantity("time", positive, "fixed step [s]", changes=VALUE)] = (
+        None
+    )
+    rtol: Annotated[
+        float | None,
+        Number(
+            val.between(0, 1, open=True),
+            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} (without cells, with auto, or with adaptive "
+            "implicit methods) if left out",
+            usual=val.UsualRange(0.0, 1e-2, "for errors of a few percent at most"),
+        ),
+    ] = None
+    linear_algebra: Annotated[
+        str | None,
+        Choice(
+            "linear algebra",
+            KINDS,
+            "linear solver of implicit steps; chosen by the structure of the case if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    cell_time: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
+            f"{DEFAULT_CELLS} if left out",
+            changes=SHAPE,
+        ),
+    ] = None
     pipe_model: Annotated[
         str, Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE)
     ] = "finite-volume"
-    delay_tolerance: Annotated[float, Number(
-        val.between(0, 1, open=True),
-        "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
-        "both as a fraction of the largest jump", changes=SHAPE,
-    )] = DEFAULT_ACCURACY  # fmt: skip
-    delay_velocity: Annotated[float, Quantity(
-        "velocity", val.nonnegative, "velocity up to which the friction of delay lines is within delay_tolerance; at "
-        "least that at the start", changes=SHAPE,
-    )] = 0.0  # fmt: skip
-    below_vapor: Annotated[str, Choice(
-        "choice", ("continue", "stop"),
-        "action at pressures below vapour pressure: mark the results and continue, or stop",
-    )] = "continue"  # fmt: skip
+    delay_tolerance: Annotated[
+        float,
+        Number(
+            val.between(0, 1, open=True),
+            "allowed error of pipe models chosen by auto, and size below which jumps in a delay line are smoothed; "
+            "both as a fraction of the largest jump",
+            changes=SHAPE,
+        ),
+    ] = DEFAULT_ACCURACY
+    delay_velocity: Annotated[
+        float,
+        Quantity(
+            "velocity",
+            val.nonnegative,
+            "velocity up to which the friction of delay lines is within delay_tolerance; at "
+            "least that at the start",
+            changes=SHAPE,
+        ),
+    ] = 0.0
+    below_vapor: Annotated[
+        str,
+        Choice(
+            "choice",
+            ("continue", "stop"),
+            "action at pressures below vapour pressure: mark the results and continue, or stop",
+        ),
+    ] = "continue"
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> "Numerics":
         """Copy with the default scheme, step control and method filled in.
@@ -275,7 +394,13 @@ class Numerics(Table):
             changes |= {"courant": courant} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
         if self.method is None:
-            by_step = CAVITY_METHOD if parts else DEFAULT_METHOD_SSP if carries or rubs else DEFAULT_METHOD
+            by_step = (
+                CAVITY_METHOD
+                if parts
+                else DEFAULT_METHOD_SSP
+                if carries or rubs
+                else DEFAULT_METHOD
+            )
             changes["method"] = DEFAULT_METHOD_RTOL if adaptive else by_step
         return self.model_copy(update=changes)
 
@@ -296,10 +421,31 @@ class OutputUnits(val.Value):
     takes = "`{ QUANTITY = UNIT }`"
     changes = VALUE
     quantities = (
-        "pressure", "gauge_pressure", "head", "level", "flow", "velocity", "position", "force", "torque", "angle",
-        "angular_velocity", "acceleration", "energy", "power", "time", "length", "area", "volume", "density",
-        "voltage", "current", "temperature", "molar_flow", "affinity",
-    )  # fmt: skip
+        "pressure",
+        "gauge_pressure",
+        "head",
+        "level",
+        "flow",
+        "velocity",
+        "position",
+        "force",
+        "torque",
+        "angle",
+        "angular_velocity",
+        "acceleration",
+        "energy",
+        "power",
+        "time",
+        "length",
+        "area",
+        "volume",
+        "density",
+        "voltage",
+        "current",
+        "temperature",
+        "molar_flow",
+        "affinity",
+    )
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         check_table(given, 'for example { pressure = "barg" }')
@@ -307,7 +453,12 @@ class OutputUnits(val.Value):
         for quantity, unit in given.items():
             if quantity not in self.quantities:
                 near = did_you_mean(str(quantity), self.quantities)
-                faults.append(((quantity,), f"unknown quantity{near}; quantities are {', '.join(self.quantities)}"))
+                faults.append(
+                    (
+                        (quantity,),
+                        f"unknown quantity{near}; quantities are {', '.join(self.quantities)}",
+                    )
+                )
                 continue
             try:
                 if not isinstance(unit, str):
@@ -371,14 +522,23 @@ class OutputLine(Table):
     """Table of one line across a basin, along which its fields are written with every frame."""
 
     basin: Annotated[str, val.Text("name of the basin", VALUE)]
-    from_: Annotated[tuple[float, float], val.Rows(
-        "length", length=2, about="x, y of the start of the line [m]", changes=VALUE,
-    ), Field(alias="from")]  # fmt: skip
+    from_: Annotated[
+        tuple[float, float],
+        val.Rows(
+            "length",
+            length=2,
+            about="x, y of the start of the line [m]",
+            changes=VALUE,
+        ),
+        Field(alias="from"),
+    ]
     to: Annotated[
-        tuple[float, float], val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)
+        tuple[float, float],
+        val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE),
     ]
     points: Annotated[
-        int, val.Whole(val.between(2, 10**5), "number of evenly spaced points, with both ends", VALUE)
+        int,
+        val.Whole(val.between(2, 10**5), "number of evenly spaced points, with both ends", VALUE),
     ] = 101
 
 
@@ -386,37 +546,73 @@ class RunUp(Table):
     """Table of the run-up in a basin, by direction about a point, or by distance along a line."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("about", "from"), ("about", "to"), ("about", "width"), ("radius", "from"), ("radius", "to"),
-    )  # fmt: skip
+        ("about", "from"),
+        ("about", "to"),
+        ("about", "width"),
+        ("radius", "from"),
+        ("radius", "to"),
+    )
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("about", "from", "to"),)
 
     basin: Annotated[str, val.Text("name of the basin")]
-    about: Annotated[tuple[float, float] | None, val.Rows(
-        "length", length=2, about="x, y of the point [m]; the table is by angle, anticlockwise from the x axis",
-        changes=VALUE,
-    )] = None  # fmt: skip
-    radius: Annotated[float | None, Quantity(
-        "length", positive, "greatest distance of cells from the point [m]; no limit if left out", changes=VALUE,
-    )] = None  # fmt: skip
-    from_: Annotated[tuple[float, float] | None, val.Rows(
-        "length", length=2, about="x, y of the start of the line [m]; the table is by distance from it", changes=VALUE,
-    ), Field(alias="from")] = None  # fmt: skip
+    about: Annotated[
+        tuple[float, float] | None,
+        val.Rows(
+            "length",
+            length=2,
+            about="x, y of the point [m]; the table is by angle, anticlockwise from the x axis",
+            changes=VALUE,
+        ),
+    ] = None
+    radius: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            positive,
+            "greatest distance of cells from the point [m]; no limit if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    from_: Annotated[
+        tuple[float, float] | None,
+        val.Rows(
+            "length",
+            length=2,
+            about="x, y of the start of the line [m]; the table is by distance from it",
+            changes=VALUE,
+        ),
+        Field(alias="from"),
+    ] = None
     to: Annotated[
         tuple[float, float] | None,
         val.Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE),
     ] = None
-    width: Annotated[float | None, Quantity(
-        "length", positive, "greatest distance of cells from the line [m]; no limit if left out", changes=VALUE,
-    )] = None  # fmt: skip
-    sectors: Annotated[int, val.Whole(
-        val.between(1, 10**5), "number of equal sectors of the circle, or parts of the line", VALUE,
-    )] = 48  # fmt: skip
+    width: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            positive,
+            "greatest distance of cells from the line [m]; no limit if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    sectors: Annotated[
+        int,
+        val.Whole(
+            val.between(1, 10**5),
+            "number of equal sectors of the circle, or parts of the line",
+            VALUE,
+        ),
+    ] = 48
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults, ends = super().key_faults(given), {"from", "to"} - given.keys()
         missing = len(ends) == 1 and "about" not in given
-        return [*faults, *(((), f"{key} is missing; a line has `from` and `to`") for key in ends if missing)]
+        return [
+            *faults,
+            *(((), f"{key} is missing; a line has `from` and `to`") for key in ends if missing),
+        ]
 
     @property
     def length(self) -> float:
@@ -428,7 +624,10 @@ class Gauge(Table):
     """Table of a named point of a basin, at which probes may record fields: `BASIN.depth@GAUGE`."""
 
     basin: Annotated[str, val.Text("name of the basin", VALUE)]
-    at: Annotated[tuple[float, float], val.Rows("length", length=2, about="x, y of the point [m]", changes=SHAPE)]
+    at: Annotated[
+        tuple[float, float],
+        val.Rows("length", length=2, about="x, y of the point [m]", changes=SHAPE),
+    ]
 
 
 class Gauges(NamedTables):
@@ -441,7 +640,9 @@ class Gauges(NamedTables):
         if isinstance(given, dict) and isinstance(given.get("file"), str):
             if len(given) > 1:
                 other = next(key for key in given if key != "file")
-                raise ValueError(f"file and {other} are given; expected all gauges in the file, or all in this table")
+                raise ValueError(
+                    f"file and {other} are given; expected all gauges in the file, or all in this table"
+                )
             given = self.rows(given["file"], setting)
         return super().read(given, setting)
 
@@ -452,10 +653,16 @@ class Gauges(NamedTables):
         rows = read_rows(find_file(file, setting))
         name, basin, x, y = (rows.column(column, 0) for column in self.columns)
         tables: dict[str, Any] = {}
-        points = zip(rows.numbers(x, "length").tolist(), rows.numbers(y, "length").tolist(), strict=True)
+        points = zip(
+            rows.numbers(x, "length").tolist(), rows.numbers(y, "length").tolist(), strict=True
+        )
         for row, line, point in zip(rows.cells, rows.lines, points, strict=True):
             if row[name] in tables or not row[name]:
-                fault = f"{show(row[name])} is the name of two gauges" if row[name] else "a gauge has no name"
+                fault = (
+                    f"{show(row[name])} is the name of two gauges"
+                    if row[name]
+                    else "a gauge has no name"
+                )
                 raise CsvError(rows.file, f"{fault}; expected a name of its own for each", line)
             tables[row[name]] = {"basin": row[basin], "at": list(point)}
         return tables
@@ -465,12 +672,25 @@ class OutputSection(Table):
     """Table of a section: a line across a basin of water, with the probe `SECTION.flow` of the flow through it."""
 
     basin: Annotated[str, val.Text("name of the basin")]
-    from_: Annotated[tuple[float, float], val.Rows(
-        "length", length=2, about="x, y of the start of the line [m]", changes=SHAPE,
-    ), Field(alias="from")]  # fmt: skip
-    to: Annotated[tuple[float, float], val.Rows(
-        "length", length=2, about="x, y of the end of the line [m]; flow to the left of it is positive", changes=SHAPE,
-    )]  # fmt: skip
+    from_: Annotated[
+        tuple[float, float],
+        val.Rows(
+            "length",
+            length=2,
+            about="x, y of the start of the line [m]",
+            changes=SHAPE,
+        ),
+        Field(alias="from"),
+    ]
+    to: Annotated[
+        tuple[float, float],
+        val.Rows(
+            "length",
+            length=2,
+            about="x, y of the end of the line [m]; flow to the left of it is positive",
+            changes=SHAPE,
+        ),
+    ]
 
     def chain(self, mesh: Any) -> Any:
         """`FaceChain` of the section in a mesh."""
@@ -483,11 +703,22 @@ class OutputGrid(Table):
     """Table of fields of a basin on square pixels, as files `grids/NAME-FIELD.tif` or `grids/NAME.nc`."""
 
     basin: Annotated[str, val.Text("name of the basin")]
-    fields: Annotated[Any, NameList(
-        "fields", '["max_depth"]', "greatest values at the end of the run, or fields of frames (the last in a GeoTIFF)",
-    )]  # fmt: skip
+    fields: Annotated[
+        Any,
+        NameList(
+            "fields",
+            '["max_depth"]',
+            "greatest values at the end of the run, or fields of frames (the last in a GeoTIFF)",
+        ),
+    ]
     format: Annotated[
-        str, Choice("format", ("geotiff", "netcdf"), "file format: geotiff, or netcdf (NetCDF-3)", changes=VALUE)
+        str,
+        Choice(
+            "format",
+            ("geotiff", "netcdf"),
+            "file format: geotiff, or netcdf (NetCDF-3)",
+            changes=VALUE,
+        ),
     ]
     cell: Annotated[float, Quantity("length", positive, "side of a pixel [m]", changes=VALUE)]
 
@@ -495,43 +726,84 @@ class OutputGrid(Table):
 class Output(Table):
     """Table `[output]`: recorded quantities, output times and units."""
 
-    every: Annotated[float | None, Quantity(
-        "time", positive, f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
-        changes=VALUE,
-    )] = None  # fmt: skip
-    fields: Annotated[int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
-        DEFAULT_FRAMES
-    )
-    probes: Annotated[Any, NameList(
-        "probes", '["gate.pressure"]', "recorded quantities; those of all nodes and links if left out",
-    )] = None  # fmt: skip
+    every: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
+            changes=VALUE,
+        ),
+    ] = None
+    fields: Annotated[
+        int, val.Whole(val.between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)
+    ] = DEFAULT_FRAMES
+    probes: Annotated[
+        Any,
+        NameList(
+            "probes",
+            '["gate.pressure"]',
+            "recorded quantities; those of all nodes and links if left out",
+        ),
+    ] = None
     lines: Annotated[
-        Any, NamedTables(OutputLine, "named lines across basins: { centre = { basin, from, to, points } }")
+        Any,
+        NamedTables(
+            OutputLine, "named lines across basins: { centre = { basin, from, to, points } }"
+        ),
     ] = {}
-    maxima: Annotated[Any, NameList(
-        "basins", '["reach"]', "basins whose greatest depths, speeds and times of arrival are recorded in every cell",
-    )] = ()  # fmt: skip
-    wet_depth: Annotated[float, Quantity(
-        "length", val.between(1e-6, 1e6), "depth above which a cell counts as wet in `maxima` and `run_up` [m]",
-        changes=VALUE,
-    )] = 0.01  # fmt: skip
+    maxima: Annotated[
+        Any,
+        NameList(
+            "basins",
+            '["reach"]',
+            "basins whose greatest depths, speeds and times of arrival are recorded in every cell",
+        ),
+    ] = ()
+    wet_depth: Annotated[
+        float,
+        Quantity(
+            "length",
+            val.between(1e-6, 1e6),
+            "depth above which a cell counts as wet in `maxima` and `run_up` [m]",
+            changes=VALUE,
+        ),
+    ] = 0.01
     run_up: Annotated[
-        Any, NamedTables(RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }")
+        Any,
+        NamedTables(
+            RunUp, "named run-ups: { shore = { basin, about } } or { beach = { basin, from, to } }"
+        ),
     ] = {}
     gauges: Annotated[
         Any,
-        Gauges(Gauge, 'named points of basins for probes: { kerb = { basin, at } }, or { file = "gauges.csv" }'),
+        Gauges(
+            Gauge,
+            'named points of basins for probes: { kerb = { basin, at } }, or { file = "gauges.csv" }',
+        ),
     ] = {}
     sections: Annotated[
-        Any, NamedTables(OutputSection, "lines across basins for probes of the flow: { bridge = { basin, from, to } }")
+        Any,
+        NamedTables(
+            OutputSection,
+            "lines across basins for probes of the flow: { bridge = { basin, from, to } }",
+        ),
     ] = {}
     grids: Annotated[
-        Any, NamedTables(OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }")
+        Any,
+        NamedTables(
+            OutputGrid, "fields of basins on pixels: { flood = { basin, fields, format, cell } }"
+        ),
     ] = {}
-    sinks: Annotated[Any, SinkNames(
-        "sinks", '["json-lines"]', "names of sinks of other packages, which receive what the run directory receives",
-        VALUE,
-    )] = ()  # fmt: skip
+    sinks: Annotated[
+        Any,
+        SinkNames(
+            "sinks",
+            '["json-lines"]',
+            "names of sinks of other packages, which receive what the run directory receives",
+            VALUE,
+        ),
+    ] = ()
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     @property
@@ -542,17 +814,29 @@ class Output(Table):
             from fvsolve.parts.basin import Physics
 
             recorded = {key for physics in Physics.kinds.values() for key in physics.maxima}
-            drawn += [spec.basin for spec in self.grids.values() if recorded.intersection(map(str, spec.fields))]
-        return tuple(dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values()), *drawn]))
+            drawn += [
+                spec.basin
+                for spec in self.grids.values()
+                if recorded.intersection(map(str, spec.fields))
+            ]
+        return tuple(
+            dict.fromkeys([*self.maxima, *(spec.basin for spec in self.run_up.values()), *drawn])
+        )
 
     def table(self) -> dict[str, Any]:
         """Keys and values as in a case file, without sinks: they change no number, and other machines may lack them."""
         values = {**super().table(), "probes": [probe.text for probe in self.probes]}
         del values["sinks"]
-        return {key: value for key, value in values.items() if value != {} and (key, value) != ("maxima", [])}
+        return {
+            key: value
+            for key, value in values.items()
+            if value != {} and (key, value) != ("maxima", [])
+        }
 
 
 class ExactSpec(Table):
     """Table `[exact]`: exact solution of the case, from which studies compute errors."""
 
-    name: Annotated[str, Choice("exact solution", NAMES, "name of the exact solution", changes=VALUE)]
+    name: Annotated[
+        str, Choice("exact solution", NAMES, "name of the exact solution", changes=VALUE)
+    ]

@@ -33,8 +33,12 @@ def find(name: str) -> Path:
     if name in names():  # even if the working folder has a folder of that name
         return folder() / f"{name}.toml"
     if path.is_dir():
-        raise FvsolveError(f"{name} is a folder; expected a case file or one of: {listing(names())}")
-    raise FvsolveError(f"no file and no shipped case {name}{did_you_mean(name, names())}; see `fvsolve list`")
+        raise FvsolveError(
+            f"{name} is a folder; expected a case file or one of: {listing(names())}"
+        )
+    raise FvsolveError(
+        f"no file and no shipped case {name}{did_you_mean(name, names())}; see `fvsolve list`"
+    )
 
 
 def titles() -> dict[str, str]:
@@ -54,14 +58,21 @@ def copy(name: str, to: Path, load: Callable[[Path], Any]) -> list[Path]:
     contents.
     """
     if name not in names():
-        raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")
+        raise FvsolveError(
+            f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}"
+        )
     if to.is_dir():
         to = to / f"{name}.toml"
     source = folder() / f"{name}.toml"
     pairs = [(source, to)]
-    pairs += [(Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files]
+    pairs += [
+        (Path(path), to.parent / Path(path).absolute().relative_to(folder()))
+        for path in load(source).files
+    ]
     schema = to.parent / SCHEMA
-    pairs = pairs[:1] + [pair for pair in pairs[1:] if not (pair[1].is_file() and cmp(*pair, shallow=False))]
+    pairs = pairs[:1] + [
+        pair for pair in pairs[1:] if not (pair[1].is_file() and cmp(*pair, shallow=False))
+    ]
     for _, target in pairs:
         if target.exists():
             raise FvsolveError(f"{target} exists; give another file: fvsolve new {name} FILE")

@@ -24,7 +24,8 @@ from fvsolve.parts.schedule import constant
 
 MODES = 3  # modes along x, and along y
 ROUNDNESS = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
-UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes hold for nearly level tanks
+# least cosine between the normal of the bed and the vertical: modes hold for nearly level tanks
+UPRIGHT = 0.9
 FLAT = 1e-9  # allowed rise of a flat bed, relative to the depth
 TERMS = 2000  # number of terms of a series
 Faults = Iterator[tuple[tuple, str]]
@@ -76,9 +77,15 @@ def slowest(basin: Any, mesh: Any) -> Slowest | None:
     They are known for boxes and upright cylinders with water over a flat bed.
     """
     bed, outline = means(samples(basin.bed, mesh)), outline_of(mesh)
-    if outline is None or np.ptp(bed) > FLAT * abs(basin.level - bed.min()) or not basin.level > bed[0]:
+    if (
+        outline is None
+        or np.ptp(bed) > FLAT * abs(basin.level - bed.min())
+        or not basin.level > bed[0]
+    ):
         return None
-    deep = modes(outline, basin.level - bed[0], 1.0, 1.0, 1)[int(np.argmax(outline.sides))].k * (basin.level - bed[0])
+    deep = modes(outline, basin.level - bed[0], 1.0, 1.0, 1)[int(np.argmax(outline.sides))].k * (
+        basin.level - bed[0]
+    )
     return Slowest(deep, 100.0 * float(np.sqrt(deep / np.tanh(deep)) - 1.0))
 
 
@@ -105,7 +112,9 @@ def depth_of(basin: Any, mesh: Any) -> float:
     return basin.level - bed_of(basin, mesh)
 
 
-def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MODES) -> list[SloshingMode]:
+def modes(
+    outline: Outline, depth: float, density: float, gravity: float, count: int = MODES
+) -> list[SloshingMode]:
     """First `count` modes in each direction of water in a tank, alternately along x and y.
 
     depth [m]; density [kg/m3]; gravity [m/s2]
@@ -118,12 +127,17 @@ def modes(outline: Outline, depth: float, density: float, gravity: float, count:
             k = 2.0 * root / side if outline.is_round else (2 * number - 1) * np.pi / side
             steep = float(np.tanh(k * depth))
             if outline.is_round:
-                share, rise = 2.0 * steep / (k * depth * (root**2 - 1.0)), 2.0 * root * steep / (root**2 - 1.0)
+                share = 2.0 * steep / (k * depth * (root**2 - 1.0))
+                rise = 2.0 * root * steep / (root**2 - 1.0)
             else:
                 share, rise = 8.0 * steep / (k * depth * (k * side) ** 2), 4.0 * steep / (k * side)
             height = depth - 2.0 / k * float(np.tanh(0.5 * k * depth))
             mass = density * area_of(outline) * depth * share
-            result.append(SloshingMode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
+            result.append(
+                SloshingMode(
+                    along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)
+                )
+            )
     return result
 
 
@@ -152,9 +166,13 @@ def lid_inertia(outline: Outline, depth: float, density: float) -> np.ndarray:
     if outline.is_round:
         across = density * cylinder_inertia(0.5 * a, depth)
         return np.diag([across, across, 0.0])
-    return density * np.diag([
-        a * rectangle_inertia(b, depth), b * rectangle_inertia(a, depth), depth * rectangle_inertia(a, b)
-    ])  # fmt: skip
+    return density * np.diag(
+        [
+            a * rectangle_inertia(b, depth),
+            b * rectangle_inertia(a, depth),
+            depth * rectangle_inertia(a, b),
+        ]
+    )
 
 
 def rectangle_inertia(a: float, b: float) -> float:
@@ -181,8 +199,16 @@ def cylinder_inertia(a: float, h: float) -> float:
     c, sign = (2 * j - 1) * np.pi / h, np.where(j % 2, 1.0, -1.0)
     part = 4.0 * sign / (h * c * c)  # coefficients of z in sin(c z)
     slope = 0.5 * (ive(0, c * a) + ive(2, c * a))  # I1', scaled like ive
-    wall = np.pi * a * (-a * h**3 / 12.0 + np.sum(2.0 * part**2 * ive(1, c * a) / (c * slope)) * h / 2.0)
-    lids = 2.0 * np.pi * (h * a**4 / 8.0 - np.sum(2.0 * part * sign * a * a * ive(2, c * a) / (c * c * slope)))
+    wall = (
+        np.pi
+        * a
+        * (-a * h**3 / 12.0 + np.sum(2.0 * part**2 * ive(1, c * a) / (c * slope)) * h / 2.0)
+    )
+    lids = (
+        2.0
+        * np.pi
+        * (h * a**4 / 8.0 - np.sum(2.0 * part * sign * a * a * ive(2, c * a) / (c * c * slope)))
+    )
     return float(wall + lids)
 
 
@@ -197,13 +223,20 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], stand: dict[str, 
             continue
         if outline_of(mesh) is None:
             text = (
-                'modes are known only for boxes and upright cylinders (a circular mesh); expected "cells" or "frozen"'
+                "modes are known only for boxes and upright cylinders (a circular "
+                'mesh); expected "cells" or "frozen"'
             )
             yield (*key, "sloshing"), text
         elif np.ptp(bed := means(samples(basin.bed, mesh))) > FLAT * abs(basin.level - bed.min()):
-            yield (*key, "bed"), 'modes are known only over a flat bed; expected a single height, or sloshing = "cells"'
+            yield (
+                (*key, "bed"),
+                'modes are known only over a flat bed; expected a single height, or sloshing = "cells"',
+            )
         elif not basin.level > bed[0]:
-            yield (*key, "level"), f"{basin.level:g} m is not above the bed, at {bed[0]:g} m; expected a higher level"
+            yield (
+                (*key, "level"),
+                f"{basin.level:g} m is not above the bed, at {bed[0]:g} m; expected a higher level",
+            )
         yield from unsupported_keys(key, basin)
         if (pose := stand.get(basin.on)) is not None:
             upright = float((pose.attitude @ basin.rotation)[2, 2])
@@ -225,7 +258,10 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
 def unsupported_keys(key: tuple, basin: Any) -> Faults:
     """Faults of keys of a basin that are not valid with sloshing modes; key : key path of the basin."""
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
-        yield (*key, "start", key_name), "sloshing modes start from level water at rest; leave this key out"
+        yield (
+            (*key, "start", key_name),
+            "sloshing modes start from level water at rest; leave this key out",
+        )
     for patch, patch_options in basin.patches.items():
         if patch_options.passes:
             text = "sloshing modes are valid only with walls on all sides; expected a wall"
@@ -245,7 +281,9 @@ def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray
     return density * area_of(outline) * depth, centre, lid_inertia(outline, depth, density)
 
 
-def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Any]:
+def mode_bodies(
+    name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float
+) -> dict[str, Any]:
     """Bodies, by name, that model the sloshing modes of a basin: one on a spring per mode, and one of negative mass.
 
     The fixed body of negative mass subtracts the moving masses from the water, which is added to the body with its full
@@ -254,7 +292,10 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
     """
     from fvsolve.parts.body import Joint
 
-    outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
+    outline = outline_of(mesh)
+    turn = basin.rotation
+    all_modes = modes_of(basin, mesh, density, gravity)
+    result = {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
     places = [bed + turn[:, 2] * item.height for item in all_modes]
     masses = np.array([item.mass for item in all_modes]) * (0.5 if outline.is_round else 1.0)
@@ -270,10 +311,16 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
             on, place = first, np.zeros(3)
         carried = 0.0 if outline.is_round and mode.along == 0 else mode.mass
         joint = Joint.model_construct(
-            kind="prismatic", on=on, at=tuple(place.tolist()), axis=tuple(turn[:, mode.along].tolist()),
-            travel=constant(float(down[mode.along] / mode.square)), stiffness=mode.mass * mode.square,
-        )  # fmt: skip
-        result[mode_body_name(name, mode)] = hidden_body(carried, np.zeros((3, 3)), joint, np.zeros(3))
+            kind="prismatic",
+            on=on,
+            at=tuple(place.tolist()),
+            axis=tuple(turn[:, mode.along].tolist()),
+            travel=constant(float(down[mode.along] / mode.square)),
+            stiffness=mode.mass * mode.square,
+        )
+        result[mode_body_name(name, mode)] = hidden_body(
+            carried, np.zeros((3, 3)), joint, np.zeros(3)
+        )
     return result
 
 
@@ -293,7 +340,10 @@ def surface_factors(
     last = len(all_modes) - 2
     return all_modes, [
         *rises[:last],
-        *(rises[k] + rest[all_modes[k].along] * all_modes[k].square / gravity for k in (last, last + 1)),
+        *(
+            rises[k] + rest[all_modes[k].along] * all_modes[k].square / gravity
+            for k in (last, last + 1)
+        ),
     ]
 
 
@@ -316,9 +366,12 @@ def hidden_body(mass: float, inertia: np.ndarray, joint: Any, centre: np.ndarray
     from fvsolve.parts.body import Body
 
     return Body.model_construct(
-        mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
+        mass=mass,
+        inertia=tuple(map(tuple, inertia.tolist())),
+        joint=joint,
+        points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),
-    )  # fmt: skip
+    )
 
 
 def nodes_with_water(
@@ -341,7 +394,11 @@ def nodes_with_water(
         middle = (body.mass * own + mass * centre) / both
         total = body.inertia_matrix() + point_inertia(body.mass, own - middle)
         total = total + turn @ inertia @ turn.T + point_inertia(mass, centre - middle)
-        change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
+        change = {
+            "mass": both,
+            "centre_of_mass": tuple(middle.tolist()),
+            "inertia": tuple(map(tuple, total.tolist())),
+        }
         result[nodes[name].on] = body.model_copy(update=change)
     swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
     stand = poses(result, t) if swinging else {}

@@ -12,7 +12,9 @@ KeyPath = tuple[str | int, ...]
 
 _BLANK = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)+")
 _KEY = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*'""")
-_TEXT = re.compile(r'"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'', re.DOTALL)
+_TEXT = re.compile(
+    r'"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'', re.DOTALL
+)
 _BARE = re.compile(r"[^,\]\}\s#]+")
 _SPACE = re.compile(r"[ \t]*")
 
@@ -23,7 +25,11 @@ def write(table: dict[str, Any]) -> str:
     Tables of the first level, and of the second level in nodes, links, signals and scalars, have a header. All other
     tables are written inline.
     """
-    lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not isinstance(value, dict)]
+    lines = [
+        f"{_key(key)} = {inline(value)}"
+        for key, value in table.items()
+        if not isinstance(value, dict)
+    ]
     for key, value in table.items():
         if isinstance(value, dict):
             lines += _section(key, value)
@@ -63,7 +69,11 @@ def inline(value: Any) -> str:
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + " }" if value else "{}"
+        return (
+            "{ " + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + " }"
+            if value
+            else "{}"
+        )
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(inline(item) for item in value) + "]"
     return repr(value)
@@ -76,9 +86,11 @@ def _text(text: str) -> str:
 # Strings end at the first closing quote: the quantifiers take all they can and give nothing back, so that a search
 # without a closing quote takes a time in proportion to the text.
 _STRINGS = {
-    '"': re.compile(r'(?:[^"\\\n]|\\.)*+"'), "'": re.compile(r"[^'\n]*+'"),
-    '"""': re.compile(r'(?:[^"\\]|\\.|"(?!""))*+"{3,5}', re.DOTALL), "'''": re.compile(r"(?:[^']|'(?!''))*+'{3,5}"),
-}  # fmt: skip
+    '"': re.compile(r'(?:[^"\\\n]|\\.)*+"'),
+    "'": re.compile(r"[^'\n]*+'"),
+    '"""': re.compile(r'(?:[^"\\]|\\.|"(?!""))*+"{3,5}', re.DOTALL),
+    "'''": re.compile(r"(?:[^']|'(?!''))*+'{3,5}"),
+}
 _TOKEN = re.compile(r'"""|\'\'\'|["\'#.]|[A-Za-z0-9_-]+|[ \t]+|[^A-Za-z0-9_"\'#. \t-]+')
 
 

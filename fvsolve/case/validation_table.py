@@ -13,14 +13,24 @@ from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
 from fvsolve.parts.table_model import check_table, keys_json, read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, ValueFault, faults_of, nonnegative
+from fvsolve.parts.value import (
+    NEEDED,
+    VALUE,
+    Quantity,
+    ReadContext,
+    ValueFault,
+    faults_of,
+    nonnegative,
+)
 from fvsolve.units import show
 
 MEASURED, OTHERS, EXACT = GATES = ("measured", "others", "exact")
-ERRORS = ("mean_error", "rms_error", "greatest_error")  # relative to the range of the measured series
+# relative to the range of the measured series
+ERRORS = ("mean_error", "rms_error", "greatest_error")
 DIFFERENCE = "rms_difference"  # from the measured series, in the unit of the probe
 CROSSING = "time"  # first time at which a probe passes a value
-PROFILE = "profile_error"  # mean error of a field at the end, relative to the mean of the exact field
+# mean error of a field at the end, relative to the mean of the exact field
+PROFILE = "profile_error"
 PROFILES = ("depth", "surface", "u", "discharge")  # quantities of exact fields
 PROFILE_KEYS = ("length", "from", "to")  # keys of a profile that are not data of its solution
 MEASURES = (*FUNCTIONS, CROSSING, *ERRORS, DIFFERENCE, PROFILE)
@@ -127,7 +137,9 @@ class Sequence(val.Value):
     def read(self, given: Any, setting: ReadContext) -> tuple[Any, ...]:
         if not isinstance(given, list):
             raise ValueError(f"{show(given)} is not a list; expected {self.about}")
-        return tuple(val.read_each(enumerate(given), lambda item: self.item.read(item, setting)).values())
+        return tuple(
+            val.read_each(enumerate(given), lambda item: self.item.read(item, setting)).values()
+        )
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": self.item.json()}
@@ -154,8 +166,11 @@ class Below(ByName):
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         check_table(given, self.about)
-        faults = [((name,), "leads out of its folder; expected a path below it") for name in given
-                  if Path(name).is_absolute() or ".." in Path(name).parts]  # fmt: skip
+        faults = [
+            ((name,), "leads out of its folder; expected a path below it")
+            for name in given
+            if Path(name).is_absolute() or ".." in Path(name).parts
+        ]
         if faults:
             raise ValueFault(faults)
         return super().read(given, setting)
@@ -167,7 +182,9 @@ class FileSum(val.Text):
     def read(self, given: Any, setting: ReadContext) -> str:
         text = super().read(given, setting)
         if not _SUM.fullmatch(text):
-            raise ValueError(f'{show(text)} is not a sum; expected "sha256:" and 64 digits, as sha256sum prints them')
+            raise ValueError(
+                f'{show(text)} is not a sum; expected "sha256:" and 64 digits, as sha256sum prints them'
+            )
         return text
 
 
@@ -199,21 +216,35 @@ def text(about: str, default: Any = "") -> tuple[val.Value, Any]:
 def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
     """Keys of a row whose computed value has a dimension : name -> (declaration, default)."""
     quantity = Quantity(dimension, changes=VALUE)
-    difference = Quantity("modulus" if dimension.endswith("pressure") else dimension, nonnegative, changes=VALUE)
+    difference = Quantity(
+        "modulus" if dimension.endswith("pressure") else dimension, nonnegative, changes=VALUE
+    )
     source = text("where the value is published")
-    measured = {"value": (quantity, None), "source": source,
-                "spread": (Span(dimension, "least and greatest of repeats, or of published values"), None)}  # fmt: skip
-    other = {"code": text("name of the program", NEEDED), "value": (quantity, NEEDED), "source": source}
+    measured = {
+        "value": (quantity, None),
+        "source": source,
+        "spread": (Span(dimension, "least and greatest of repeats, or of published values"), None),
+    }
+    other = {
+        "code": text("name of the program", NEEDED),
+        "value": (quantity, NEEDED),
+        "source": source,
+    }
     exact = {
         "value": (quantity, None),
         "source": source,
-        "resolution": (val.Number(FINER, "times the resolution of the case, for a converged answer"), None),
+        "resolution": (
+            val.Number(FINER, "times the resolution of the case, for a converged answer"),
+            None,
+        ),
     }
     gate = {
         "of": (val.Choice("gate", GATES, "value that decides", changes=VALUE), NEEDED),
         "rtol": (val.Number(nonnegative, "tolerance relative to that value", changes=VALUE), 0.0),
         "atol": (difference, 0.0),
-        "reason": text("why the gate is wider than the spread of measurement, codes and numerical error together"),
+        "reason": text(
+            "why the gate is wider than the spread of measurement, codes and numerical error together"
+        ),
     }
     return {
         "what": text("name of the row", NEEDED),
@@ -221,10 +252,16 @@ def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
         "from": (Quantity("time", about="first time that counts [s]", changes=VALUE), None),
         "to": (Quantity("time", about="last time that counts [s]", changes=VALUE), None),
         "set": (ByName(val.Anything(), "overrides of the case, for example { KEY = VALUE }"), {}),
-        "curves": (ByName(val.Text(changes=VALUE), "{ NAME = FILE }, run-up over angle or distance"), {}),
+        "curves": (
+            ByName(val.Text(changes=VALUE), "{ NAME = FILE }, run-up over angle or distance"),
+            {},
+        ),
         "series": text("name of the compared series in the picture, for example of a program"),
         "measured": (Subtable(measured, "for example { value, spread, source }"), None),
-        "others": (Sequence(Subtable(other, "for example { code, value }"), "results of other programs"), ()),
+        "others": (
+            Sequence(Subtable(other, "for example { code, value }"), "results of other programs"),
+            (),
+        ),
         "exact": (Subtable(exact, "for example { value, source }"), None),
         "gate": (Subtable(gate, 'for example { of = "measured", rtol = 0.05 }'), NEEDED),
         "because": text("why the model differs from the measurement"),
@@ -234,11 +271,25 @@ def row_keys(dimension: str) -> dict[str, tuple[val.Value, Any]]:
 
 TABLE_KEYS = {
     "of": text("file of the data folder", NEEDED),
-    "skip": (val.Whole(val.between(0, 10**6), "number of lines before the rows of numbers", VALUE), 0),
-    "matrix": (val.Flag("true if the file is a matrix: c1, c2 are indices from 0, c3 the entry", VALUE), False),
-    "every": (val.Whole(val.between(1, 1000), "step between the rows and columns of a matrix that count", VALUE), 1),
+    "skip": (
+        val.Whole(val.between(0, 10**6), "number of lines before the rows of numbers", VALUE),
+        0,
+    ),
+    "matrix": (
+        val.Flag("true if the file is a matrix: c1, c2 are indices from 0, c3 the entry", VALUE),
+        False,
+    ),
+    "every": (
+        val.Whole(
+            val.between(1, 1000), "step between the rows and columns of a matrix that count", VALUE
+        ),
+        1,
+    ),
     "where": text("condition for a row to count, for example c2 > 0"),
-    "columns": (ByName(val.Text(changes=VALUE), '{ "t [s]" = "c1 - 22" }, formulas of columns c1, c2, ...'), NEEDED),
+    "columns": (
+        ByName(val.Text(changes=VALUE), '{ "t [s]" = "c1 - 22" }, formulas of columns c1, c2, ...'),
+        NEEDED,
+    ),
 }
 NETWORK_KEYS = {
     "inp": text("EPANET file of the data folder, or name of a network of WNTR", NEEDED),
@@ -251,13 +302,19 @@ KEYS = {
     "get": text("how to get the files"),
     "note": text("what a reader must know about the case"),
     "files": (Below(FileSum(changes=VALUE), "{ PATH = SUM }, files of the data folder"), {}),
-    "tables": (Below(Subtable(TABLE_KEYS, "{ of, skip, columns }"), "CSV files to make, by name"), {}),
+    "tables": (
+        Below(Subtable(TABLE_KEYS, "{ of, skip, columns }"), "CSV files to make, by name"),
+        {},
+    ),
     "case": text("shipped case that this file completes", None),
     "network": (Subtable(NETWORK_KEYS, '{ inp = "town.inp" }'), None),
     "program": text("program of fvsolve that computes the values, in place of a scene", None),
-    "profile": (ByName(val.Anything(), "{ solution = NAME, ... }, exact fields at the end of the run"), None),
+    "profile": (
+        ByName(val.Anything(), "{ solution = NAME, ... }, exact fields at the end of the run"),
+        None,
+    ),
     "compare": (val.Anything(), NEEDED),
-}  # fmt: skip
+}
 
 
 def schema() -> dict[str, Any]:
@@ -266,7 +323,9 @@ def schema() -> dict[str, Any]:
     return keys_json(KEYS | {"compare": (rows, NEEDED)})
 
 
-def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, Any]) -> Validation | None:
+def read_validation(
+    reading: Reading, kinds: Kinds | None, routes: Mapping[str, Any]
+) -> Validation | None:
     """Table `[validation]` of a case; None if there is none, or if it is faulty.
 
     kinds, routes : as for `read_claim`; kinds is None where the parts are not read; then only the rows of a program are
@@ -283,7 +342,9 @@ def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, 
     listed = given.get("compare") if isinstance(given, dict) else None
     if not isinstance(listed, list) or not listed:
         if listed is not None:
-            reading.fault(("validation", "compare"), f"{show(listed)} is not a list of tables; expected rows")
+            reading.fault(
+                ("validation", "compare"), f"{show(listed)} is not a list of tables; expected rows"
+            )
         return None
     by_scene = kinds is None and "program" not in given  # rows are read with the parts
     for number, row in enumerate([] if by_scene else listed):
@@ -296,25 +357,36 @@ def read_validation(reading: Reading, kinds: Kinds | None, routes: Mapping[str, 
 
 def check_profile(given: Mapping[str, Any]) -> None:
     """Raise ValueFault for an unknown solution, for unknown data, and for data that are not numbers."""
-    from fvsolve.exact.shallow_water import SOLUTIONS, data_of  # SciPy is imported only for a profile
+    # SciPy is imported only for a profile
+    from fvsolve.exact.shallow_water import SOLUTIONS, data_of
 
     name = given.get("solution")
     if name not in SOLUTIONS:
         text = f"{show(name)} is unknown{did_you_mean(str(name), SOLUTIONS)}; solutions are {listing(SOLUTIONS)}"
         raise ValueFault([(("profile", "solution"), text)])
     known = (*data_of(name), *PROFILE_KEYS)
-    faults = [(("profile", key), f"unknown key{did_you_mean(key, known)}; keys are {', '.join(known)}")
-              for key in given if key not in ("solution", *known)]  # fmt: skip
-    faults += [(("profile", key), f"{show(value)} is not a number") for key, value in given.items()
-               if key in known and (isinstance(value, bool) or not isinstance(value, (int, float)))]  # fmt: skip
+    faults = [
+        (("profile", key), f"unknown key{did_you_mean(key, known)}; keys are {', '.join(known)}")
+        for key in given
+        if key not in ("solution", *known)
+    ]
+    faults += [
+        (("profile", key), f"{show(value)} is not a number")
+        for key, value in given.items()
+        if key in known and (isinstance(value, bool) or not isinstance(value, (int, float)))
+    ]
     if faults:
         raise ValueFault(faults)
 
 
-def read_row(given: Any, kinds: Kinds | None, routes: Mapping[str, Any], reading: Reading) -> Row | None:
+def read_row(
+    given: Any, kinds: Kinds | None, routes: Mapping[str, Any], reading: Reading
+) -> Row | None:
     """Read a row; None if the part that it names is faulty. Raises ValueFault."""
     check_table(given, "for example { what, computed, measured, gate }")
-    faults, measure, known = [], None, kinds is None
+    faults = []
+    measure = None
+    known = kinds is None
     if kinds is not None and "computed" in given:
         try:
             measure, known = read_measure(given["computed"], kinds, routes, reading), True
@@ -343,20 +415,28 @@ def gate_faults(values: Mapping[str, Any], measure: Measure | None) -> list[tupl
         return [(("gate", "of"), '"others" has no values; expected others = [{ code, value }]')]
     if is_error:
         return []
-    reference = values["measured"] if of == MEASURED else values["exact"] if of == EXACT else {"value": 0.0}
+    reference = (
+        values["measured"] if of == MEASURED else values["exact"] if of == EXACT else {"value": 0.0}
+    )
     if reference is None and measure is not None:
         return [(("gate", "of"), f'"{of}" has no value; expected {of} = {{ value }}')]
-    if reference is not None and all(reference.get(key) is None for key in ("value", "spread", "resolution")):
+    if reference is not None and all(
+        reference.get(key) is None for key in ("value", "spread", "resolution")
+    ):
         return [((of,), "value is missing")]
     return []
 
 
-def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: Reading) -> Measure | None:
+def read_measure(
+    given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: Reading
+) -> Measure | None:
     """Measure from its text, such as "time(tank.depth@1,0, 2 cm)"; None if its part is faulty. Raises ValueError."""
     match = _MEASURE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None or match[1] not in MEASURES:
         near = did_you_mean(match[1], MEASURES) if match else ""
-        raise ValueError(f"{show(given)} is not a measure; expected FUNCTION(PROBE) with {listing(MEASURES)}{near}")
+        raise ValueError(
+            f"{show(given)} is not a measure; expected FUNCTION(PROBE) with {listing(MEASURES)}{near}"
+        )
     function, inner = match.groups()
     if function == PROFILE:
         basin, _, quantity = inner.rpartition(".")
@@ -370,7 +450,11 @@ def read_measure(given: Any, kinds: Kinds, routes: Mapping[str, Any], reading: R
         target = probe or extent
         if isinstance(target, RunUpPlace):
             return Measure(given, function, target.dimension, run_up=target)
-        return None if target is None else Measure(given, function, target.dimension, probe, extent, when)
+        return (
+            None
+            if target is None
+            else Measure(given, function, target.dimension, probe, extent, when)
+        )
     argument = None
     if function == CROSSING:
         inner, comma, argument = map(str.strip, inner.rpartition(","))

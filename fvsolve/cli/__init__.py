@@ -35,7 +35,8 @@ def main() -> None:
             run_command()
         except SystemExit as exit:
             output.flush()
-            if exit.code or output.error is None or output.error.errno == errno.EPIPE:  # a reader may leave early
+            # a reader may leave early
+            if exit.code or output.error is None or output.error.errno == errno.EPIPE:
                 raise
             _exit_with(f"standard output: cannot be written: {output.error.strerror}", 2)
 
@@ -47,14 +48,22 @@ def run_command() -> None:
 
         print(f"fvsolve {fvsolve.__version__}")
         sys.exit(0)
-    atexit.register(gc.freeze)  # at the end Python would search all modules for unused objects, a fifth of a short run
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads of linear algebra cost time for these matrices
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else pydantic searches all installed packages
+    # at the end Python would search all modules for unused objects, a fifth of a short run
+    atexit.register(gc.freeze)
+    # more threads of linear algebra cost time for these matrices
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # else pydantic searches all installed packages
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if sys.argv[1:2] == ["run"]:
         gc.disable()  # until `run` has imported its modules, none of which becomes unused
-    before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
+    before, warnings.formatwarning = (
+        warnings.formatwarning,
+        lambda message, *_, **__: f"{visible(str(message))}\n",
+    )
     try:
-        (overview() if sys.argv[1:] in ([], ["--help"]) else application(*sys.argv[1:2]))(prog_name="fvsolve")
+        (overview() if sys.argv[1:] in ([], ["--help"]) else application(*sys.argv[1:2]))(
+            prog_name="fvsolve"
+        )
     except FvsolveError as error:
         _exit_with(str(error), 2)
     except KeyboardInterrupt:
@@ -62,8 +71,12 @@ def run_command() -> None:
     except OSError as error:
         _exit_with(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
     except MemoryError:
-        _exit_with("out of memory; try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
-    except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
+        _exit_with(
+            "out of memory; try fewer cells, fewer probes, or a longer output interval ([output] every)",
+            1,
+        )
+    except Exception as error:
+        # a defect of fvsolve: print its location, so that it can be reported
         command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
         source = f"{command.source}: " if command and command.source else ""
         reader = " to its authors" if source else ""
@@ -118,7 +131,11 @@ def help_text(command: Declaration) -> str:
         statements = ast.parse(command.text()).body
     except (SyntaxError, ValueError):
         return ""
-    functions = [part for part in statements if isinstance(part, ast.FunctionDef) and part.name == command.attribute]
+    functions = [
+        part
+        for part in statements
+        if isinstance(part, ast.FunctionDef) and part.name == command.attribute
+    ]
     return (ast.get_docstring(functions[-1]) or "") if functions else ""
 
 

@@ -13,36 +13,85 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy.fit import NO_ERROR
 from fvsolve.studies.accuracy.order_study import NORMS, SHOWN_VARIABLES, study_title, variable_unit
 
-STEP_KEYS = {f"numerics.{key}" for key in ("courant", "rtol", "step", "cell_time")}  # set by a chart itself
+# set by a chart itself
+STEP_KEYS = {f"numerics.{key}" for key in ("courant", "rtol", "step", "cell_time")}
 ORDER_FILE = columns(
-    scheme="scheme", method="method", reference="reference", variable="variable", unit="unit", norm="norm",
-    cells="cells", size="size", step="step [s]", error="error", pairwise="order", mark="mark", order="fitted order",
-    spread="spread", steps="steps", rhs="rhs", updates="cell updates", seconds="seconds",
-)  # fmt: skip
+    scheme="scheme",
+    method="method",
+    reference="reference",
+    variable="variable",
+    unit="unit",
+    norm="norm",
+    cells="cells",
+    size="size",
+    step="step [s]",
+    error="error",
+    pairwise="order",
+    mark="mark",
+    order="fitted order",
+    spread="spread",
+    steps="steps",
+    rhs="rhs",
+    updates="cell updates",
+    seconds="seconds",
+)
 
 
 @cli.command("chart", order=90)
 def chart(
     case: cli.SingleCase,
-    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to compare (default "
-        "upwind,muscl,upwind5,weno5)")] = None,
-    method: Annotated[str | None, Option(metavar="A,B", help="methods to compare (default a selection that suits "
-        "the case)")] = None,
-    cells: Annotated[str | None, Option(metavar="A,B", help="numbers of cells to compare, for example 50,100,200, "
-        "of the pipe with the longest travel time or of the basin side with most cells (default up to five numbers "
-        "that suit the case)")] = None,
-    rtol: Annotated[str | None, Option(metavar="A,B", help="relative tolerances to compare, for example 1e-3,1e-6, "
-        "for a case without pipes and basins (default 1e-2 to 1e-10)")] = None,
-    step: Annotated[str | None, Option(metavar="A,B", help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
-        "for a case without cells (default seven or eight steps)")] = None,
-    target: Annotated[float | None, Option(metavar="ERROR", help="greatest accepted error of a probe, as a fraction "
-        "of its range, for which the cheapest settings or model are printed (default none, or 0.01 with "
-        "--models)")] = None,
-    models: Annotated[bool, Option("--models", help="compare models, from lumped volumes to cells, instead of "
-        "methods")] = False,
-    jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
-    out: cli.Out = None, as_json: cli.Json = False,
-) -> None:  # fmt: skip
+    scheme: Annotated[
+        str | None,
+        Option(metavar="A,B", help="schemes to compare (default upwind,muscl,upwind5,weno5)"),
+    ] = None,
+    method: Annotated[
+        str | None,
+        Option(metavar="A,B", help="methods to compare (default a selection that suits the case)"),
+    ] = None,
+    cells: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="numbers of cells to compare, for example 50,100,200, "
+            "of the pipe with the longest travel time or of the basin side with most cells (default up to five numbers "
+            "that suit the case)",
+        ),
+    ] = None,
+    rtol: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="relative tolerances to compare, for example 1e-3,1e-6, "
+            "for a case without pipes and basins (default 1e-2 to 1e-10)",
+        ),
+    ] = None,
+    step: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="fixed time steps [s] to compare, for example 1e-3,1e-4, "
+            "for a case without cells (default seven or eight steps)",
+        ),
+    ] = None,
+    target: Annotated[
+        float | None,
+        Option(
+            metavar="ERROR",
+            help="greatest accepted error of a probe, as a fraction "
+            "of its range, for which the cheapest settings or model are printed (default none, or 0.01 with "
+            "--models)",
+        ),
+    ] = None,
+    models: Annotated[
+        bool,
+        Option("--models", help="compare models, from lumped volumes to cells, instead of methods"),
+    ] = False,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
     """Chart error against CPU time and work for schemes, methods and resolutions; list the cheapest for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.work_precision import write_chart
@@ -57,7 +106,16 @@ def chart(
         raise FvsolveError(f"{text}; expected a fraction of the range, between 0 and 1")
     if models:
         several_jobs = None if jobs == 1 else jobs
-        _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several_jobs, dask=dask, out=out)
+        _refuse(
+            scheme=scheme,
+            method=method,
+            cells=cells,
+            rtol=rtol,
+            step=step,
+            jobs=several_jobs,
+            dask=dask,
+            out=out,
+        )
         from fvsolve.studies import ladder
         from fvsolve.studies.accuracy.model_hierarchy import DEFAULT_TARGET
 
@@ -66,12 +124,22 @@ def chart(
             hierarchy = ladder(loaded, target=target, progress=progress)
         return present(as_json, hierarchy.plain(), hierarchy_text(hierarchy, target))
     folder = cli.folder_of(loaded, "chart", out)
-    sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
+    sizes = [
+        _numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))
+    ]
     with progress_line() as progress:
         result = study(
-            loaded, None, cli.comma_list(scheme, "--scheme"), cli.method_names(method), *sizes, target, folder,
-            progress, jobs, dask,
-        )  # fmt: skip
+            loaded,
+            None,
+            cli.comma_list(scheme, "--scheme"),
+            cli.method_names(method),
+            *sizes,
+            target,
+            folder,
+            progress,
+            jobs,
+            dask,
+        )
     paths = write_chart(result, folder)
     present(as_json, result.plain() | {"files": paths}, chart_text(result, paths))
 
@@ -120,7 +188,9 @@ def chart_text(result, paths) -> Iterator:
         "and method"
     )
     if own is not None:
-        outcome = f"error {own.trajectory:.2g} in {own.seconds * 1e3:.3g} ms" if own.ok else own.reason
+        outcome = (
+            f"error {own.trajectory:.2g} in {own.seconds * 1e3:.3g} ms" if own.ok else own.reason
+        )
         yield f"default at its own resolution, {own.setting.fineness}: {outcome}"
     yield (
         f"errors against {result.reference}; {result.second} differs from it by {floor:.2g}: "
@@ -160,11 +230,20 @@ def _times(row: Mapping) -> str:
 
 FRONT = (
     Column("target", "error", ".0e"),
-    Column("name", "cheapest by CPU time", lambda row: f"{row['name']}, {row['fineness']}" if row["name"] else "none"),
+    Column(
+        "name",
+        "cheapest by CPU time",
+        lambda row: f"{row['name']}, {row['fineness']}" if row["name"] else "none",
+    ),
     Column("seconds", "ms", _ms("seconds")),
     Column("by_updates", "cheapest by updates", lambda row: row["by_updates"] or "none"),
     Column("updates", words=".2e"),
-    Column("default", words=lambda row: "not reached" if row["default_seconds"] is None else row["default_fineness"]),
+    Column(
+        "default",
+        words=lambda row: (
+            "not reached" if row["default_seconds"] is None else row["default_fineness"]
+        ),
+    ),
     Column("default_seconds", "ms", _ms("default_seconds")),
     Column("times", words=_times),
     Column("default_updates", "updates", ".2e"),
@@ -172,15 +251,23 @@ FRONT = (
 
 
 MODELS = (
-    Column("name", "model"), Column("law"), Column("states"), Column("error", words=".4g"), Column("of"),
-    Column("greatest", words=".4g"), Column("ms", "time [ms]", ".4g"), Column("rhs", "calls of f"),
-)  # fmt: skip
+    Column("name", "model"),
+    Column("law"),
+    Column("states"),
+    Column("error", words=".4g"),
+    Column("of"),
+    Column("greatest", words=".4g"),
+    Column("ms", "time [ms]", ".4g"),
+    Column("rhs", "calls of f"),
+)
 
 
 def hierarchy_text(hierarchy, target: float) -> Iterator:
     """Error and cost of each model of a hierarchy, and the cheapest model with an error of at most `target`."""
     known = [level for level in hierarchy.rungs if level.error is not None]
-    yield ResultTable(MODELS, [vars(level) | {"of": level.worst, "ms": 1e3 * level.seconds} for level in known])
+    yield ResultTable(
+        MODELS, [vars(level) | {"of": level.worst, "ms": 1e3 * level.seconds} for level in known]
+    )
     richest, cheapest = hierarchy.richest, hierarchy.cheapest
     yield (
         'error: root mean square over time of the worst probe (column "of"), over its range; '
@@ -188,38 +275,83 @@ def hierarchy_text(hierarchy, target: float) -> Iterator:
     )
     yield f"reference for both: {richest.name}, {richest.law}"
     for reason in dict.fromkeys(level.reason for level in hierarchy.rungs if level.error is None):
-        levels = [level for level in hierarchy.rungs if level.error is None and level.reason == reason]
+        levels = [
+            level for level in hierarchy.rungs if level.error is None and level.reason == reason
+        ]
         yield f"{', '.join(dict.fromkeys(f'{level.name} ({level.law})' for level in levels))}: {reason}"
     gain = richest.seconds / cheapest.seconds
     model = f"{cheapest.name}, {cheapest.law}, {cheapest.states} states"
-    yield f"cheapest within {target:g}: {model}, {gain:.3g} times faster than the most detailed model", "bold"
+    yield (
+        f"cheapest within {target:g}: {model}, {gain:.3g} times faster than the most detailed model",
+        "bold",
+    )
     yield from hierarchy.rules
 
 
 ORDER_COLUMNS = (
-    Column("cells"), Column("step", "step [s]", ".4g"),
-    *(column for norm in NORMS for column in (Column(norm, words=".4g"), Column(f"order {norm}", "order", ".2f"))),
-    Column("rhs"), Column("seconds", words=".4g"), Column("mark"),
-)  # fmt: skip
+    Column("cells"),
+    Column("step", "step [s]", ".4g"),
+    *(
+        column
+        for norm in NORMS
+        for column in (Column(norm, words=".4g"), Column(f"order {norm}", "order", ".2f"))
+    ),
+    Column("rhs"),
+    Column("seconds", words=".4g"),
+    Column("mark"),
+)
 
 
 @cli.command("order", order=180)
 def order(
-    case: cli.SingleCase, overrides: cli.Set = [],  # noqa: B006
-    refine: Annotated[str | None, Option(help="resolution to refine: both (cells and time steps), space or time "
-        "(default both, or time for a case without pipes and basins)")] = None,
-    key: Annotated[str | None, Option(metavar="KEY", help="single key to refine, for example links.main.cells or "
-        "numerics.step (default all keys that --refine selects)")] = None,
-    levels: Annotated[int | None, Option(help="number of refinement levels, 2 or more (default 4, or 6 if only time "
-        "is refined)")] = None,
-    cells: Annotated[int | None, Option(help="number of cells, at the coarsest level, of the pipe or basin side with "
-        "most cells, or of the part of --key (default as in the case, or fewer to shorten the study)")] = None,
-    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case)")] = None,
-    method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case)")] = None,
-    reference: Annotated[str, Option(help="reference solution: exact (named in the case), finer (a run at a finer "
-        "level), richardson (the next level) or auto (the first of these that suits the case)")] = "auto",
-    jobs: cli.Jobs = 1, dask: cli.Dask = None, out: cli.Out = None, as_json: cli.Json = False,
-) -> None:  # fmt: skip
+    case: cli.SingleCase,
+    overrides: cli.Set = [],  # noqa: B006
+    refine: Annotated[
+        str | None,
+        Option(
+            help="resolution to refine: both (cells and time steps), space or time "
+            "(default both, or time for a case without pipes and basins)"
+        ),
+    ] = None,
+    key: Annotated[
+        str | None,
+        Option(
+            metavar="KEY",
+            help="single key to refine, for example links.main.cells or "
+            "numerics.step (default all keys that --refine selects)",
+        ),
+    ] = None,
+    levels: Annotated[
+        int | None,
+        Option(
+            help="number of refinement levels, 2 or more (default 4, or 6 if only time is refined)"
+        ),
+    ] = None,
+    cells: Annotated[
+        int | None,
+        Option(
+            help="number of cells, at the coarsest level, of the pipe or basin side with "
+            "most cells, or of the part of --key (default as in the case, or fewer to shorten the study)"
+        ),
+    ] = None,
+    scheme: Annotated[
+        str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case)")
+    ] = None,
+    method: Annotated[
+        str | None, Option(metavar="A,B", help="methods to study (default method of the case)")
+    ] = None,
+    reference: Annotated[
+        str,
+        Option(
+            help="reference solution: exact (named in the case), finer (a run at a finer "
+            "level), richardson (the next level) or auto (the first of these that suits the case)"
+        ),
+    ] = "auto",
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
     """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.result_cache import ResultCache
@@ -228,18 +360,36 @@ def order(
     folder = cli.folder_of(loaded, "order", out)
     with progress_line() as progress, ResultCache(folder) as points:
         studies = study(
-            loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=cli.comma_list(scheme, "--scheme"),
-            methods=cli.method_names(method), reference=reference, out=points, progress=progress, jobs=jobs, dask=dask,
-        )  # fmt: skip
+            loaded,
+            refine=refine,
+            key=key,
+            levels=levels,
+            cells=cells,
+            schemes=cli.comma_list(scheme, "--scheme"),
+            methods=cli.method_names(method),
+            reference=reference,
+            out=points,
+            progress=progress,
+            jobs=jobs,
+            dask=dask,
+        )
     studies = studies if isinstance(studies, list) else [studies]
     cli.clear_files(folder, "order.csv", "order.png", "order-*.png")
     files = [ResultTable(ORDER_FILE, [*file_rows(studies)]).write(folder / "order.csv")]
     for result in studies:
-        files.append(folder / ("order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"))
+        files.append(
+            folder
+            / ("order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png")
+        )
         result.plot(files[-1])
-    facts = {"studies": [result.plain() for result in studies], "files": [str(file) for file in files]}
+    facts = {
+        "studies": [result.plain() for result in studies],
+        "files": [str(file) for file in files],
+    }
     text = [line for result in studies for line in study_text(result)]
-    present(as_json, facts | {"reused": points.reused}, [*text, f"files: {', '.join(facts['files'])}"])
+    present(
+        as_json, facts | {"reused": points.reused}, [*text, f"files: {', '.join(facts['files'])}"]
+    )
 
 
 def file_rows(studies) -> Iterator[dict]:
@@ -248,13 +398,28 @@ def file_rows(studies) -> Iterator[dict]:
         head = {"scheme": result.scheme, "method": result.method, "reference": result.kind}
         for variable, fits in result.fits.items():
             for norm in NORMS:
-                labels = {"variable": variable, "unit": variable_unit(variable, result.units), "norm": norm}
-                pairs = zip(result.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True)
+                labels = {
+                    "variable": variable,
+                    "unit": variable_unit(variable, result.units),
+                    "norm": norm,
+                }
+                pairs = zip(
+                    result.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True
+                )
                 for row, pairwise, mark in pairs:
-                    yield head | labels | vars(fits[norm]) | vars(row) | vars(row.level) | {
-                        "error": row.errors.get(variable, {}).get(norm), "pairwise": pairwise, "mark": mark,
-                        "updates": row.cell_updates,
-                    }  # fmt: skip
+                    yield (
+                        head
+                        | labels
+                        | vars(fits[norm])
+                        | vars(row)
+                        | vars(row.level)
+                        | {
+                            "error": row.errors.get(variable, {}).get(norm),
+                            "pairwise": pairwise,
+                            "mark": mark,
+                            "updates": row.cell_updates,
+                        }
+                    )
 
 
 def study_text(result) -> Iterator:
@@ -267,7 +432,9 @@ def study_text(result) -> Iterator:
         yield f"{variable} [{result.error_unit(variable)[1]}]{place}"
         yield rows_of(result, variable)
     yield ""
-    orders = [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
+    orders = [
+        [f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()
+    ]
     yield ResultTable.of("", ["fitted order of", "L1", "L2", "max"], orders)
     yield from dict.fromkeys([*reason_lines(result), *result.notes])
     yield ""
@@ -275,15 +442,26 @@ def study_text(result) -> Iterator:
 
 def rows_of(result, variable: str) -> ResultTable:
     """Table of a variable of an order study: errors and pairwise orders of all levels."""
-    fits, rows, size = result.fits[variable], [], result.error_unit(variable)[0]
+    fits = result.fits[variable]
+    rows = []
+    size = result.error_unit(variable)[0]
     for k, row in enumerate(result.rows):
         step = f"rtol {row.level.size:g}" if result.plan.measure == "rtol" else row.level.step
-        cells = {"cells": row.level.cells or None, "step": step, "rhs": row.rhs, "seconds": row.seconds}
+        cells = {
+            "cells": row.level.cells or None,
+            "step": step,
+            "rhs": row.rhs,
+            "seconds": row.seconds,
+        }
         cells |= {norm: size * error for norm, error in row.errors.get(variable, {}).items()}
         cells |= {f"order {norm}": fits[norm].pairwise[k - 1] if k else None for norm in NORMS}
         marks = {norm: fits[norm].marks[k] for norm in NORMS}
         same = len(set(marks.values())) == 1
-        mark_text = marks["L1"] if same else ", ".join(f"{text} ({norm})" for norm, text in marks.items() if text)
+        mark_text = (
+            marks["L1"]
+            if same
+            else ", ".join(f"{text} ({norm})" for norm, text in marks.items() if text)
+        )
         rows.append(plain(cells | {"mark": mark_text}))
     return ResultTable(ORDER_COLUMNS, rows)
 
@@ -304,6 +482,10 @@ def reason_lines(result):
                 notes.setdefault(fit.reason or fit.note, []).append(norm)
         for text, norms in notes.items():
             yield f"{name} ({', '.join(norms)}): {text}"
-    others = [fit.reason for name in result.variables[SHOWN_VARIABLES:] for fit in result.fits[name].values()]
+    others = [
+        fit.reason
+        for name in result.variables[SHOWN_VARIABLES:]
+        for fit in result.fits[name].values()
+    ]
     if any(reason and reason != NO_ERROR for reason in others):
         yield "of the other variables some have no order; --json gives the reasons"

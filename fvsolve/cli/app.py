@@ -21,8 +21,12 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Cases = Annotated[list[str], Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-SingleCase = Annotated[str, Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+Cases = Annotated[
+    list[str], Argument(metavar="CASE", help="a case file, or the name of a shipped case")
+]
+SingleCase = Annotated[
+    str, Argument(metavar="CASE", help="a case file, or the name of a shipped case")
+]
 RunDirectory = Annotated[Path, Argument(metavar="RUN", help="a run directory")]
 Set = Annotated[
     list[str],
@@ -32,10 +36,15 @@ Set = Annotated[
         help="new value of a key of the case, for example links.main.cells=400; repeat the option for more keys",
     ),
 ]
-Json = Annotated[bool, Option("--json", help="print one JSON object on standard output instead of text")]
+Json = Annotated[
+    bool, Option("--json", help="print one JSON object on standard output instead of text")
+]
 Out = Annotated[
     Path | None,
-    Option(metavar="DIR", help="folder of tables and pictures (default runs/NAME.COMMAND, such as runs/main.sweep)"),
+    Option(
+        metavar="DIR",
+        help="folder of tables and pictures (default runs/NAME.COMMAND, such as runs/main.sweep)",
+    ),
 ]
 Jobs = Annotated[int, Option(metavar="N", help="number of runs at a time, each in its own process")]
 Dask = Annotated[
@@ -54,11 +63,18 @@ AtTime = Annotated[
     ),
 ]
 BeforeJump = Annotated[
-    bool, Option("--left-limit", help="if a schedule has a kink or jump at the time --at, use its values just before")
+    bool,
+    Option(
+        "--left-limit",
+        help="if a schedule has a kink or jump at the time --at, use its values just before",
+    ),
 ]
 LinearScheme = Annotated[
     str | None,
-    Option(metavar="NAME", help="linear scheme, for example upwind5 (default scheme of the case, if it is linear)"),
+    Option(
+        metavar="NAME",
+        help="linear scheme, for example upwind5 (default scheme of the case, if it is linear)",
+    ),
 ]
 
 
@@ -72,9 +88,11 @@ def _version(requested: bool) -> None:
 
 @app.callback()
 def all_commands(
-    version: Annotated[bool, Option("--version", callback=_version, is_eager=True, help="print the version and "
-        "exit")] = False,
-) -> None:  # fmt: skip
+    version: Annotated[
+        bool,
+        Option("--version", callback=_version, is_eager=True, help="print the version and exit"),
+    ] = False,
+) -> None:
     """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
 
 
@@ -103,7 +121,9 @@ def add_command(found: Declaration) -> None:
     app.command(found.name)(function)
 
 
-def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
+def load_case(
+    name: str, overrides: list[str], scheme: str | None = None, method: str | None = None
+):
     """Read a case and apply the overrides. Raises CaseError with all faults of the case and of the overrides.
 
     Raises FvsolveError if there is neither a file nor a shipped case `name`.
@@ -146,7 +166,9 @@ def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
     for text in texts:
         key, equals, value = text.partition("=")
         if not (equals and key.strip()):
-            faults.append(Fault(text, "expected KEY=VALUE, for example links.main.cells=400", override=True))
+            faults.append(
+                Fault(text, "expected KEY=VALUE, for example links.main.cells=400", override=True)
+            )
         else:
             settings[key.strip()] = value_of(value)
     return settings, faults
@@ -185,7 +207,9 @@ def comma_list(text: str | None, option: str = "") -> list[str] | None:
         return None
     words = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
     if not words:
-        raise FvsolveError(f'{option} "{text}" is an empty list; expected names or numbers separated by commas')
+        raise FvsolveError(
+            f'{option} "{text}" is an empty list; expected names or numbers separated by commas'
+        )
     return words
 
 
@@ -214,7 +238,10 @@ def folder_of(case, study: str, out: Path | None) -> Path:
 def warn_replaced(folder: Path, name: str) -> None:
     """Print a notice that an earlier result will be replaced, if the folder contains the file `name`."""
     if (folder / name).exists():
-        print(f"{folder}: the results of an earlier command are replaced; to keep them, use --out DIR", file=sys.stderr)
+        print(
+            f"{folder}: the results of an earlier command are replaced; to keep them, use --out DIR",
+            file=sys.stderr,
+        )
 
 
 def clear_files(folder: Path, *patterns: str) -> Path:
@@ -232,5 +259,7 @@ def writable_folder(folder: Path) -> Path:
         text = f"{folder}: cannot be written: {error.strerror or error}"
         raise FvsolveError(f"{text}; use another directory with --out DIR") from None
     if not os.access(folder, os.W_OK):
-        raise FvsolveError(f"{folder}: cannot be written: permission denied; use another directory with --out DIR")
+        raise FvsolveError(
+            f"{folder}: cannot be written: permission denied; use another directory with --out DIR"
+        )
     return folder

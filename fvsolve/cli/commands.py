@@ -9,7 +9,16 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fvsolve.cli.app import Cases, Json, RunDirectory, Set, SingleCase, command, load_case, quantity_of
+from fvsolve.cli.app import (
+    Cases,
+    Json,
+    RunDirectory,
+    Set,
+    SingleCase,
+    command,
+    load_case,
+    quantity_of,
+)
 from fvsolve.cli.terminal import present, print_json, show
 from fvsolve.core.output.result_table import ResultTable
 from fvsolve.errors import FvsolveError, visible
@@ -18,22 +27,41 @@ from fvsolve.errors import FvsolveError, visible
 @command("run", order=10)
 def run(
     cases: Cases,
-    out: Annotated[Path | None, Option(metavar="DIR", help="run directory, or for several cases the folder of their "
-        "run directories DIR/NAME (default runs/NAME)")] = None,
+    out: Annotated[
+        Path | None,
+        Option(
+            metavar="DIR",
+            help="run directory, or for several cases the folder of their "
+            "run directories DIR/NAME (default runs/NAME)",
+        ),
+    ] = None,
     set: Set = [],  # noqa: B006
-    resume: Annotated[bool, Option("--resume", help="continue an interrupted run from its last checkpoint")] = False,
-    force: Annotated[bool, Option("--force", help="replace an earlier run in the run directory")] = False,
-    threads: Annotated[int, Option(metavar="N", help="number of threads that share the rows of basin cells")] = 1,
+    resume: Annotated[
+        bool, Option("--resume", help="continue an interrupted run from its last checkpoint")
+    ] = False,
+    force: Annotated[
+        bool, Option("--force", help="replace an earlier run in the run directory")
+    ] = False,
+    threads: Annotated[
+        int, Option(metavar="N", help="number of threads that share the rows of basin cells")
+    ] = 1,
     no_pictures: Annotated[bool, Option("--no-pictures", help="write no pictures")] = False,
-    estimate_error: Annotated[bool, Option("--estimate-error", help="estimate the errors of peaks, from further runs "
-        "at half, one and twice the resolution")] = False,
+    estimate_error: Annotated[
+        bool,
+        Option(
+            "--estimate-error",
+            help="estimate the errors of peaks, from further runs "
+            "at half, one and twice the resolution",
+        ),
+    ] = False,
     as_json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Solve cases and write their run directories."""
     from fvsolve.report.draw.plot_process import PlotProcess
 
     results = []
-    with PlotProcess(second_process=not no_pictures) as painter:  # its process starts before other modules are imported
+    # its process starts before other modules are imported
+    with PlotProcess(second_process=not no_pictures) as painter:
         from fvsolve.cli import printing
         from fvsolve.core.run import model_of, mpi_run
 
@@ -51,7 +79,16 @@ def run(
             with mpi_run.rank_zero_first(mpi_run.world()):
                 model = model_of(load_case(name, set))
             results.append(
-                _run(model, place, force, resume, threads, None if no_pictures else painter, as_json, estimate_error)
+                _run(
+                    model,
+                    place,
+                    force,
+                    resume,
+                    threads,
+                    None if no_pictures else painter,
+                    as_json,
+                    estimate_error,
+                )
             )
             if results[-1].reason.startswith("interrupted"):
                 break
@@ -61,7 +98,9 @@ def run(
     sys.exit(max(printing.exit_code(result) for result in results))
 
 
-def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
+def _run(
+    model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool
+):
     """Solve a case, print its results, draw them, and return its `Result`.
 
     place : run directory; painter : `PlotProcess`, or None for no pictures; quiet : True to print no results
@@ -81,7 +120,11 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
             from fvsolve.studies.peak_error import peak_errors
 
             name = model.case.name
-            peak_errors(result, model.case, lambda text: print(f"{name} again: {text}", file=sys.stderr, flush=True))
+            peak_errors(
+                result,
+                model.case,
+                lambda text: print(f"{name} again: {text}", file=sys.stderr, flush=True),
+            )
             write_summary(result.directory / "summary.json", result.summary)
         if not quiet:
             show(printing.result_text(result))
@@ -95,10 +138,11 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
 
 @command("check", order=20)
 def check(
-    case: SingleCase, set: Set = [],  # noqa: B006
+    case: SingleCase,
+    set: Set = [],  # noqa: B006
     every: Annotated[bool, Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Print the contents of a case as read, its initial state and its expected cost."""
     from fvsolve.cli import printing
     from fvsolve.core.run import model_of
@@ -124,7 +168,9 @@ def list_cases(as_json: Json = False) -> None:
 @command("new", order=40)
 def new(
     name: Annotated[str, Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
-    file: Annotated[Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
+    file: Annotated[
+        Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")
+    ] = None,
 ) -> None:
     """Copy a shipped case and the files it uses."""
     from fvsolve.case import load, shipped
@@ -144,8 +190,12 @@ def schema() -> None:
 
 @command("compare", order=70)
 def compare(
-    run_a: Annotated[Path, Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")],
-    run_b: Annotated[Path, Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")],
+    run_a: Annotated[
+        Path, Argument(metavar="RUN_A", help="run directory, as written by fvsolve run --out")
+    ],
+    run_b: Annotated[
+        Path, Argument(metavar="RUN_B", help="run directory that is compared with RUN_A")
+    ],
     as_json: Json = False,
 ) -> None:
     """Compare two runs: greatest and rms difference (RUN_B minus RUN_A) of each common probe."""
@@ -161,17 +211,39 @@ def compare(
 @command("view", order=80)
 def view(
     directory: RunDirectory,
-    time: Annotated[str | None, Option(metavar="T", help='time whose nearest frame is drawn: seconds, or "20 ms" '
-        "(default the last frame)")] = None,
-    field: Annotated[str | None, Option(help="quantity to draw, such as pressure, head, flow, velocity or depth "
-        "(default pressure, or for a case without pipes the first field of its basins or the speed of its "
-        "bodies)")] = None,
-    contours: Annotated[int, Option(metavar="N", min=0, max=100, help="number of contour lines on the surfaces of "
-        "basins")] = 0,
-    animate: Annotated[Path | None, Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")] = None,
-    out: Annotated[Path | None, Option(metavar="FILE", help="picture file, or a page .html in which the scene can be "
-        "turned (default RUN/view-FIELD.png, with the name of the field)")] = None,
-) -> None:  # fmt: skip
+    time: Annotated[
+        str | None,
+        Option(
+            metavar="T",
+            help='time whose nearest frame is drawn: seconds, or "20 ms" (default the last frame)',
+        ),
+    ] = None,
+    field: Annotated[
+        str | None,
+        Option(
+            help="quantity to draw, such as pressure, head, flow, velocity or depth "
+            "(default pressure, or for a case without pipes the first field of its basins or the speed of its "
+            "bodies)"
+        ),
+    ] = None,
+    contours: Annotated[
+        int,
+        Option(
+            metavar="N", min=0, max=100, help="number of contour lines on the surfaces of basins"
+        ),
+    ] = 0,
+    animate: Annotated[
+        Path | None, Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE",
+            help="picture file, or a page .html in which the scene can be "
+            "turned (default RUN/view-FIELD.png, with the name of the field)",
+        ),
+    ] = None,
+) -> None:
     """Draw a quantity in all parts at one time, or an animation of all stored times, into a file."""
     from fvsolve.core.run import open_run
 
@@ -179,7 +251,11 @@ def view(
     if animate is not None and not time is out is None:
         raise FvsolveError("--animate draws all times into its own file; remove --time and --out")
     run = open_run(directory)
-    print(run.view(when, field, out, contours) if animate is None else run.animate(animate, field, contours))
+    print(
+        run.view(when, field, out, contours)
+        if animate is None
+        else run.animate(animate, field, contours)
+    )
 
 
 def _places(cases: list[str], out: Path | None) -> dict[str, Path]:

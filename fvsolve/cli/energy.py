@@ -22,48 +22,89 @@ LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has
 RESTARTS = "the same command starts from the beginning"
 FILES = ("energy.csv", "energy.png", "energy.svg")
 SCHEME = (
-    Column("scheme"), Column("passive", "never grows"), Column("rate", "rate [per cell time]", ".4g"),
+    Column("scheme"),
+    Column("passive", "never grows"),
+    Column("rate", "rate [per cell time]", ".4g"),
     Column("gain", "greatest gain", ".4g"),
-)  # fmt: skip
+)
 
 
 def _limit(key: str) -> Callable[[Mapping], str]:
     """Function that formats the greatest passive step in column `key`: "any", "none" or a number."""
-    return lambda row: "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
+    return lambda row: (
+        "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
+    )
 
 
 METHOD = (
-    Column("method"), Column("any_network", "any network"),
-    Column("chamber", "driven chamber",
-           lambda row: "-" if row["chamber"] is None else "keeps" if row["chamber"] >= 0.0 else "creates"),
-    Column("leak", "leak: h/tau", _limit("leak")), Column("resonator", "resonator: h w", _limit("resonator")),
-)  # fmt: skip
+    Column("method"),
+    Column("any_network", "any network"),
+    Column(
+        "chamber",
+        "driven chamber",
+        lambda row: (
+            "-" if row["chamber"] is None else "keeps" if row["chamber"] >= 0.0 else "creates"
+        ),
+    ),
+    Column("leak", "leak: h/tau", _limit("leak")),
+    Column("resonator", "resonator: h w", _limit("resonator")),
+)
 
 
 @cli.command("energy", order=100)
 def energy(
-    case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case to run (default none: list "
-        "the passivity of schemes and methods)")] = None,
-    port: Annotated[str | None, Option(metavar="NODE", help="node at which the passivity of the network is checked: "
-        "a reservoir, inflow or junction (default none)")] = None,
-    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case, or "
-        "without a case all schemes)")] = None,
-    method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case, or "
-        "without a case all methods)")] = None,
-    out: cli.Out = None, set: cli.Set = [],  # noqa: B006
+    case: Annotated[
+        str | None,
+        Argument(
+            metavar="CASE",
+            help="case file or shipped case to run (default none: list "
+            "the passivity of schemes and methods)",
+        ),
+    ] = None,
+    port: Annotated[
+        str | None,
+        Option(
+            metavar="NODE",
+            help="node at which the passivity of the network is checked: "
+            "a reservoir, inflow or junction (default none)",
+        ),
+    ] = None,
+    scheme: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="schemes to study (default scheme of the case, or without a case all schemes)",
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="methods to study (default method of the case, or without a case all methods)",
+        ),
+    ] = None,
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
     schemes, methods = cli.comma_list(scheme, "--scheme"), cli.method_names(method)
     if case is None:
         from fvsolve.studies.passivity import passivity
 
-        needs_case = [name for name, value in (("--port", port), ("--out", out), ("--set", set)) if value]
+        needs_case = [
+            name for name, value in (("--port", port), ("--out", out), ("--set", set)) if value
+        ]
         if needs_case:
-            raise FvsolveError(f"{', '.join(needs_case)}: valid only with a case; expected fvsolve energy CASE "
-                               f"{needs_case[0]} ...; without a case the passivity of schemes and methods is listed, "
-                               "without files")  # fmt: skip
-        with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
+            raise FvsolveError(
+                f"{', '.join(needs_case)}: valid only with a case; expected fvsolve energy CASE "
+                f"{needs_case[0]} ...; without a case the passivity of schemes and methods is listed, "
+                "without files"
+            )
+        with (
+            progress_line() as progress,
+            interrupt_message(f"interrupted: no results are saved; {RESTARTS}"),
+        ):
             result = passivity(schemes, methods, progress)
         present(as_json, result.plain(), passivity_text(result))
     elif schemes or methods:
@@ -85,15 +126,29 @@ def ledger(case, port, out, as_json: bool) -> None:
 
     folder = cli.folder_of(case, "energy", out)
     cli.warn_replaced(folder, FILES[0])
-    with interrupt_message(f"interrupted: no ledger is written, {folder} may lack files; {RESTARTS}"):
+    with interrupt_message(
+        f"interrupted: no ledger is written, {folder} may lack files; {RESTARTS}"
+    ):
         with run_progress(case) as progress:
             result = study(case, port=port, progress=progress)
         write_table(result, cli.clear_files(folder, *FILES) / FILES[0])
-        at_port = None if result.port is None else (result.port.node, result.port.course, result.port.bound)
+        at_port = (
+            None
+            if result.port is None
+            else (result.port.node, result.port.course, result.port.bound)
+        )
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
-        figure = energy_figure(clock.from_si(result.t), result.supplied, result.stored, result.dissipated,
-                               result.numerical(), case.title or case.name, at_port, units)  # fmt: skip
+        figure = energy_figure(
+            clock.from_si(result.t),
+            result.supplied,
+            result.stored,
+            result.dissipated,
+            result.numerical(),
+            case.title or case.name,
+            at_port,
+            units,
+        )
         for name in FILES[1:]:
             save(figure, folder / name)
     facts = result.plain() | {"directory": str(folder), "files": list(FILES)}
@@ -118,7 +173,9 @@ def ledger_text(result, case, folder) -> Iterator:
         if len(order) > LINES:
             rest = sum(lines[name][-1] for name in order[LINES:])
             rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
-    rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
+    rows += [
+        ["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()
+    ]
     yield ResultTable.of("", ["kind", "part", joules.header, "share [%]"], rows)
     if result.energy_use:
         from fvsolve.cli.printing import energy_use_text
@@ -136,7 +193,11 @@ def ledger_text(result, case, folder) -> Iterator:
     for mark in result.marks:
         yield mark, "yellow"
     cut = result.reason == "interrupted"
-    ended = f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}" if result.ok or cut else result.reason
+    ended = (
+        f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}"
+        if result.ok or cut
+        else result.reason
+    )
     yield (
         f"{ended}; {result.steps} steps{f': the ledger ends at this time, {RESTARTS}' if cut else ''}",
         None if result.ok else "bold red",
@@ -157,8 +218,16 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     with progress_line() as progress, run_progress() as watch, ResultCache(folder) as points:
         rows = measure_pairs(case, schemes, methods, port, progress, points, watch)
     ResultTable(PAIR_COLUMNS, rows).write(folder / "pairs.csv")
-    heads = [_in_unit(column, case) for column in PAIR_COLUMNS if port or column.key not in ("relative", "margin")]
-    text = [ResultTable(heads, rows), *_outcome_text(case, rows), f"{folder}: pairs.csv, points.jsonl"]
+    heads = [
+        _in_unit(column, case)
+        for column in PAIR_COLUMNS
+        if port or column.key not in ("relative", "margin")
+    ]
+    text = [
+        ResultTable(heads, rows),
+        *_outcome_text(case, rows),
+        f"{folder}: pairs.csv, points.jsonl",
+    ]
     facts = {"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]}
     present(as_json, facts, text, code=2 if all(row["creates"] is None for row in rows) else 0)
 
@@ -172,7 +241,9 @@ def _in_unit(heading: Column, case) -> Column:
     own = column(heading.head.removesuffix(" [J]"), "energy", case)
 
     def words(row: Mapping) -> str:
-        return cell_text(None if row[heading.key] is None else own.from_si(row[heading.key]), heading.words)
+        return cell_text(
+            None if row[heading.key] is None else own.from_si(row[heading.key]), heading.words
+        )
 
     return replace(heading, head=own.header, words=words)
 
@@ -186,7 +257,9 @@ def _outcome_text(case, rows) -> Iterator:
             yield f"{_pair(row)}: {row['reason']}", "yellow"
     groups: dict[str, list] = {}  # a reason that is the same for several methods appears once
     for row in refused:
-        groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)
+        groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(
+            row
+        )
     for reason, rows_of_reason in groups.items():
         text = reason if len(rows_of_reason) > 1 else rows_of_reason[0]["reason"]
         yield f"{', '.join(map(_pair, rows_of_reason))}: {text}", "bold red"
@@ -226,13 +299,17 @@ def passivity_text(result) -> Iterator:
     )
     good = [entry.scheme for entry in known if entry.passive]
     limit = {(entry.scheme, entry.method): entry.courant for entry in result.pairs}
-    rows = [vars(entry) | {name: limit[name, entry.method] for name in good} for entry in result.methods]
+    rows = [
+        vars(entry) | {name: limit[name, entry.method] for name in good} for entry in result.methods
+    ]
     yield ResultTable([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows)
     bad = [entry.scheme for entry in known if not entry.passive]
     if bad:
         yield f"schemes that create energy at pipe ends with every method, up to the gain above: {', '.join(bad)}"
     never = [
-        f"{entry.scheme} with {entry.method}" for entry in result.pairs if entry.courant == 0.0 and entry.scheme in good
+        f"{entry.scheme} with {entry.method}"
+        for entry in result.pairs
+        if entry.courant == 0.0 and entry.scheme in good
     ]
     if never:
         yield f"pairs that create energy at every step size: {', '.join(never)}"

@@ -16,24 +16,63 @@ from fvsolve.errors import FvsolveError
 @cli.command("failure-map", order=110)
 def failure_map(
     case: cli.SingleCase,
-    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes, one panel for each (default upwind and the "
-        "scheme of the case, or the latter alone for a stiff case or a case without cells)")] = None,
-    method: Annotated[str | None, Option(metavar="A,B", help="methods, one row for each (default euler, ssp-rk3, rk4 "
-        "and four implicit methods)")] = None,
-    courant: Annotated[str | None, Option(metavar="A,B", help="Courant numbers, one column for each, or a single one "
-        "with --key (default 0.25 to 3, or ten time steps for a stiff case or a case without cells)")] = None,
-    step: Annotated[str | None, Option(metavar="A,B", help='time steps instead of Courant numbers, for example "1 '
-        'ms,2 ms", one column for each, or a single step with --key')] = None,
-    key: Annotated[str | None, Option(metavar="KEY=A,B", help="key of the case and its values, one column for each, "
-        "instead of columns of time steps or Courant numbers")] = None,
-    tolerance: Annotated[float, Option(metavar="X", help="greatest accepted error of a probe: mean over the run, as "
-        "a fraction of the probe's range")] = 0.02,
-    jobs: cli.Jobs = 1, dask: cli.Dask = None,
-    out: Annotated[Path | None, Option(metavar="DIR", help="folder of the table and pictures (default "
-        "runs/NAME.map)")] = None,
+    scheme: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="schemes, one panel for each (default upwind and the "
+            "scheme of the case, or the latter alone for a stiff case or a case without cells)",
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="methods, one row for each (default euler, ssp-rk3, rk4 "
+            "and four implicit methods)",
+        ),
+    ] = None,
+    courant: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="Courant numbers, one column for each, or a single one "
+            "with --key (default 0.25 to 3, or ten time steps for a stiff case or a case without cells)",
+        ),
+    ] = None,
+    step: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help='time steps instead of Courant numbers, for example "1 '
+            'ms,2 ms", one column for each, or a single step with --key',
+        ),
+    ] = None,
+    key: Annotated[
+        str | None,
+        Option(
+            metavar="KEY=A,B",
+            help="key of the case and its values, one column for each, "
+            "instead of columns of time steps or Courant numbers",
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float,
+        Option(
+            metavar="X",
+            help="greatest accepted error of a probe: mean over the run, as "
+            "a fraction of the probe's range",
+        ),
+    ] = 0.02,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    out: Annotated[
+        Path | None,
+        Option(metavar="DIR", help="folder of the table and pictures (default runs/NAME.map)"),
+    ] = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Map failures of methods over time steps or values of a key. Each run is stable, ringing, wrong, blown up, ..."""
     from fvsolve.studies.failure_map import failure_map as study
     from fvsolve.studies.result_cache import ResultCache
@@ -41,15 +80,36 @@ def failure_map(
 
     read_case = cli.load_case(case, set, scheme, method)
     folder = cli.folder_of(read_case, "map", out)
-    steps = None if step is None else [cli.quantity_of(word, "time", f"--step {step}") for word in cli.comma_list(step)]
+    steps = (
+        None
+        if step is None
+        else [cli.quantity_of(word, "time", f"--step {step}") for word in cli.comma_list(step)]
+    )
     with progress_line() as progress, ResultCache(folder) as points:
         result = study(
-            read_case, cli.comma_list(scheme, "--scheme"), cli.method_names(method), _numbers("--courant", courant),
-            steps, _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
-        )  # fmt: skip
-    head = result.key if result.key == "step" else key_with_unit(read_case.raw, result.key, result.values)
+            read_case,
+            cli.comma_list(scheme, "--scheme"),
+            cli.method_names(method),
+            _numbers("--courant", courant),
+            steps,
+            _key(key),
+            tolerance,
+            points,
+            progress,
+            jobs=jobs,
+            dask=dask,
+        )
+    head = (
+        result.key
+        if result.key == "step"
+        else key_with_unit(read_case.raw, result.key, result.values)
+    )
     files = _write_files(result, folder, head)
-    present(as_json, result.plain() | {"files": [str(file) for file in files]}, map_text(result, files, head))
+    present(
+        as_json,
+        result.plain() | {"files": [str(file) for file in files]},
+        map_text(result, files, head),
+    )
 
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
@@ -66,7 +126,9 @@ def _key(text: str | None) -> tuple[str, list] | None:
         return None
     name, equals, values = text.partition("=")
     if not equals or not name.strip():
-        raise FvsolveError(f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
+        raise FvsolveError(
+            f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5"
+        )
     return name.strip(), [cli.value_of(word) for word in cli.comma_list(values)]
 
 
@@ -94,12 +156,17 @@ def map_text(result, files: list[Path], head: str) -> Iterator:
         yield f"{scheme}, {heading}:" if result.wave_rate else f"{heading}:", "bold"
         heads = [
             "method",
-            *(label.split("\n")[-1 if _by_courant(result) else 0] for label in column_labels(result)),
+            *(
+                label.split("\n")[-1 if _by_courant(result) else 0]
+                for label in column_labels(result)
+            ),
             "predicted",
         ]
         squares = {method: result.row(scheme, method) for method in result.methods}
-        rows = [[method, *(square.verdict for square in row), _limit_text(result, row)]
-                for method, row in squares.items()]  # fmt: skip
+        rows = [
+            [method, *(square.verdict for square in row), _limit_text(result, row)]
+            for method, row in squares.items()
+        ]
         yield ResultTable.of("", heads, rows)
         yield ""
     present = {square.verdict: None for square in result.squares}
@@ -122,7 +189,9 @@ def map_text(result, files: list[Path], head: str) -> Iterator:
             f"predicted limits of {', '.join(result.limited)}: estimates with the weights of the scheme in smooth "
             "flow, not bounds"
         )
-    for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
+    for reason in {
+        square.measures.reason: None for square in result.squares if square.verdict == "refused"
+    }:
         yield f"refused: {reason}"
     yield from map(str, files)
 
@@ -132,7 +201,11 @@ def _by_courant(result) -> bool:
 
     They do if the columns are time steps that all have a Courant number of 0.01 or more.
     """
-    return result.key == "step" and bool(result.wave_rate) and min(result.values) * result.wave_rate >= 0.01
+    return (
+        result.key == "step"
+        and bool(result.wave_rate)
+        and min(result.values) * result.wave_rate >= 0.01
+    )
 
 
 def _limit_text(result, row) -> str:

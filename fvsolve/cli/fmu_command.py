@@ -13,10 +13,12 @@ from fvsolve.core.output.result_table import ResultTable
 @command("fmu", order=120)
 def fmu(
     case: SingleCase,
-    out: Annotated[Path | None, Option(metavar="FILE", help="file of the FMU (default NAME.fmu in the current "
-        "folder)")] = None,
+    out: Annotated[
+        Path | None,
+        Option(metavar="FILE", help="file of the FMU (default NAME.fmu in the current folder)"),
+    ] = None,
     set: Set = [],  # noqa: B006
-) -> None:  # fmt: skip
+) -> None:
     """Export a case as an FMU (FMI 2.0, co-simulation): schedules and setpoints as inputs, probes as outputs."""
     from fvsolve.exchange.fmi.export import write_fmu
 

@@ -20,10 +20,11 @@ PICTURES = ("bode", "nyquist", "step", "locus")
 def loop(
     case: cli.SingleCase,
     name: Annotated[str, Argument(metavar="NAME", help="control at whose output the loop is cut")],
-    at: cli.AtTime = None, out: cli.Out = None,
+    at: cli.AtTime = None,
+    out: cli.Out = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Study the loop of a control: margins, stability, range of the gain, poles, and pictures."""
     from fvsolve.studies.loops.loop import loop as ask
 
@@ -35,7 +36,13 @@ def loop(
     cli.warn_replaced(folder, f"{stem}.csv")
     h = result.ratio
     with np.errstate(divide="ignore"):
-        table = [result.frequency, h.real, h.imag, 20.0 * np.log10(np.abs(h)), np.degrees(np.unwrap(np.angle(h)))]
+        table = [
+            result.frequency,
+            h.real,
+            h.imag,
+            20.0 * np.log10(np.abs(h)),
+            np.degrees(np.unwrap(np.angle(h))),
+        ]
     header = ["w [rad/s]", "real", "imaginary", "magnitude [dB]", "phase [deg]"]
     write_csv(folder / f"{stem}.csv", header, np.column_stack(table).tolist())
     draw(result, folder, stem)
@@ -44,7 +51,12 @@ def loop(
 
 def draw(result, folder: Path, stem: str) -> None:
     """Write the pictures of a loop, STEM.bode.png and so on."""
-    from fvsolve.report.draw.loop_pictures import bode_figure, locus_figure, nyquist_figure, step_figure
+    from fvsolve.report.draw.loop_pictures import (
+        bode_figure,
+        locus_figure,
+        nyquist_figure,
+        step_figure,
+    )
     from fvsolve.studies.loops.loop import locus, step_response
 
     title = f"{result.case} at {result.when}: loop of {result.control}"
@@ -52,7 +64,11 @@ def draw(result, folder: Path, stem: str) -> None:
     figures = {"locus": locus_figure(result, *locus(result), title)}
     if result.frequency.size:
         step = step_figure(*step_response(result), result.period is not None, title)
-        figures |= {"bode": bode_figure(result, title), "nyquist": nyquist_figure(result, title), "step": step}
+        figures |= {
+            "bode": bode_figure(result, title),
+            "nyquist": nyquist_figure(result, title),
+            "step": step,
+        }
     for kind, figure in figures.items():
         save(figure, folder / f"{stem}.{kind}.png")
 
@@ -63,13 +79,19 @@ def loop_text(result, folder: Path, stem: str) -> Iterator:
     yield f"{result.case} at {result.when}: loop of controls.{result.control}"
     if result.moving > 1e-9:
         yield "  not a steady state; schedules are held at their values of that time"
-    words = {True: "stable", False: "not stable", None: "undecided, poles are too close to the imaginary axis"}
+    words = {
+        True: "stable",
+        False: "not stable",
+        None: "undecided, poles are too close to the imaginary axis",
+    }
     yield f"closed loop: {words[result.stable]}", "bold"
     if result.delays:
         yield f"  delays: {', '.join(f'{delay:.4g} s' for delay in result.delays)}, exact"
     if result.period is not None:
         yield f"  sampled with a period of {result.period:.6g} s; poles are those of its map, stable below size 1"
-    yield ResultTable(columns(margin="margin", value="value", at="at [rad/s]"), list(margin_rows(margins)))
+    yield ResultTable(
+        columns(margin="margin", value="value", at="at [rad/s]"), list(margin_rows(margins))
+    )
     low, high = (None if end is None else f"{end:.6g}" for end in result.gain_range)
     if low is None and high is None:
         yield "stable with any gain" if result.stable else "not stable with any gain"
@@ -77,9 +99,13 @@ def loop_text(result, folder: Path, stem: str) -> Iterator:
         ends = [f"above {low}"] * (low is not None) + [f"below {high}"] * (high is not None)
         yield f"stable with factors on the gain {' and '.join(ends)}"
     rows = [
-        {"pole": f"{s.real:.6g} {s.imag:+.6g}j" if s.imag else f"{s.real:.6g}"} for s in result.poles if s.imag >= 0
+        {"pole": f"{s.real:.6g} {s.imag:+.6g}j" if s.imag else f"{s.real:.6g}"}
+        for s in result.poles
+        if s.imag >= 0
     ]
-    yield ResultTable(columns(pole="pole" if result.period is not None else "pole [1/s]"), rows[:POLES_SHOWN])
+    yield ResultTable(
+        columns(pole="pole" if result.period is not None else "pole [1/s]"), rows[:POLES_SHOWN]
+    )
     if not result.frequency.size:
         yield "no return ratio: the control does not act once in the common period of all samples"
     kinds = PICTURES if result.frequency.size else ("locus",)
@@ -95,8 +121,11 @@ def margin_rows(margins) -> Iterator[dict]:
     yield {"margin": "phase", "value": phase, "at": number(margins.gain_crossover)}
     delay = None if margins.delay_margin is None else f"{margins.delay_margin:.6g} s"
     yield {"margin": "delay", "value": delay, "at": None}
-    yield {"margin": "least |1 + L|", "value": number(margins.stability_margin),
-           "at": number(margins.stability_crossover)}  # fmt: skip
+    yield {
+        "margin": "least |1 + L|",
+        "value": number(margins.stability_margin),
+        "at": number(margins.stability_crossover),
+    }
 
 
 def number(value: float | None) -> str | None:

@@ -35,25 +35,54 @@ def single_method(name: str, out: Path | None) -> tuple[dict, Iterator]:
     facts = analyse(method)
     path = out or Path(f"{name}.png")
     if path.suffix.lower() not in PICTURES:
-        raise FvsolveError(f"{path}: unknown type of picture; expected a name that ends in {' or '.join(PICTURES)}")
+        raise FvsolveError(
+            f"{path}: unknown type of picture; expected a name that ends in {' or '.join(PICTURES)}"
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     save(region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1"), path)
-    array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
+    array = {
+        "a": method.a,
+        "b": method.b,
+        "c": method.c,
+        "error": method.error,
+        "start_error": method.start_error,
+    }
     return facts.plain() | array | {"picture": str(path)}, _method_text(method, facts, path)
 
 
 def _table_text(all_facts: dict[str, Facts]) -> Iterator:
     first = {name: facts for name, facts in all_facts.items() if name == facts.name}
-    heads = ["method", "order", "error", "stage", "stages", "kind", "A", "L", "real", "imaginary", "SSP", "Padé"]
+    heads = [
+        "method",
+        "order",
+        "error",
+        "stage",
+        "stages",
+        "kind",
+        "A",
+        "L",
+        "real",
+        "imaginary",
+        "SSP",
+        "Padé",
+    ]
     rows = [
         [
-            name, str(facts.order), str(facts.error_order) if facts.adaptive else "-", str(facts.stage_order),
-            str(facts.stages), facts.kind, _yes(facts.a_stable), _yes(facts.l_stable), _length(facts.real_interval),
-            _length(facts.imaginary_interval), _length(facts.ssp_radius),
+            name,
+            str(facts.order),
+            str(facts.error_order) if facts.adaptive else "-",
+            str(facts.stage_order),
+            str(facts.stages),
+            facts.kind,
+            _yes(facts.a_stable),
+            _yes(facts.l_stable),
+            _length(facts.real_interval),
+            _length(facts.imaginary_interval),
+            _length(facts.ssp_radius),
             f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-",
         ]
         for name, facts in first.items()
-    ]  # fmt: skip
+    ]
     yield ResultTable.of("", heads, rows)
     yield ""
     for name, facts in all_facts.items():
@@ -83,11 +112,15 @@ def _method_text(method: Method, facts: Facts, path: Path) -> Iterator:
 
 
 def _sentences(method: Method, facts: Facts) -> list[str]:
-    estimate = f"error estimate of order {facts.error_order}" if facts.adaptive else "no error estimate"
+    estimate = (
+        f"error estimate of order {facts.error_order}" if facts.adaptive else "no error estimate"
+    )
     kind = [f"{facts.stages} stages", facts.kind]
     kind += ["stiffly accurate"] if facts.stiffly_accurate else []
     kind += ["first rate same as last"] if facts.first_same_as_last else []
-    sector = "no sector" if facts.angle is None else f"A(alpha) with alpha = {facts.angle:.8g} degrees"
+    sector = (
+        "no sector" if facts.angle is None else f"A(alpha) with alpha = {facts.angle:.8g} degrees"
+    )
     sentences = [
         f"order {facts.order}, {estimate}; stage order {facts.stage_order}",
         ", ".join(kind),
@@ -98,7 +131,9 @@ def _sentences(method: Method, facts: Facts) -> list[str]:
         f"R(s) - e^s = {facts.error_constant:.6g} s^{facts.stability_function.error_constant[0] + 1} + ...",
     ]
     if facts.pade:
-        sentences.append(f"R is the Padé approximation of e^s of degrees {facts.pade[0]} over {facts.pade[1]}")
+        sentences.append(
+            f"R is the Padé approximation of e^s of degrees {facts.pade[0]} over {facts.pade[1]}"
+        )
     if facts.rounded_order:
         sentences.append(rounding_text(method.text, facts.rounded_order))
     if facts.digits:
@@ -107,7 +142,13 @@ def _sentences(method: Method, facts: Facts) -> list[str]:
 
 
 def _interval_text(value: float, before: str, after: str) -> str:
-    return "everywhere" if math.isinf(value) else "nowhere" if value == 0 else f"to {before}{value:.13g}{after}"
+    return (
+        "everywhere"
+        if math.isinf(value)
+        else "nowhere"
+        if value == 0
+        else f"to {before}{value:.13g}{after}"
+    )
 
 
 def _tableau_lines(method: Method) -> list[str]:
@@ -123,8 +164,14 @@ def _tableau_lines(method: Method) -> list[str]:
     wide = [max(len(row[i]) for row in rows if row) for i in range(width + 1)]
     lines = []
     for row in rows:
-        cells = [x.ljust(w) for x, w in zip(row, wide, strict=True)] if row else ["-" * w for w in wide]
-        lines.append(f"{cells[0]} | {'  '.join(cells[1:])}".rstrip() if row else f"{cells[0]}-+-{'--'.join(cells[1:])}")
+        cells = (
+            [x.ljust(w) for x, w in zip(row, wide, strict=True)] if row else ["-" * w for w in wide]
+        )
+        lines.append(
+            f"{cells[0]} | {'  '.join(cells[1:])}".rstrip()
+            if row
+            else f"{cells[0]}-+-{'--'.join(cells[1:])}"
+        )
     return lines
 
 
@@ -140,7 +187,9 @@ def _polynomial(p: Polynomial) -> str:
         elif re.search(r".[-+]", size):
             size = f"({size})"
         size = "" if size == "1" and power else size
-        terms.append((" - " if sign(x) < 0 else " + ") + " ".join(word for word in (size, power) if word))
+        terms.append(
+            (" - " if sign(x) < 0 else " + ") + " ".join(word for word in (size, power) if word)
+        )
     text = "".join(terms)
     return text[3:] if text.startswith(" + ") else text.strip()
 
@@ -155,16 +204,28 @@ def _length(value: float, digits: int = 6) -> str:
 
 @command("methods", order=60)
 def methods(
-    name: Annotated[str | None, Argument(metavar="NAME", help="name of a method, or file of its tableau (default all "
-        "methods)")] = None,
-    out: Annotated[Path | None, Option(metavar="FILE", help="picture file of the stability region of NAME: .png, "
-        ".svg or .pdf (default NAME.png)")] = None,
+    name: Annotated[
+        str | None,
+        Argument(
+            metavar="NAME", help="name of a method, or file of its tableau (default all methods)"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE",
+            help="picture file of the stability region of NAME: .png, "
+            ".svg or .pdf (default NAME.png)",
+        ),
+    ] = None,
     as_json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """List Runge-Kutta methods: order, stability, cost. With NAME show its tableau, R(s) and stability region."""
     if name is None and out is not None:
         raise FvsolveError("--out is valid for a single method only; add the NAME of the method")
     if name is not None:
         return present(as_json, *single_method(name, out))
     all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    present(as_json, {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts))
+    present(
+        as_json, {name: facts.plain() for name, facts in all_facts.items()}, _table_text(all_facts)
+    )

@@ -16,35 +16,59 @@ from fvsolve.errors import listing
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all
-MANY_ROWS = 40  # greatest number of rows of a table of `check`; of longer tables only notable rows are printed
+# greatest number of rows of a table of `check`; of longer tables only notable rows are printed
+MANY_ROWS = 40
 FLUID = {
-    "density": "density", "bulk_modulus": "modulus", "sound_speed": "velocity", "viscosity": "viscosity",
+    "density": "density",
+    "bulk_modulus": "modulus",
+    "sound_speed": "velocity",
+    "viscosity": "viscosity",
     "vapor_pressure": "pressure",
-}  # fmt: skip
-NODE = {"elevation": ("elevation", "head"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
+}
+NODE = {
+    "elevation": ("elevation", "head"),
+    "pressure": ("pressure", "pressure"),
+    "head": ("head", "head"),
+}
 MASS = {
-    "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
-}  # fmt: skip
+    "position": ("position", "position"),
+    "velocity": ("velocity", "velocity"),
+    "force": ("net force", "force"),
+}
 BODY = {
-    **{key: (key, "position") for key in "xyz"}, **{key: (key, "angle") for key in ("roll", "pitch", "yaw")},
-    "speed": ("speed", "velocity"), "spin": ("spin", "angular_velocity"),
-}  # fmt: skip
+    **{key: (key, "position") for key in "xyz"},
+    **{key: (key, "angle") for key in ("roll", "pitch", "yaw")},
+    "speed": ("speed", "velocity"),
+    "spin": ("spin", "angular_velocity"),
+}
 PIPE = {
-    "length": ("length", "length"), "cells": ("cells", "number"), "wave_speed": ("wave speed", "velocity"),
-    "flow": ("flow", "flow"), "velocity": ("velocity", "velocity"), "reynolds": ("Reynolds", "number"),
-    "friction_factor": ("friction factor", "number"), "from_head": ("head at from", "head"),
+    "length": ("length", "length"),
+    "cells": ("cells", "number"),
+    "wave_speed": ("wave speed", "velocity"),
+    "flow": ("flow", "flow"),
+    "velocity": ("velocity", "velocity"),
+    "reynolds": ("Reynolds", "number"),
+    "friction_factor": ("friction factor", "number"),
+    "from_head": ("head at from", "head"),
     "to_head": ("head at to", "head"),
-}  # fmt: skip
+}
 BASIN = {
-    "physics": ("physics", "number"), "cells": ("cells", "number"), "path": ("kernels over", "number"),
-    "area": ("area", "area"), "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"),
+    "physics": ("physics", "number"),
+    "cells": ("cells", "number"),
+    "path": ("kernels over", "number"),
+    "area": ("area", "area"),
+    "depth": ("depth", "level"),
+    "wave_speed": ("wave speed", "velocity"),
     "memory": ("memory [B]", "number"),
-}  # fmt: skip
+}
 PATCH = {
-    "faces": ("faces", "number"), "length": ("length", "length"), "area": ("cells behind", "area"),
+    "faces": ("faces", "number"),
+    "length": ("length", "length"),
+    "area": ("cells behind", "area"),
     "reflects": ("waves reflected", "number"),
-}  # fmt: skip
-LONG_RUN, LARGE_FILES = 180.0, 1e9  # [s], [B] above which the cost of a run is estimated before it starts
+}
+# [s], [B] above which the cost of a run is estimated before it starts
+LONG_RUN, LARGE_FILES = 180.0, 1e9
 DURATIONS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"))
 PLACES_SHOWN = 3
 EVENTS_SHOWN = 12
@@ -97,7 +121,9 @@ def result_text(run) -> Iterator:
     if "energy_use" in summary:
         yield from energy_use_text(summary["energy_use"])
     for name, ledger in summary["ledgers"].items():
-        relative = f", {_number(ledger['relative'])} of the largest term" if "relative" in ledger else ""
+        relative = (
+            f", {_number(ledger['relative'])} of the largest term" if "relative" in ledger else ""
+        )
         yield f"{name} ledger: remainder {_number(ledger['remainder'])}{relative}"
     for claim in summary["expectations"]:
         yield _expectation_text(claim, summary), "green" if claim["ok"] else "bold red"
@@ -161,29 +187,52 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     if facts["nodes"] or basins:
         yield _fluid_text(case, facts["fluid"])
     odd = {part["place"] for part in facts["warnings"]}
-    groups = ("nodes", "node", NODE), ("masses", "mass", MASS), ("bodies", "body", BODY), ("pipes", "pipe", PIPE)
+    groups = (
+        ("nodes", "node", NODE),
+        ("masses", "mass", MASS),
+        ("bodies", "body", BODY),
+        ("pipes", "pipe", PIPE),
+    )
     for group, word, keys in groups:
         place = "links" if group == "pipes" else "nodes"
         noticed = {name for name in facts[group] if f"{place}.{name}" in odd}
         yield from _parts_table(case, word, facts[group], keys, every, noticed)
     yield from _parts_table(case, "basin", basins, BASIN)
-    patches = {f"{name}.{patch}": faces for name, part in basins.items() for patch, faces in part["patches"].items()}
+    patches = {
+        f"{name}.{patch}": faces
+        for name, part in basins.items()
+        for patch, faces in part["patches"].items()
+    }
     yield from _parts_table(case, "patch", patches, PATCH)
-    unsteady = {name: part["unsteady"] for name, part in facts["pipes"].items() if "unsteady" in part}
-    notes = [f"unsteady friction of {name}: {part['weighting']}, {part['terms']} terms a cell, within "
-             f"{part['accuracy']:g} up to {part['frequency']:.3g} Hz" for name, part in unsteady.items()]  # fmt: skip
+    unsteady = {
+        name: part["unsteady"] for name, part in facts["pipes"].items() if "unsteady" in part
+    }
+    notes = [
+        f"unsteady friction of {name}: {part['weighting']}, {part['terms']} terms a cell, within "
+        f"{part['accuracy']:g} up to {part['frequency']:.3g} Hz"
+        for name, part in unsteady.items()
+    ]
     walls: dict[str, list[str]] = {}  # pipes with the same text share a line
     for name, pipe in facts["pipes"].items():
         if text := _wall_text(case, pipe):
             walls.setdefault(text, []).append(name)
     notes += [f"wall of {listing(names)}: {text}" for text, names in walls.items()]
     lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay-line"}
-    notes += [f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"
-             for name, part in lines.items()]  # fmt: skip
+    notes += [
+        f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"
+        for name, part in lines.items()
+    ]
     if lines:
-        notes += [f"{name} has cells: {part['line_why']}" for name, part in facts["pipes"].items() if name not in lines]
-    notes += [f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the "
-              "start" for name, item in facts["reactions"].items()]  # fmt: skip
+        notes += [
+            f"{name} has cells: {part['line_why']}"
+            for name, part in facts["pipes"].items()
+            if name not in lines
+        ]
+    notes += [
+        f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the "
+        "start"
+        for name, item in facts["reactions"].items()
+    ]
     notes += [f"{name}: {text}" for name, part in basins.items() for text in part["chains"]]
     yield from _first([*notes, *_network_lines(facts["network"])], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
@@ -193,7 +242,9 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
     yield _step_text(case, facts)
 
 
-def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, odd: set[str] = frozenset()) -> Iterator:
+def _parts_table(
+    case, word: str, parts: dict, keys: dict, every: bool = True, odd: set[str] = frozenset()
+) -> Iterator:
     """Table of parts in the units of `[output]`, if there are any; of a long table only notable rows.
 
     word : header of the column of names; every : True for all rows; odd : names of parts with notices
@@ -202,13 +253,23 @@ def _parts_table(case, word: str, parts: dict, keys: dict, every: bool = True, o
         return
     columns = [column(title, dimension, case) for title, dimension in keys.values()]
     names = list(parts) if every or len(parts) <= MANY_ROWS else _notable_rows(parts, keys, odd)
-    rows = [[name, *(_number(_in_unit(unit, parts[name].get(key))) for key, unit in zip(keys, columns, strict=True))]
-            for name in names]  # fmt: skip
+    rows = [
+        [
+            name,
+            *(
+                _number(_in_unit(unit, parts[name].get(key)))
+                for key, unit in zip(keys, columns, strict=True)
+            ),
+        ]
+        for name in names
+    ]
     heads = [word, *(unit.name if unit.dimension == "number" else unit.header for unit in columns)]
     yield ResultTable.of("", heads, rows)
     if len(names) < len(parts):
-        yield (f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
-               "or greatest value of a column or with a notice, --all prints all")  # fmt: skip
+        yield (
+            f"... {len(parts) - len(names)} more of {len(parts)}; the table has only parts with the least "
+            "or greatest value of a column or with a notice, --all prints all"
+        )
     yield ""
 
 
@@ -217,7 +278,9 @@ def _network_lines(network: dict | None) -> list[str]:
     if network is None:
         return []
     states = listing(network["states"], 8) if network["states"] else "none"
-    text = f"network: states {states}; {network['eliminated']} further potentials and flows eliminated"
+    text = (
+        f"network: states {states}; {network['eliminated']} further potentials and flows eliminated"
+    )
     if network["greatest"] is not None:
         verdict = "passive" if network["passive"] else "not passive"
         text += f"; {verdict}, greatest eigenvalue of Q A + A' Q {network['greatest']:.6g}"
@@ -228,18 +291,27 @@ def _wall_text(case, pipe: dict) -> str:
     texts = []
     if "allowable_pressure" in pipe:
         unit = column("allowable", "gauge_pressure", case)
-        texts.append(f"allowable pressure {_number(_in_unit(unit, pipe['allowable_pressure']))} {unit.unit}")
+        texts.append(
+            f"allowable pressure {_number(_in_unit(unit, pipe['allowable_pressure']))} {unit.unit}"
+        )
     if "creep" in pipe:
         speed = case.amount(pipe["creep"]["slow_speed"], "velocity")
-        texts.append(f"viscoelastic, {pipe['creep']['elements']} elements, speed of slow waves {speed}")
+        texts.append(
+            f"viscoelastic, {pipe['creep']['elements']} elements, speed of slow waves {speed}"
+        )
     if "restraint_factor" in pipe:
         texts.append(f"restraint factor {pipe['restraint_factor']:.4g}")
-    texts += [f"retardation factor of {name} {factor:.4g}" for name, factor in pipe.get("retardation", {}).items()]
+    texts += [
+        f"retardation factor of {name} {factor:.4g}"
+        for name, factor in pipe.get("retardation", {}).items()
+    ]
     if "source" in pipe:
         texts.append(pipe["source"])
     if pipe.get("unread"):
         keys = listing(pipe["unread"]).replace("_", " ")
-        texts.append(f"{keys} of {pipe['material']}: no source in the catalogue, give the values in the case")
+        texts.append(
+            f"{keys} of {pipe['material']}: no source in the catalogue, give the values in the case"
+        )
     return "; ".join(texts)
 
 
@@ -276,7 +348,11 @@ def _fluid_text(case, fluid: dict) -> str:
         unit = column(key, dimension, case)
         if dimension == "modulus":
             unit = column(key, dimension, case, span(unit.unit))
-        value = "unknown" if fluid[key] is None else f"{_number(_in_unit(unit, fluid[key]))} {unit.unit}"
+        value = (
+            "unknown"
+            if fluid[key] is None
+            else f"{_number(_in_unit(unit, fluid[key]))} {unit.unit}"
+        )
         texts.append(f"{key.replace('_', ' ')} {value}")
     name = "" if fluid["name"] == fluid["source"] else f" ({fluid['source']})"
     return f"fluid {fluid['name']}{name}: {', '.join(texts)}"
@@ -316,8 +392,12 @@ def difference_text(results: dict, summary: dict) -> Iterator:
     clock, rows = time_column(summary), []
     for name, probe in results["probes"].items():
         time = None if probe["t_greatest"] is None else clock.from_si(probe["t_greatest"])
-        rows.append([name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))])
-    yield ResultTable.of("", ["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
+        rows.append(
+            [name, span(probe["unit"]), *map(_number, (probe["greatest"], time, probe["rms"]))]
+        )
+    yield ResultTable.of(
+        "", ["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows
+    )
     if results["note"]:
         yield results["note"]
     for key in ("only_a", "only_b"):
@@ -328,9 +408,17 @@ def difference_text(results: dict, summary: dict) -> Iterator:
 def _extremes(run) -> Iterator:
     clock = UnitColumn("at", "time", run.summary["time_unit"])
     missing = not_valid(run.summary) or "-"
-    rows = [[name, run.units[name], missing if extreme.minimum is None else _number(extreme.minimum),
-             _number(_in_unit(clock, extreme.t_min)), missing if extreme.maximum is None else _number(extreme.maximum),
-             _number(_in_unit(clock, extreme.t_max))] for name, extreme in run.extremes.items()]  # fmt: skip
+    rows = [
+        [
+            name,
+            run.units[name],
+            missing if extreme.minimum is None else _number(extreme.minimum),
+            _number(_in_unit(clock, extreme.t_min)),
+            missing if extreme.maximum is None else _number(extreme.maximum),
+            _number(_in_unit(clock, extreme.t_max)),
+        ]
+        for name, extreme in run.extremes.items()
+    ]
     heads = ["probe", "unit", "minimum", clock.header, "maximum", clock.header]
     if "peaks" in run.summary:
         heads = ["probe", "unit", "minimum", "+-", clock.header, "maximum", "+-", clock.header]
@@ -350,7 +438,9 @@ def _step_text(case, facts: dict) -> str:
     expected = facts["expected_seconds"]
     cost = "" if expected is None else f", about {expected:.2g} s of computing time"
     step = f"step at the start {case.step_amount(facts['step'])}, set by {facts['step_set_by']}"
-    full = "" if facts["steps_if_full"] is None else f" ({facts['steps_if_full']} with full conduits)"
+    full = (
+        "" if facts["steps_if_full"] is None else f" ({facts['steps_if_full']} with full conduits)"
+    )
     return f"{step}; {facts['steps']} steps of this size in the run{full}{cost}"
 
 
@@ -375,7 +465,9 @@ def where_and_when(verdict: dict, summary: dict) -> str:
     text = verdict["place"]
     if verdict["chainage"] is not None:
         text += f" at {_number(_in_unit(along, verdict['chainage']))} {along.unit}"
-    return text if verdict["time"] is None else f"{text}, {time_formatter(summary)(verdict['time'])}"
+    return (
+        text if verdict["time"] is None else f"{text}, {time_formatter(summary)(verdict['time'])}"
+    )
 
 
 def _limit_text(verdict: dict, summary: dict) -> str:
@@ -385,14 +477,22 @@ def _limit_text(verdict: dict, summary: dict) -> str:
         f"{verdict['quantity'].replace('_', ' ')} {_number(verdict['value'])} {verdict['unit']} "
         f"({where_and_when(verdict, summary)})"
     )
-    state = IN_WORDS[this.state] if this.state != OPEN else f"OPEN, because {undecided_limit_reason(this, summary)}"
+    state = (
+        IN_WORDS[this.state]
+        if this.state != OPEN
+        else f"OPEN, because {undecided_limit_reason(this, summary)}"
+    )
     margin = not_valid(summary) or "-"
     if verdict["margin"] is not None:
         margin = f"{_number(verdict['margin'])} {span(verdict['unit'])}"
     text = f"{state}: {verdict['name']}: {value_text}, {relation} {_number(verdict['limit'])}; margin {margin}"
     if verdict["error"] is not None and verdict["margin"] is not None:
         text += f" within {verdict['error']:.2g}"
-    if verdict["time"] is not None and verdict["until"] > 0.0 and verdict["time"] >= verdict["until"] * (1.0 - 1e-9):
+    if (
+        verdict["time"] is not None
+        and verdict["until"] > 0.0
+        and verdict["time"] >= verdict["until"] * (1.0 - 1e-9)
+    ):
         text += ", at the end of the run: a longer run may reach a worse value"
     return text
 
@@ -401,7 +501,10 @@ def undecided_limit_reason(verdict, summary: dict) -> str:
     """Reason why a limit is undecided (state OPEN). verdict : `LimitVerdict`"""
     if verdict.doubtful:
         return "its margin is smaller than its error"
-    return undecided_reason(summary) or f"its {'value' if verdict.margin is None else 'error'} is not known"
+    return (
+        undecided_reason(summary)
+        or f"its {'value' if verdict.margin is None else 'error'} is not known"
+    )
 
 
 def mark_lines(marks: list[dict], time_text) -> list[str]:
@@ -418,7 +521,9 @@ def mark_lines(marks: list[dict], time_text) -> list[str]:
         names = [mark["text"].partition(": ")[0] for mark in group]
         more = f" and {len(names) - PLACES_SHOWN} more" if len(names) > PLACES_SHOWN else ""
         places = ", ".join(names[:PLACES_SHOWN]) + more
-        lines.append(f"{places}: {text}: results from {time_text(group[0]['time'])} on are not to be trusted")
+        lines.append(
+            f"{places}: {text}: results from {time_text(group[0]['time'])} on are not to be trusted"
+        )
     return lines
 
 
@@ -428,7 +533,11 @@ def undecided_reason(summary: dict) -> str:
     if text := not_valid(summary):
         return f"the run is {text}"
     if not summary["marks"]:
-        return (late[0] if late else "") if summary["ok"] else f"the run is not ok ({summary['reason']})"
+        return (
+            (late[0] if late else "")
+            if summary["ok"]
+            else f"the run is not ok ({summary['reason']})"
+        )
     first = min(summary["marks"], key=lambda mark: mark["time"])
     return f"results from {time_formatter(summary)(first['time'])} on are not to be trusted"
 
@@ -436,7 +545,9 @@ def undecided_reason(summary: dict) -> str:
 def _comparison_text(comparison: dict, summary: dict) -> str:
     if comparison["rms"] is None:
         return f"{comparison['probe']} against {comparison['file']}: no measured time lies within the run"
-    unit, span_unit, time_text = comparison["unit"], span(comparison["unit"]), time_formatter(summary)
+    unit = comparison["unit"]
+    span_unit = span(comparison["unit"])
+    time_text = time_formatter(summary)
     return (
         f"{comparison['probe']} against {comparison['file']}: rms {_number(comparison['rms'])} {span_unit}, greatest "
         f"difference {_number(comparison['greatest_difference'])} {span_unit} at "
@@ -449,7 +560,11 @@ def _comparison_text(comparison: dict, summary: dict) -> str:
 def _cost_text(summary: dict) -> str:
     rejected = f", {summary['rejections']} rejected" if summary["rejections"] else ""
     cells = f", {summary['cells']} cells" if summary["cells"] else ""
-    cost = f" ({_number(summary['cost'])} ns per cell and step)" if summary["cells"] and summary["cost"] else ""
+    cost = (
+        f" ({_number(summary['cost'])} ns per cell and step)"
+        if summary["cells"] and summary["cost"]
+        else ""
+    )
     newton = ""
     if summary["jacobians"]:
         newton += f", {summary['jacobians']} Jacobians, {summary['factorisations']} factorisations"

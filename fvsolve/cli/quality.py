@@ -16,16 +16,22 @@ NODES_SHOWN = 40  # greatest number of nodes on a terminal; the files have all
 @cli.command("quality", order=200)
 def quality(
     case: cli.SingleCase,
-    trace: Annotated[str | None, Option(metavar="A,B", help="nodes whose water is traced (default none)")] = None,
-    step: Annotated[str, Option(metavar="TIME", help="longest time step of the transport")] = "60 s",
-    out: cli.Out = None, set: cli.Set = [],  # noqa: B006
+    trace: Annotated[
+        str | None, Option(metavar="A,B", help="nodes whose water is traced (default none)")
+    ] = None,
+    step: Annotated[
+        str, Option(metavar="TIME", help="longest time step of the transport")
+    ] = "60 s",
+    out: cli.Out = None,
+    set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Compute the age of the water at all nodes of a network without waves, and its shares by source, over a run."""
     from fvsolve.studies.water_quality.water_quality import water_quality
 
     loaded = cli.load_case(case, set)
-    sources, seconds = cli.comma_list(trace, "--trace") or [], cli.quantity_of(step, "time", f"--step {step}")
+    sources = cli.comma_list(trace, "--trace") or []
+    seconds = cli.quantity_of(step, "time", f"--step {step}")
     folder = cli.folder_of(loaded, "quality", out)
     cli.warn_replaced(folder, "age.csv")
     with run_progress(loaded) as progress:
@@ -38,10 +44,21 @@ def quality(
 
 def quality_text(result, folder: Path, paths: list[Path]) -> Iterator:
     """Age and shares at the end of a run, by node, the error of the balance, and the files."""
-    heads = ["node", "age at the end [h]", "greatest age [h]", *(f"from {name} [%]" for name in result.trace)]
-    rows = [[node, f"{result.age[-1, k] / 3600.0:.4g}", f"{result.age[:, k].max() / 3600.0:.4g}",
-             *(f"{100.0 * values[-1, k]:.4g}" for values in result.trace.values())]
-            for k, node in enumerate(result.nodes[:NODES_SHOWN])]  # fmt: skip
+    heads = [
+        "node",
+        "age at the end [h]",
+        "greatest age [h]",
+        *(f"from {name} [%]" for name in result.trace),
+    ]
+    rows = [
+        [
+            node,
+            f"{result.age[-1, k] / 3600.0:.4g}",
+            f"{result.age[:, k].max() / 3600.0:.4g}",
+            *(f"{100.0 * values[-1, k]:.4g}" for values in result.trace.values()),
+        ]
+        for k, node in enumerate(result.nodes[:NODES_SHOWN])
+    ]
     yield ResultTable.of("", heads, rows)
     if len(result.nodes) > NODES_SHOWN:
         yield f"... {len(result.nodes) - NODES_SHOWN} more nodes in the files"

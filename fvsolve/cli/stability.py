@@ -24,9 +24,15 @@ from fvsolve.studies.stability.periodic_limits import (
     measured_limits,
 )
 
-RUNS = (Column("scheme"), Column("method"), Column("predicted", words=".7g"), Column("measured", words=".7g"),
-        Column("ratio", words=".7f"))  # fmt: skip
-SHOWN_ROWS = 8  # greatest number of pairs that are printed in sentences; more are printed as a table
+RUNS = (
+    Column("scheme"),
+    Column("method"),
+    Column("predicted", words=".7g"),
+    Column("measured", words=".7g"),
+    Column("ratio", words=".7f"),
+)
+# greatest number of pairs that are printed in sentences; more are printed as a table
+SHOWN_ROWS = 8
 SET_BY = {
     "longest": "the longest waves (theta -> 0)",
     "shortest": "the shortest wave (two cells)",
@@ -42,9 +48,13 @@ LEGEND = "l: the longest waves set the limit, s: the shortest (two cells), b: a 
 
 
 def without_case(
-    scheme: str | None, method: str | None, cells: int | None, steps: int | None, out: Path | None,
+    scheme: str | None,
+    method: str | None,
+    cells: int | None,
+    steps: int | None,
+    out: Path | None,
     courant: float | None = None,
-) -> tuple[dict, Iterator]:  # fmt: skip
+) -> tuple[dict, Iterator]:
     """Courant limits of schemes and methods on a periodic grid : (values for JSON, text).
 
     scheme, method : names separated by commas, or None for all linear schemes and all methods
@@ -59,15 +69,21 @@ def without_case(
     limits = advection_limits(linear, methods, courant) if linear is None or linear else []
     if out is not None:
         cli.writable_folder(out)
-        for name, rows in (("limits", [entry.plain() for entry in limits]),
-                           ("measured", [entry.plain() for entry in runs]),
-                           ("limited", [entry.flat() for entry in limited])):  # fmt: skip
+        for name, rows in (
+            ("limits", [entry.plain() for entry in limits]),
+            ("measured", [entry.plain() for entry in runs]),
+            ("limited", [entry.flat() for entry in limited]),
+        ):
             if rows:
                 ResultTable([Column(key) for key in rows[0]], rows).write(out / f"{name}.csv")
-    return {"limits": limits, "measured": runs, "limited": limited}, _limits_text(limits, runs, limited)
+    return {"limits": limits, "measured": runs, "limited": limited}, _limits_text(
+        limits, runs, limited
+    )
 
 
-def _limits_text(limits: list[AdvectionLimit], runs: list[MeasuredLimit], limited: list[LimitedLimit]) -> Iterator:
+def _limits_text(
+    limits: list[AdvectionLimit], runs: list[MeasuredLimit], limited: list[LimitedLimit]
+) -> Iterator:
     """Courant limits in sentences or as a table, then limits measured in runs of linear and of limited schemes."""
     if len(limits) > SHOWN_ROWS:
         yield from _limit_table(limits)
@@ -100,7 +116,11 @@ def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tu
     limited = [name for name in named or () if name in LIMITED]
     given = {name: n for name, n in (("cells", cells), ("steps", steps)) if n is not None}
     with progress_line() as progress:
-        runs = measured_limits(linear, methods, **given, progress=progress) if given and linear != [] else []
+        runs = (
+            measured_limits(linear, methods, **given, progress=progress)
+            if given and linear != []
+            else []
+        )
         limits = limited_limits(limited, methods, **given, progress=progress) if limited else []
     return runs, limits
 
@@ -109,7 +129,9 @@ def _limited_text(limited: LimitedLimit) -> Iterator:
     """Limits of one limited scheme with one method, with frozen weights and from runs."""
     name = f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
     yield f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold"
-    frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items())
+    frozen = ", ".join(
+        f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items()
+    )
     yield f"  limits if the weights of the scheme are held constant: {frozen}"
     if limited.monotone is not None:
         yield f"  up to Courant number {limited.monotone:.6g} the total variation cannot grow"
@@ -142,10 +164,14 @@ def _sentences(limit: AdvectionLimit) -> list[str]:
         sentences.append(f"at Courant number {limit.courant:.6g} no wave grows")
     for low, high in limit.stable:
         if low > 0.0:
-            place = f"from {low:.10g} to {high:.10g}" if math.isfinite(high) else f"above {low:.10g}"
+            place = (
+                f"from {low:.10g} to {high:.10g}" if math.isfinite(high) else f"above {low:.10g}"
+            )
             sentences.append(f"stable again {place}")
     if limit.digits:
-        sentences.append(f"computed with the coefficients as published, which have {limit.digits} digits")
+        sentences.append(
+            f"computed with the coefficients as published, which have {limit.digits} digits"
+        )
     if not limit.proved:
         sentences.append("computed for sampled waves; not proved for waves between them")
     return sentences
@@ -187,41 +213,103 @@ def _cell(limit: AdvectionLimit) -> str:
 
 PICTURES = 12  # greatest number of pairs of scheme and method for which pictures are drawn
 STABILITY_FILE = columns(
-    scheme="scheme", method="method", steps="steps", threshold="threshold", states="states",
-    predicted="predicted [s]", predicted_courant="predicted Courant", after="after steps",
-    measured="measured [s]", measured_courant="measured Courant", difference="difference",
-    eigenvalues="eigenvalues [s]", field_of_values="field of values [s]", von_neumann="von Neumann [s]",
-    longer="measured, ten times the steps [s]", where="grows in", share="share of energy", notes="notes",
-)  # fmt: skip
+    scheme="scheme",
+    method="method",
+    steps="steps",
+    threshold="threshold",
+    states="states",
+    predicted="predicted [s]",
+    predicted_courant="predicted Courant",
+    after="after steps",
+    measured="measured [s]",
+    measured_courant="measured Courant",
+    difference="difference",
+    eigenvalues="eigenvalues [s]",
+    field_of_values="field of values [s]",
+    von_neumann="von Neumann [s]",
+    longer="measured, ten times the steps [s]",
+    where="grows in",
+    share="share of energy",
+    notes="notes",
+)
 
 
 @cli.command("stability", order=300)
 def stability(
-    case: Annotated[str | None, Argument(metavar="CASE", help="case file or shipped case (default none: advection on "
-        "a periodic grid)")] = None,
-    scheme: Annotated[str | None, Option(metavar="A,B", help="schemes to study (default scheme of the case, or "
-        "without a case all linear schemes)")] = None,
-    method: Annotated[str | None, Option(metavar="A,B", help="methods to study (default method of the case, or "
-        "without a case all methods)")] = None,
-    steps: Annotated[int | None, Option(help="number of steps over which growth is measured; without a case it adds "
-        "measured limits of linear schemes (default 1000)")] = None,
-    cells: Annotated[int | None, Option(help="number of cells of the periodic grid on which growth is measured, only "
-        "without a case (default 100)")] = None,
-    courant: Annotated[float | None, Option(help="Courant number at which growth is computed, only without a case "
-        "(default 1 % above the stability limit, or 0.5 if the limit is 0)")] = None,
-    at: cli.AtTime = None, before: cli.BeforeJump = False, jobs: cli.Jobs = 1, dask: cli.Dask = None,
-    out: Annotated[Path | None, Option(metavar="DIR", help="folder of tables and pictures (default "
-        "runs/NAME.stability, or no files without a case)")] = None,
+    case: Annotated[
+        str | None,
+        Argument(
+            metavar="CASE",
+            help="case file or shipped case (default none: advection on a periodic grid)",
+        ),
+    ] = None,
+    scheme: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="schemes to study (default scheme of the case, or "
+            "without a case all linear schemes)",
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        Option(
+            metavar="A,B",
+            help="methods to study (default method of the case, or without a case all methods)",
+        ),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        Option(
+            help="number of steps over which growth is measured; without a case it adds "
+            "measured limits of linear schemes (default 1000)"
+        ),
+    ] = None,
+    cells: Annotated[
+        int | None,
+        Option(
+            help="number of cells of the periodic grid on which growth is measured, only "
+            "without a case (default 100)"
+        ),
+    ] = None,
+    courant: Annotated[
+        float | None,
+        Option(
+            help="Courant number at which growth is computed, only without a case "
+            "(default 1 % above the stability limit, or 0.5 if the limit is 0)"
+        ),
+    ] = None,
+    at: cli.AtTime = None,
+    before: cli.BeforeJump = False,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    out: Annotated[
+        Path | None,
+        Option(
+            metavar="DIR",
+            help="folder of tables and pictures (default "
+            "runs/NAME.stability, or no files without a case)",
+        ),
+    ] = None,
     set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
-    of_a_case = {"--set": set, "--at": at, "--left-limit": before, "--jobs": None if jobs == 1 else jobs}
+    of_a_case = {
+        "--set": set,
+        "--at": at,
+        "--left-limit": before,
+        "--jobs": None if jobs == 1 else jobs,
+    }
     of_a_case |= {"--dask": dask}
     unused = of_a_case if case is None else {"--cells": cells, "--courant": courant}
     useless = [name for name, value in unused.items() if value not in (None, False, [])]
     if useless:
-        reason = "needs a case: fvsolve stability CASE" if case is None else "not valid with a case, only without"
+        reason = (
+            "needs a case: fvsolve stability CASE"
+            if case is None
+            else "not valid with a case, only without"
+        )
         raise FvsolveError(f"{', '.join(useless)}: {reason}")
     if case is None:
         return present(as_json, *without_case(scheme, method, cells, steps, out, courant))
@@ -232,15 +320,32 @@ def stability(
     folder = cli.folder_of(loaded, "stability", out)
     with progress_line() as progress:
         result = ask(
-            loaded, cli.comma_list(scheme, "--scheme"), cli.method_names(method),
-            cli.quantity_of(at, "time", f"--at {at}"), before, steps or STEPS, out=folder, progress=progress,
-            jobs=jobs, dask=dask,
-        )  # fmt: skip
-    table = ResultTable(STABILITY_FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
-    files = [table.write(cli.clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
+            loaded,
+            cli.comma_list(scheme, "--scheme"),
+            cli.method_names(method),
+            cli.quantity_of(at, "time", f"--at {at}"),
+            before,
+            steps or STEPS,
+            out=folder,
+            progress=progress,
+            jobs=jobs,
+            dask=dask,
+        )
+    table = ResultTable(
+        STABILITY_FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows]
+    )
+    files = [
+        table.write(
+            cli.clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv"
+        ).name
+    ]
     if len(result.rows) <= PICTURES:
         files += pictures(result, folder)
-    present(as_json, result.plain() | {"directory": str(folder), "files": files}, stability_text(result, folder, files))
+    present(
+        as_json,
+        result.plain() | {"directory": str(folder), "files": files},
+        stability_text(result, folder, files),
+    )
 
 
 def pictures(result, folder: Path) -> list[str]:
@@ -264,8 +369,14 @@ def pictures(result, folder: Path) -> list[str]:
         title = f"{result.case}, {row.scheme} with {row.method}: spectrum times h = {h:.4g} s"
         if row.rate == 0.0:
             title = f"{result.case}, {row.method}: spectrum times h = {h:.4g} s"
-        figure = spectrum_figure(analyse(row.method).stability_function, h * side.spectrum.values, field, title)
-        names.append(f"spectrum-{row.scheme}-{row.method}.png" if row.rate > 0.0 else f"spectrum-{row.method}.png")
+        figure = spectrum_figure(
+            analyse(row.method).stability_function, h * side.spectrum.values, field, title
+        )
+        names.append(
+            f"spectrum-{row.scheme}-{row.method}.png"
+            if row.rate > 0.0
+            else f"spectrum-{row.method}.png"
+        )
         save(figure, folder / names[-1])
     return names
 
@@ -301,7 +412,9 @@ def terminal_columns(cells: bool) -> list[Column]:
         heads |= {quantity: f"{quantity} [s]", f"{quantity}_courant": "Courant"}
     heads["percent"] = "difference"
     for bound in ("eigenvalues", "field_of_values", "von_neumann"):
-        heads[f"{bound}_courant" if cells else bound] = bound.replace("_", " ").replace("von n", "von N")
+        heads[f"{bound}_courant" if cells else bound] = bound.replace("_", " ").replace(
+            "von n", "von N"
+        )
     heads["part"] = "grows in"
     omitted = () if cells else ("scheme", "predicted_courant", "measured_courant", "von_neumann")
     return [Column(key, head, ".5g") for key, head in heads.items() if key not in omitted]
@@ -314,8 +427,15 @@ def table_lines(row) -> list[dict]:
     """
     from fvsolve.studies.stability.stability_row import json_number
 
-    frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": json_number(h),
-              "predicted_courant": json_number(row.courant(h))} for name, h in row.frozen.items()]  # fmt: skip
+    frozen_lines = [
+        {
+            "scheme": f"{row.scheme}: {name}",
+            "method": row.method,
+            "predicted": json_number(h),
+            "predicted_courant": json_number(row.courant(h)),
+        }
+        for name, h in row.frozen.items()
+    ]
     percent = f"{100 * row.difference:+.2f} %" if np.isfinite(row.difference) else None
     part = f"{row.where} ({100 * row.share:.0f} %)" if row.where else None
     return [*frozen_lines, row.plain() | {"percent": percent, "part": part}]

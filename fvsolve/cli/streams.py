@@ -42,7 +42,8 @@ class SafeStream:
             action(*arguments)
         except OSError as error:
             self.error = error
-            with contextlib.suppress(OSError, io.UnsupportedOperation):  # else the end of the interpreter would fail
+            # else the end of the interpreter would fail
+            with contextlib.suppress(OSError, io.UnsupportedOperation):
                 null = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(null, self.stream.fileno())
                 os.close(null)
@@ -56,7 +57,8 @@ class SafeStream:
 def safe_streams() -> Iterator[SafeStream]:
     """Context manager in which all standard streams exist and accept text; yields that of standard output."""
     before = sys.stdin, sys.stdout, sys.stderr
-    for number in range(3):  # else the next file would take the number, and texts of libraries would go into it
+    # else the next file would take the number, and texts of libraries would go into it
+    for number in range(3):
         try:
             os.fstat(number)
         except OSError:
@@ -64,8 +66,10 @@ def safe_streams() -> Iterator[SafeStream]:
     with contextlib.ExitStack() as opened:
         null = opened.enter_context(open(os.devnull, "r+", encoding="utf-8"))
         for stream in (sys.stdout, sys.stderr):
-            if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
-                stream.reconfigure(errors="backslashreplace")  # a terminal may have a small character set
+            # false if a caller has replaced the stream by another file object
+            if hasattr(stream, "reconfigure"):
+                # a terminal may have a small character set
+                stream.reconfigure(errors="backslashreplace")
         sys.stdin = sys.stdin or null
         output, sys.stderr = SafeStream(sys.stdout or null), SafeStream(sys.stderr or null)
         sys.stdout = output

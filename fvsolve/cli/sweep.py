@@ -46,15 +46,32 @@ MAX_ROWS = 100  # greatest number of rows of that table
 
 @cli.command("sweep", order=260)
 def sweep(
-    case: cli.SingleCase, set: Values = [],  # noqa: B006
-    points: Annotated[Path | None, Option(metavar="FILE.csv", help="CSV file of the values of keys in all runs: a "
-        "row for each run, a column for each key")] = None,
-    sample: Annotated[str | None, Option(metavar="sobol:N", help="sample of N runs in the ranges of --vary: sobol:N "
-        "(Sobol) or lhs:N (Latin hypercube)")] = None,
+    case: cli.SingleCase,
+    set: Values = [],  # noqa: B006
+    points: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE.csv",
+            help="CSV file of the values of keys in all runs: a "
+            "row for each run, a column for each key",
+        ),
+    ] = None,
+    sample: Annotated[
+        str | None,
+        Option(
+            metavar="sobol:N",
+            help="sample of N runs in the ranges of --vary: sobol:N "
+            "(Sobol) or lhs:N (Latin hypercube)",
+        ),
+    ] = None,
     vary: Ranges = [],  # noqa: B006
-    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, quantity: Quantities = [],  # noqa: B006
-    out: cli.Out = None, as_json: cli.Json = False,
-) -> None:  # fmt: skip
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    quantity: Quantities = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
     from fvsolve.studies.sampling import key_with_unit
@@ -62,16 +79,30 @@ def sweep(
     values_by_key = dict(key_and_values(text) for text in set)
     fixed = {key: values[0] for key, values in values_by_key.items() if len(values) == 1}
     if vary and sample is None:
-        raise FvsolveError(f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c")
-    varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(vary, "--vary")
+        raise FvsolveError(
+            f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c"
+        )
+    varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(
+        vary, "--vary"
+    )
     loaded = cli.load_case(case, [])
     folder = cli.folder_of(loaded, "sweep", out)
     with progress_line() as progress:
-        result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
-    heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
+        result = studies.sweep(
+            loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask
+        )
+    heads = {
+        key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows])
+        for key in result.keys
+    }
     charts = write_charts(result, quantity, folder, heads)
     facts = result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]}
-    present(as_json, facts, sweep_text(result, folder, heads), code=0 if all(row["ok"] for row in result.rows) else 1)
+    present(
+        as_json,
+        facts,
+        sweep_text(result, folder, heads),
+        code=0 if all(row["ok"] for row in result.rows) else 1,
+    )
 
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
@@ -105,7 +136,9 @@ def write_charts(result, quantities: list[str], folder: Path, heads: dict[str, s
     return paths
 
 
-def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORMAT) -> tuple[str, list]:
+def key_and_values(
+    text: str, option: str = "--set", expected: str = VALUES_FORMAT
+) -> tuple[str, list]:
     """Key and list of values from a text `KEY=a,b,c`. Raises FvsolveError for any other text.
 
     option, expected : name of the option and valid form of the text, for the message
@@ -118,7 +151,9 @@ def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORM
 
 def split_list(text: str) -> list[str]:
     """Split a text at commas outside of brackets, braces and quotes."""
-    parts, depth, quote = [""], 0, ""
+    parts = [""]
+    depth = 0
+    quote = ""
     for letter in text:
         if quote:
             quote = "" if letter == quote else quote
@@ -136,11 +171,19 @@ def sweep_text(result, folder: Path, heads: dict[str, str]) -> Iterator:
     from fvsolve.studies.sweep import as_option_text
 
     judged = ["verdicts"] * any(row.get("verdicts") is not None for row in result.rows)
-    columns = [*result.keys, "ok", *judged, *(name for name in result.columns if name.startswith(("min(", "max(")))]
+    columns = [
+        *result.keys,
+        "ok",
+        *judged,
+        *(name for name in result.columns if name.startswith(("min(", "max("))),
+    ]
     shown = columns[len(result.keys) : len(result.keys) + 1 + len(judged) + MAX_COLUMNS]
     first_rows = result.rows[:MAX_ROWS]
     rows = [
-        [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
+        [
+            *(as_option_text(row[key]) for key in result.keys),
+            *(_text(row.get(name)) for name in shown),
+        ]
         for row in first_rows
     ]
     yield ResultTable.of("", [*heads.values(), *shown], rows)
@@ -162,14 +205,32 @@ def _text(value) -> str:
 @cli.command("sensitivity", order=270)
 def sensitivity(
     case: cli.SingleCase,
-    vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to vary and its range, in SI or "
-        "with units; repeat the option for more keys")],
-    quantity: Annotated[str, Option(metavar="max(PROBE)", help="quantity to analyse: max, min or final of a probe")],
-    samples: Annotated[int, Option(metavar="N", help="base sample size, a power of two; for k keys the study makes "
-        "about 1.25 N (k + 2) runs")] = 64,
-    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
-    out: cli.Out = None, as_json: cli.Json = False,
-) -> None:  # fmt: skip
+    vary: Annotated[
+        list[str],
+        Option(
+            "--vary",
+            metavar="KEY=LOW,HIGH",
+            help="key to vary and its range, in SI or with units; repeat the option for more keys",
+        ),
+    ],
+    quantity: Annotated[
+        str, Option(metavar="max(PROBE)", help="quantity to analyse: max, min or final of a probe")
+    ],
+    samples: Annotated[
+        int,
+        Option(
+            metavar="N",
+            help="base sample size, a power of two; for k keys the study makes "
+            "about 1.25 N (k + 2) runs",
+        ),
+    ] = 64,
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
+    out: cli.Out = None,
+    as_json: cli.Json = False,
+) -> None:
     """Compute the sensitivity of a quantity to keys: Sobol indices and Morris effects over ranges."""
     from fvsolve import studies
 
@@ -177,7 +238,16 @@ def sensitivity(
     folder = cli.folder_of(loaded, "sensitivity", out)
     with progress_line() as progress:
         result = studies.sensitivity(
-            loaded, ranges(vary, "--vary"), quantity, samples, seed, None, jobs, dask, folder, progress
+            loaded,
+            ranges(vary, "--vary"),
+            quantity,
+            samples,
+            seed,
+            None,
+            jobs,
+            dask,
+            folder,
+            progress,
         )
     cli.clear_files(folder, "sensitivity.csv", "sensitivity.png")
     path = result.sheet.write(folder / "sensitivity.csv")
@@ -189,11 +259,21 @@ def sensitivity(
 @cli.command("calibrate", order=280)
 def calibrate(
     case: cli.SingleCase,
-    vary: Annotated[list[str], Option("--vary", metavar="KEY=LOW,HIGH", help="key to calibrate and its range, in SI or "
-        "with units; repeat the option for more keys")],
-    seed: cli.Seed = 0, jobs: cli.Jobs = 1, dask: cli.Dask = None, set: cli.Set = [],  # noqa: B006
+    vary: Annotated[
+        list[str],
+        Option(
+            "--vary",
+            metavar="KEY=LOW,HIGH",
+            help="key to calibrate and its range, in SI or "
+            "with units; repeat the option for more keys",
+        ),
+    ],
+    seed: cli.Seed = 0,
+    jobs: cli.Jobs = 1,
+    dask: cli.Dask = None,
+    set: cli.Set = [],  # noqa: B006
     as_json: cli.Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Calibrate keys of a case against the measured series in its [compare]."""
     from fvsolve import studies
 
@@ -208,13 +288,20 @@ def calibration_text(case, result) -> Iterator:
     from fvsolve.core.output.unit_columns import column
     from fvsolve.studies.sampling import si_unit_of
 
-    probes = {series.probe.text: series.probe for series in case.compare.values() if series.probe is not None}
+    probes = {
+        series.probe.text: series.probe
+        for series in case.compare.values()
+        if series.probe is not None
+    }
     texts = []
     for name, rms in result.rms.items():
         probe = probes[name]
         unit_column = column(probe.text, probe.dimension, case, probe.unit)
         texts.append(f"rms of {name} {unit_column.span_from_si(rms):.6g} {unit_column.span_unit}")
-    units = {key: f"{key} [{unit}]" if (unit := si_unit_of(case.raw, key)) else key for key in result.values}
+    units = {
+        key: f"{key} [{unit}]" if (unit := si_unit_of(case.raw, key)) else key
+        for key in result.values
+    }
     yield _key_table(result, units)
     yield ", ".join([*texts, f"{result.runs} runs"])
     yield from ((doubt, "yellow") for doubt in result.doubts)

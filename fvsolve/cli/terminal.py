@@ -46,7 +46,9 @@ def show(items: Iterable) -> None:
         if isinstance(item, (str, tuple)):
             text, style = (item, None) if isinstance(item, str) else item
             if console:
-                console.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
+                console.print(
+                    visible(text), style=style, highlight=False, markup=False, soft_wrap=True
+                )
             else:
                 print(visible(text))
         else:
@@ -75,8 +77,13 @@ def table_lines(table: ResultTable) -> list[str] | None:
     if sum(widths) + 2 * len(widths) - 2 > WIDTH or not (text.isascii() and text.isprintable()):
         return None
     left = _text_columns(heads, texts)
-    cells = [[x.ljust(w) if is_left else x.rstrip().rjust(w) for x, w, is_left in zip(row, widths, left, strict=True)]
-             for row in rows]  # fmt: skip
+    cells = [
+        [
+            x.ljust(w) if is_left else x.rstrip().rjust(w)
+            for x, w, is_left in zip(row, widths, left, strict=True)
+        ]
+        for row in rows
+    ]
     return ["  ".join(row) for row in cells]
 
 
@@ -92,7 +99,9 @@ def _grid(table: ResultTable):
     grid = Grid(box=None, pad_edge=False, header_style="bold", show_edge=False)
     heads, rows = table.words()
     for header, is_left in zip(heads, _text_columns(heads, rows), strict=True):
-        grid.add_column(Text(visible(header)), justify="left" if is_left else "right", overflow="fold")
+        grid.add_column(
+            Text(visible(header)), justify="left" if is_left else "right", overflow="fold"
+        )
     for row in rows:
         grid.add_row(*(Text(visible(cell)) for cell in row))
     return grid
@@ -157,7 +166,10 @@ def progress_line(resumable: bool = True) -> Iterator[Callable[[int, int, str], 
     with exit code 130, and with a message that states whether finished runs are kept.
     resumable : True if finished runs are on disk and the same command continues from there
     """
-    is_terminal, counts, text, finished = sys.stderr.isatty(), [0, 0], [""], threading.Event()
+    is_terminal = sys.stderr.isatty()
+    counts = [0, 0]
+    text = [""]
+    finished = threading.Event()
 
     def progress(done: int, total: int, label: str) -> None:
         counts[:], text[0] = (done, total), f"{done} of {total}: {visible(label)}"
@@ -218,8 +230,14 @@ class RunLines:
         if passed < PROGRESS_INTERVAL:
             return
         left = (self.end - t) * passed / (t - self.last[0]) if t > self.last[0] else math.inf
-        times = f"t = {self.format_amount(t, 'time', 6)} of {self.format_amount(self.end, 'time', 6)}"
-        print(f"{times}, {steps} steps; about {left:.2g} s left at this pace", file=sys.stderr, flush=True)
+        times = (
+            f"t = {self.format_amount(t, 'time', 6)} of {self.format_amount(self.end, 'time', 6)}"
+        )
+        print(
+            f"{times}, {steps} steps; about {left:.2g} s left at this pace",
+            file=sys.stderr,
+            flush=True,
+        )
         self.last = t, seconds
 
 
@@ -229,7 +247,11 @@ class RunBar:
     def __init__(self, case):
         from rich.progress import TextColumn
 
-        self.start, self.end, self.format_amount = case.numerics.start, case.numerics.end, case.amount
+        self.start, self.end, self.format_amount = (
+            case.numerics.start,
+            case.numerics.end,
+            case.amount,
+        )
         self.first: tuple[float, float] | None = None
         self.shown = _bar(TextColumn("{task.fields[now]}"))
         self.task = self.shown.add_task(visible(case.name), total=self.end - self.start, now="")
@@ -250,5 +272,10 @@ def _bar(column):
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), column, TimeRemainingColumn()
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        column,
+        TimeRemainingColumn(),
+    )
     return Progress(*columns, console=Console(stderr=True), transient=True)

@@ -19,14 +19,16 @@ from fvsolve.errors import FvsolveError
 
 TEST_BYTES = 65536  # bytes that are written to test if a folder can hold caches
 KEPT_GENERATIONS = 3  # generations of compiled code kept in addition to the present one
-CODE_SUFFIX = store.SUFFIX if store.IN_USE else ".nbc"  # of files of compiled code; the second is numba's own
+# of files of compiled code; the second is numba's own
+CODE_SUFFIX = store.SUFFIX if store.IN_USE else ".nbc"
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 PACKAGE = Path(__file__).resolve().parent.parent
 # Sources that compiled code can depend on: packages and modules with compiled functions and, by import contract, all
 # that they may import; of `parts` the law files. Features state their own sources, see `add_sources`.
 SOURCE_ROOTS = ("core/kernels", "core/steppers", "jit", "compile", "units", "errors")
-EXTRA_FOLDERS: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
+# other folders with compiled functions -> their folder below the code folder
+EXTRA_FOLDERS: dict[Path, str] = {}
 
 
 @functools.cache
@@ -46,7 +48,9 @@ def cache_folder() -> Path:
 
 def reading_folders() -> tuple[Path, ...]:
     """Folders from which cached data are read: `cache_folder`, and before it a preferred folder that is read-only."""
-    return tuple(dict.fromkeys(folder for folder in (_preferred_folder(), cache_folder()) if folder.is_dir()))
+    return tuple(
+        dict.fromkeys(folder for folder in (_preferred_folder(), cache_folder()) if folder.is_dir())
+    )
 
 
 def _check_access(folder: Path) -> None:
@@ -136,20 +140,26 @@ def is_cold() -> bool:
 
     Then they must be compiled first.
     """
-    return COMPILING and not any(path for folder in code_folders() for path in folder.rglob(f"*{CODE_SUFFIX}"))
+    return COMPILING and not any(
+        path for folder in code_folders() for path in folder.rglob(f"*{CODE_SUFFIX}")
+    )
 
 
 def is_cached(name: str) -> bool:
     """True if the code of a function of the package is cached for this machine."""
     if store.IN_USE:
-        return any(path for folder in code_folders() for path in folder.glob(f"{name}-*{CODE_SUFFIX}"))
+        return any(
+            path for folder in code_folders() for path in folder.glob(f"{name}-*{CODE_SUFFIX}")
+        )
     return any(code_folder().rglob(f"*.{name}-*{CODE_SUFFIX}"))
 
 
 def other_caches() -> str:
     """Text about cached code from other machines or sources, which cannot be used here; "" without such code."""
     own = code_folder()
-    folders = [path for path in cache_folder().glob("code/*/*") if any(path.rglob(f"*{CODE_SUFFIX}"))]
+    folders = [
+        path for path in cache_folder().glob("code/*/*") if any(path.rglob(f"*{CODE_SUFFIX}"))
+    ]
     machines = sorted(path.name for path in folders if path.parent == own.parent and path != own)
     others = sorted({path.parent.name for path in folders} - {own.parent.name})
     if machines:
@@ -189,7 +199,11 @@ def _preferred_folder() -> Path:
     if stated := os.environ.get("FVSOLVE_CACHE"):
         return Path(stated).expanduser().absolute()
     if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fvsolve" / "cache"
+        return (
+            Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+            / "fvsolve"
+            / "cache"
+        )
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "fvsolve"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fvsolve"
@@ -211,5 +225,11 @@ def _writable(folder: Path) -> bool:
 
 @functools.cache
 def warn_not_cached(reason: str) -> None:
-    text = f"{cache_folder()}: compiled code cannot be saved: {reason}; each start compiles it again"
-    warnings.warn(f"{text}. Free space there, or set FVSOLVE_CACHE to another folder", RuntimeWarning, stacklevel=2)
+    text = (
+        f"{cache_folder()}: compiled code cannot be saved: {reason}; each start compiles it again"
+    )
+    warnings.warn(
+        f"{text}. Free space there, or set FVSOLVE_CACHE to another folder",
+        RuntimeWarning,
+        stacklevel=2,
+    )

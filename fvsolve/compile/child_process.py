@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE_PARENT = Path(__file__).resolve().parents[2]
-SAFE_PATH = "PYTHONSAFEPATH"  # environment variable of Python: the present folder is not searched for modules
+# environment variable of Python: the present folder is not searched for modules
+SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def python_command(*arguments: str) -> list[str]:
@@ -27,7 +28,11 @@ def module_folders() -> list[str]:
     """Folders of modules of this process, without the present folder unless fvsolve itself is in it."""
     package, present = str(PACKAGE_PARENT), _present_folder()
     folders = [str(Path(folder).absolute()) for folder in sys.path if folder]
-    return list(dict.fromkeys([*(folder for folder in folders if folder == package or folder != present), package]))
+    return list(
+        dict.fromkeys(
+            [*(folder for folder in folders if folder == package or folder != present), package]
+        )
+    )
 
 
 def forget_present_folder() -> None:

@@ -26,7 +26,13 @@ class Tables(types.Opaque):
     own : as `members`, for further tables of a feature, whose handle is entry `slot` of the table `features`
     """
 
-    def __init__(self, name: str, members: Callable[[], tuple], own: Callable[[], tuple] | None = None, slot=0) -> None:
+    def __init__(
+        self,
+        name: str,
+        members: Callable[[], tuple],
+        own: Callable[[], tuple] | None = None,
+        slot=0,
+    ) -> None:
         super().__init__(name)
         self.members, self.own, self.slot = members, own, slot
 
@@ -48,7 +54,9 @@ class TableOf(AttributeTemplate):
 
     def generic_resolve(self, kind, name):
         member = getattr(kind.members(), name, None)
-        return getattr(kind.own(), name, None) if member is None and kind.own is not None else member
+        return (
+            getattr(kind.own(), name, None) if member is None and kind.own is not None else member
+        )
 
 
 @lower_getattr_generic(Tables)
@@ -66,7 +74,9 @@ def load_table(context, builder, kind, value, name):
         return loaded
 
     if not hasattr(members, name):  # a table of a feature
-        slots = builder.inttoptr(load(base, 3 * members._fields.index("features")), word.as_pointer())
+        slots = builder.inttoptr(
+            load(base, 3 * members._fields.index("features")), word.as_pointer()
+        )
         base, members = builder.inttoptr(load(slots, kind.slot), word.as_pointer()), kind.own()
     member, first = getattr(members, name), 3 * members._fields.index(name)
 
@@ -75,7 +85,9 @@ def load_table(context, builder, kind, value, name):
 
     array = make_array(member)(context, builder)
     size = word(context.get_abi_sizeof(context.get_data_type(member.dtype)))
-    address, rows, columns = entry(0), entry(1), entry(2)
+    address = entry(0)
+    rows = entry(1)
+    columns = entry(2)
     populate_array(
         array,
         data=builder.inttoptr(address, array.data.type),
@@ -138,7 +150,9 @@ def call_by_address(kinds: tuple, results: tuple):
 
     kinds, results : numba types of the other arguments and of the results
     """
-    result = types.none if not results else results[0] if len(results) == 1 else types.Tuple(results)
+    result = (
+        types.none if not results else results[0] if len(results) == 1 else types.Tuple(results)
+    )
 
     def generate(context, builder, kind, args):
         shape = context.call_conv.get_function_type(result, kinds)
@@ -158,14 +172,18 @@ def call_in_table(loop, given, row: int, kinds: tuple, results: tuple):
     """
     places = [k for k, kind in enumerate(given.types) if not isinstance(kind, types.Dispatcher)]
     if tuple(_passed(given.types[k]) for k in places) != kinds:
-        raise errors.TypingError(f"{loop} is called with {given}; its entry in the table has {kinds}")
+        raise errors.TypingError(
+            f"{loop} is called with {given}; its entry in the table has {kinds}"
+        )
     signature, call = call_by_address(kinds, results)
 
     def generate(context, builder, kind, args):
         word = context.get_value_type(types.int64)
         table = builder.inttoptr(args[1], word.as_pointer())
         address = builder.load(cgutils.gep_inbounds(builder, table, row))
-        return call(context, builder, None, [address, *(builder.extract_value(args[2], k) for k in places)])
+        return call(
+            context, builder, None, [address, *(builder.extract_value(args[2], k) for k in places)]
+        )
 
     return signature.return_type(loop, types.int64, given), generate
 
@@ -186,7 +204,9 @@ def c_call(arguments: int, bits: int = 0):
     """
 
     def generate(context, builder, kind, args):
-        shape = ir.FunctionType(ir.IntType(bits) if bits else ir.VoidType(), [ir.IntType(64)] * arguments)
+        shape = ir.FunctionType(
+            ir.IntType(bits) if bits else ir.VoidType(), [ir.IntType(64)] * arguments
+        )
         builder.call(builder.inttoptr(args[0], shape.as_pointer()), args[1:])
         return context.get_dummy_value()
 
@@ -200,7 +220,9 @@ def floats_at_address():
         array = make_array(kind.return_type)(context, builder)
         width = context.get_constant(types.intp, kind.return_type.dtype.bitwidth // 8)
         data = builder.inttoptr(args[0], array.data.type)
-        populate_array(array, data=data, shape=[args[1]], strides=[width], itemsize=width, meminfo=None)
+        populate_array(
+            array, data=data, shape=[args[1]], strides=[width], itemsize=width, meminfo=None
+        )
         return array._getvalue()
 
     return types.float64[::1](types.int64, types.int64), generate
@@ -247,7 +269,9 @@ def estimated_cube_root_reciprocal():
         word = ir.IntType(64)
         upper = builder.lshr(builder.bitcast(args[0], word), word(32))
         third = builder.lshr(builder.mul(upper, word(0xAAAAAAAB)), word(33))
-        return builder.bitcast(builder.shl(builder.sub(word(0x553EF0FF), third), word(32)), ir.DoubleType())
+        return builder.bitcast(
+            builder.shl(builder.sub(word(0x553EF0FF), third), word(32)), ir.DoubleType()
+        )
 
     return types.float64(types.float64), generate
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 GROUP_WRITES, OTHERS_WRITE = stat.S_IWGRP, stat.S_IWOTH
 REMEDY = "remove it (its content is compiled again), or let its owner run chmod -R go-w"
-CHECKED = hasattr(os, "geteuid")  # False on Windows, whose folders of a user are closed to other users
+# False on Windows, whose folders of a user are closed to other users
+CHECKED = hasattr(os, "geteuid")
 
 
 def fault(path: Path) -> str:
@@ -47,7 +48,11 @@ def is_private_group(status: os.stat_result) -> bool:
         user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(status.st_gid)
     except KeyError:
         return False
-    return group.gr_gid == user.pw_gid and group.gr_name == user.pw_name and {*group.gr_mem} <= {user.pw_name}
+    return (
+        group.gr_gid == user.pw_gid
+        and group.gr_name == user.pw_name
+        and {*group.gr_mem} <= {user.pw_name}
+    )
 
 
 def user_name(number: int) -> str:

@@ -26,8 +26,22 @@ from fvsolve.compile.store import Code
 COMPILE_TIMEOUT = 60.0  # longest wait for a second process that compiles [s]
 COMPILE_LOCK = threading.RLock()  # locked while functions are compiled
 # Letters of a signature: of numbers, by their type; of arrays, their dtype and number of dimensions.
-LETTERS = {float: "t", np.float64: "t", int: "i", np.int64: "i", bool: "b", np.bool_: "b", complex: "c"}
-ARRAYS = {"v": ("float64", 1), "w": ("float64", 2), "h": ("int64", 1), "s": ("int64", 2), "z": ("complex128", 1)}
+LETTERS = {
+    float: "t",
+    np.float64: "t",
+    int: "i",
+    np.int64: "i",
+    bool: "b",
+    np.bool_: "b",
+    complex: "c",
+}
+ARRAYS = {
+    "v": ("float64", 1),
+    "w": ("float64", 2),
+    "h": ("int64", 1),
+    "s": ("int64", 2),
+    "z": ("complex128", 1),
+}
 ARRAY_LETTERS = {(np.dtype(kind).char, axes): letter for letter, (kind, axes) in ARRAYS.items()}
 WRITABLE, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable; Fortran-contiguous
 
@@ -66,7 +80,8 @@ def inline(function: Callable) -> Callable:
     return njit(function, forceinline=True)
 
 
-COPIES: dict[tuple[str, int, str], str] = {}  # (file, line of a template, name of a copy) -> module of the copy
+# (file, line of a template, name of a copy) -> module of the copy
+COPIES: dict[tuple[str, int, str], str] = {}
 
 
 def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
@@ -87,9 +102,14 @@ def specialise(template: FunctionType, name: str, **constants: Any) -> Callable:
             f'{module}: {first} has a copy of {template.__name__} with the name "{name}"; give another name'
         )
     if constants.get("__name__", template.__module__) != module:
-        raise ValueError(f"{module}: the copy {name} of {template.__name__} needs __name__=__name__")
-    function = FunctionType(template.__code__, template.__globals__ | constants, name, template.__defaults__)
-    function.__qualname__, function.__doc__ = name, template.__doc__  # its module is the constant `__name__`
+        raise ValueError(
+            f"{module}: the copy {name} of {template.__name__} needs __name__=__name__"
+        )
+    function = FunctionType(
+        template.__code__, template.__globals__ | constants, name, template.__defaults__
+    )
+    # its module is the constant `__name__`
+    function.__qualname__, function.__doc__ = name, template.__doc__
     return njit(function)
 
 
@@ -142,10 +162,12 @@ class Function:
     def __init__(self, function: Callable, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func, self.options = function, options
-        self.targetoptions = {"nopython": True, "boundscheck": None} | options  # numba reads this attribute
+        # numba reads this attribute
+        self.targetoptions = {"nopython": True, "boundscheck": None} | options
         self.__code__, self.__defaults__ = function.__code__, function.__defaults__
         self.codes: dict[str, Code] = {}  # by signature; after a dot for code without wrappers
-        self.by_types: dict[tuple, Callable] = {}  # callables by types of arguments, all of them numbers
+        # callables by types of arguments, all of them numbers
+        self.by_types: dict[tuple, Callable] = {}
         self.declared: DeclaredFunction | None = None
 
     @functools.cached_property
@@ -159,7 +181,9 @@ class Function:
         return (
             ""
             if home in folders.compiled_sources()
-            else next((folders.EXTRA_FOLDERS[f] for f in home.parents if f in folders.EXTRA_FOLDERS), None)
+            else next(
+                (folders.EXTRA_FOLDERS[f] for f in home.parents if f in folders.EXTRA_FOLDERS), None
+            )
         )
 
     @functools.cached_property
@@ -167,7 +191,9 @@ class Function:
         """Numba dispatcher of this function."""
         with COMPILE_LOCK:
             cached = self.folder is not None and self.numba_caches
-            return internals().dispatcher_class()(self.py_func, cached, self.folder or "", **self.targetoptions)
+            return internals().dispatcher_class()(
+                self.py_func, cached, self.folder or "", **self.targetoptions
+            )
 
     @property
     def _numba_type_(self):
@@ -186,7 +212,9 @@ class Function:
         kinds : function that gives the numba types of the arguments for `letters`
         """
         if self.declared is None:
-            self.declared = DeclaredFunction(self, letters, self.code(letters, lambda: kinds(letters)))
+            self.declared = DeclaredFunction(
+                self, letters, self.code(letters, lambda: kinds(letters))
+            )
         return self.declared
 
     def address(self, letters: str, kinds: Callable[[str], tuple]) -> int:
@@ -205,7 +233,9 @@ class Function:
             letters = "".join(map(signature_of, arguments))
         except KeyError:  # a type without letter
             return self.numba(*arguments)
-        python = self.code(letters, lambda: tuple(map(internals().numba_module().typeof, arguments))).python
+        python = self.code(
+            letters, lambda: tuple(map(internals().numba_module().typeof, arguments))
+        ).python
         if LETTERS.keys() >= set(kinds):
             self.by_types[kinds] = python
         return python(*arguments)
@@ -241,7 +271,11 @@ class Function:
             try:
                 loaded = internals().LOADED_CODE.get(compiled.fndesc.llvm_func_name)
                 store.write(
-                    path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), wrappers
+                    path,
+                    self._identity(key),
+                    compiled,
+                    loaded or compiled.library._get_compiled_object(),
+                    wrappers,
                 )
             except OSError as error:
                 folders.warn_not_cached(error.strerror or str(error))
@@ -254,7 +288,12 @@ class Function:
         `store.IN_USE` is False.
         key : text of the signature
         """
-        if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.IN_USE:
+        if (
+            self.folder is None
+            or "<" in self.__qualname__
+            or self.py_func.__closure__
+            or not store.IN_USE
+        ):
             return None
         digest = hashlib.sha256(self._identity(key).encode()).hexdigest()[:12]
         return f"{self.folder}/{self.__name__}-{digest}{store.SUFFIX}".lstrip("/")
@@ -278,7 +317,12 @@ class DeclaredFunction:
     """
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
-        self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
+        self.function, self.code, self.address, self.python = (
+            function,
+            code,
+            code.pointer,
+            code.python,
+        )
         self.letters = letters.lower()
         self.arrays = [i for i, letter in enumerate(self.letters) if letter in ARRAYS]
         # weak reference to the array of the last call at each place, or a function that returns None
@@ -298,7 +342,9 @@ class DeclaredFunction:
         actual = signature_of(array) if type(array) is np.ndarray else type(array).__name__
         if actual != letter:
             expected = "{} with {} dimension(s)".format(*ARRAYS[letter])
-            raise TypeError(f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}")
+            raise TypeError(
+                f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}"
+            )
         self.checked[i] = weakref.ref(array)
 
 
@@ -314,7 +360,10 @@ def plain_kinds() -> dict:
     """Numba types of numbers and of arrays of numbers : letter of a signature -> type."""
     types = internals().numba_module().types
     kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
-    return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
+    return kinds | {
+        letter: types.Array(getattr(types, kind), axes, "C")
+        for letter, (kind, axes) in ARRAYS.items()
+    }
 
 
 def declare_function(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
@@ -333,9 +382,16 @@ def signature_of(argument: Any) -> str:
     if type(argument) is not np.ndarray:
         if isinstance(argument, tuple):
             return f"({type(argument).__qualname__} {''.join(map(signature_of, argument))})"
-        return f"[{_dtype_text(argument.dtype)}]" if type(argument) is np.void else LETTERS[type(argument)]
+        return (
+            f"[{_dtype_text(argument.dtype)}]"
+            if type(argument) is np.void
+            else LETTERS[type(argument)]
+        )
     kind, flags = argument.dtype, argument.flags.num
-    if flags & WRITABLE == WRITABLE and (letter := ARRAY_LETTERS.get((kind.char, argument.ndim))) is not None:
+    if (
+        flags & WRITABLE == WRITABLE
+        and (letter := ARRAY_LETTERS.get((kind.char, argument.ndim))) is not None
+    ):
         return letter
     return f"[{_dtype_text(kind)} {argument.ndim} {flags & (WRITABLE | COLUMNS)}]"
 
@@ -363,4 +419,8 @@ class Intrinsic:
         from numba.extending import intrinsic
 
         intrinsic_function = intrinsic(self.define)
-        return next(kind for value, kind in reversed(builtin_registry.globals) if value is intrinsic_function)
+        return next(
+            kind
+            for value, kind in reversed(builtin_registry.globals)
+            if value is intrinsic_function
+        )

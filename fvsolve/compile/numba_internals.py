@@ -18,7 +18,8 @@ from fvsolve.compile.shorter_compilation import shorten_compilation
 from fvsolve.compile.store import IN_USE, Code
 
 DIGEST = hashlib.sha256().digest_size
-LOADED_CODE: dict[str, bytes] = {}  # machine code that numba has loaded and the store lacks, by its symbol
+# machine code that numba has loaded and the store lacks, by its symbol
+LOADED_CODE: dict[str, bytes] = {}
 CACHE_DIR_LOCK = threading.Lock()  # locked while numba's cache folder is set
 
 
@@ -51,7 +52,9 @@ def dispatcher_class() -> type:
     bare = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
     class Dispatcher(CPUDispatcher):
-        def __init__(self, function: Callable, cache: bool, folder: str = "", **options: Any) -> None:
+        def __init__(
+            self, function: Callable, cache: bool, folder: str = "", **options: Any
+        ) -> None:
             super().__init__(function, targetoptions=options)
             self.cache, self.folder, self.options = cache, folder, options
             if cache:
@@ -69,7 +72,9 @@ def dispatcher_class() -> type:
             """Dispatcher without wrappers, created at first use by compiled code."""
             if bare.items() <= self.options.items():
                 return self
-            return Dispatcher(self.py_func, self.cache, f"{self.folder}/within".strip("/"), **self.options | bare)
+            return Dispatcher(
+                self.py_func, self.cache, f"{self.folder}/within".strip("/"), **self.options | bare
+            )
 
         @property
         def _numba_type_(self):
@@ -98,7 +103,8 @@ def cache_file_class() -> type:
         def _load_data(self, name: str) -> Any:
             content = file_access.read(Path(self._data_path(name)))
             if content is None:
-                raise OSError(f"{name} cannot be read, or others can write it")  # numba then compiles it again
+                # numba then compiles it again
+                raise OSError(f"{name} cannot be read, or others can write it")
             digest, data = content[:DIGEST], content[DIGEST:]
             if hashlib.sha256(data).digest() != digest:
                 raise OSError(f"{name} is damaged")  # numba then compiles it again
@@ -135,4 +141,6 @@ def code_of(compiled, wrappers: bool = True) -> Code:
     """
     find, names = compiled.library.get_pointer_to_function, compiled.fndesc
     pointer = find(names.llvm_cfunc_wrapper_name) if wrappers else 0
-    return Code(find(names.llvm_func_name), pointer, compiled.entry_point if wrappers else None, compiled)
+    return Code(
+        find(names.llvm_func_name), pointer, compiled.entry_point if wrappers else None, compiled
+    )

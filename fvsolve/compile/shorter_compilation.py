@@ -41,7 +41,10 @@ def generate_code_on_request() -> None:
         if codegen._engine.get_global_value_address(name):
             set_environment_now(name, environment)
 
-    codegen.set_env, codegen._library_class = set_environment, library_class(environments, set_environment)
+    codegen.set_env, codegen._library_class = (
+        set_environment,
+        library_class(environments, set_environment),
+    )
 
 
 def library_class(environments: dict[str, Any], set_environment: Callable) -> type:
@@ -58,7 +61,8 @@ def library_class(environments: dict[str, Any], set_environment: Callable) -> ty
             if not self.large:
                 self._verify_declare_only_symbols()
             self._finalized = True
-            if self._object_caching_enabled and self._compiled_object is not None:  # from a cache file
+            # from a cache file
+            if self._object_caching_enabled and self._compiled_object is not None:
                 self.generate()
 
         @global_compiler_lock
@@ -75,7 +79,9 @@ def library_class(environments: dict[str, Any], set_environment: Callable) -> ty
 
         def get_pointer_to_function(self, name: str) -> int:
             self._ensure_finalized()
-            if not self.generated and name in {function.name for function in self.get_defined_functions()}:
+            if not self.generated and name in {
+                function.name for function in self.get_defined_functions()
+            }:
                 self.generate()
             return super().get_pointer_to_function(name) if self.generated else 0
 
@@ -113,7 +119,8 @@ class LargeFunctions:
 
     def finalize(self: Any) -> None:
         for library in self._linking_libraries:
-            self.large |= getattr(library, "large", {})  # a library from before this change has none
+            # a library from before this change has none
+            self.large |= getattr(library, "large", {})
         linked = []
         for library in dict.fromkeys(self._linking_libraries):
             names = exported_names(library)
@@ -129,7 +136,8 @@ class LargeFunctions:
         """Link the large functions, before the machine code is generated."""
         if self.large:
             self._get_module_for_linking()  # kept for later callers, without the large functions
-            for module in reversed(self.large.values()):  # callers first: LLVM links what is already used
+            # callers first: LLVM links what is already used
+            for module in reversed(self.large.values()):
                 self._final_module.link_in(module, preserve=True)
 
 
@@ -137,13 +145,19 @@ def exported_names(library: Any) -> list[str]:
     """Names of the functions of a code library of numba that others call."""
     library._ensure_finalized()
     functions = library._final_module.functions
-    return [each.name for each in functions if each.linkage.name == "external" and not each.is_declaration]
+    return [
+        each.name
+        for each in functions
+        if each.linkage.name == "external" and not each.is_declaration
+    ]
 
 
 def is_large(function: Any) -> bool:
     """True if LLVM does not inline a function."""
     instructions = (line for block in function.blocks for line in block.instructions)
-    return any(k >= LARGE for k, _ in enumerate(instructions)) and b"alwaysinline" not in [*function.attributes]
+    return any(k >= LARGE for k, _ in enumerate(instructions)) and b"alwaysinline" not in [
+        *function.attributes
+    ]
 
 
 def compare_flags_quickly() -> None:

@@ -73,9 +73,14 @@ def target() -> dict[str, str]:
         "numba": numba_version(),
         "llvmlite": llvmlite.__version__,
         "numpy": numpy.__version__,
-        "settings": " ".join(sorted(f"{name}={value}" for name, value in os.environ.items()
-                                    if name.startswith("NUMBA_") and not IGNORED_SETTINGS.match(name))),
-    }  # fmt: skip
+        "settings": " ".join(
+            sorted(
+                f"{name}={value}"
+                for name, value in os.environ.items()
+                if name.startswith("NUMBA_") and not IGNORED_SETTINGS.match(name)
+            )
+        ),
+    }
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:8]
     return settings | {"name": f"{settings['processor']}-{digest}"}
 
@@ -86,7 +91,13 @@ def numba_version() -> str:
     folder = numba_folder()
     text = (folder / "_version.py").read_text(encoding="utf-8") if folder else ""
     match = re.search(r'version"?\s*[:=]\s*["\']([^"\']+)', text)
-    return match[1] if match else sys.modules["numba"].__version__ if "numba" in sys.modules else "unknown"
+    return (
+        match[1]
+        if match
+        else sys.modules["numba"].__version__
+        if "numba" in sys.modules
+        else "unknown"
+    )
 
 
 def numba_folder() -> Path | None:
@@ -117,7 +128,10 @@ def write(path: Path, identity: str, compiled, code: bytes, wrappers: bool) -> N
     if wrappers:
         if compiled.environment.consts:  # Python objects, which a file cannot contain
             return
-        symbols |= {"pointer": names.llvm_cfunc_wrapper_name, "python": names.llvm_cpython_wrapper_name}
+        symbols |= {
+            "pointer": names.llvm_cfunc_wrapper_name,
+            "python": names.llvm_cpython_wrapper_name,
+        }
         symbols["environment"] = names.env_name
     needed = [name for name in runtime_symbols() if name.encode() in code]
     head = {"function": identity, "target": target()["name"], "symbols": symbols, "wanted": needed}
@@ -153,8 +167,10 @@ def read(path: Path, identity: str) -> Code | None:
     header, _, object_code = data.partition(b"\n")
     head = json.loads(header)
     if head["target"] != target()["name"]:
-        _warn(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; the "
-                "code is compiled again")  # fmt: skip
+        _warn(
+            f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; the "
+            "code is compiled again"
+        )
         return None
     if head["function"] != identity:
         return None
@@ -163,7 +179,9 @@ def read(path: Path, identity: str) -> Code | None:
         with contextlib.suppress(RuntimeError):  # LLVM writes missing symbols to standard error
             return _link(head["symbols"], head["wanted"], object_code, identity)
     reason = (
-        f"numba {numba_version()} has no {', '.join(missing)}" if missing else "it calls functions that are not loaded"
+        f"numba {numba_version()} has no {', '.join(missing)}"
+        if missing
+        else "it calls functions that are not loaded"
     )
     _warn(f"{path}: code of {identity.split()[0]} cannot be loaded: {reason}; it is compiled again")
     return None
@@ -195,7 +213,12 @@ def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identi
         environment = own.Environment({})
         ctypes.c_void_p.from_address(library[symbols["environment"]]).value = id(environment)
         python = own.make_function(
-            sys.modules[__name__], identity.split()[0], identity, library[symbols["python"]], environment, (library,)
+            sys.modules[__name__],
+            identity.split()[0],
+            identity,
+            library[symbols["python"]],
+            environment,
+            (library,),
         )
     pointer = library[symbols["pointer"]] if "pointer" in symbols else 0
     return Code(library[symbols["address"]], pointer, python, library)
@@ -223,7 +246,9 @@ def runtime_symbols() -> dict[str, int]:
     addresses = {"_Py_NoneStruct": id(None)}
     for module in (numba_extension("_helperlib"), numba_extension("_dynfunc")):
         addresses |= {f"numba_{name}": address for name, address in module.c_helpers.items()}
-    exceptions = (e for e in vars(builtins).values() if isinstance(e, type) and issubclass(e, BaseException))
+    exceptions = (
+        e for e in vars(builtins).values() if isinstance(e, type) and issubclass(e, BaseException)
+    )
     return addresses | {f"PyExc_{e.__name__}": id(e) for e in exceptions}
 
 
@@ -233,8 +258,14 @@ def numba_extension(name: str):
     full = f"numba.{name}"
     if full in sys.modules:
         return sys.modules[full]
-    path = next(candidate for end in EXTENSION_SUFFIXES if (candidate := numba_folder() / f"{name}{end}").is_file())
+    path = next(
+        candidate
+        for end in EXTENSION_SUFFIXES
+        if (candidate := numba_folder() / f"{name}{end}").is_file()
+    )
     loader = ExtensionFileLoader(full, str(path))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_file_location(full, path, loader=loader))
+    module = importlib.util.module_from_spec(
+        importlib.util.spec_from_file_location(full, path, loader=loader)
+    )
     loader.exec_module(module)
     return module

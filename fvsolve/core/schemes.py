@@ -12,7 +12,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-STENCIL = range(-2, 3)  # cells that a linear scheme may use, relative to the cell upstream of the face
+# cells that a linear scheme may use, relative to the cell upstream of the face
+STENCIL = range(-2, 3)
 LEAST_CELLS = 5  # number of cells that a pipe needs for a scheme with a stencil of five
 Weights = tuple[Fraction, ...]
 
@@ -58,7 +59,8 @@ class Scheme:
     cavities: bool = False
     extra_cells: int = 0
     own_end_factors: tuple[float, ...] = ()
-    branches: tuple[tuple[str, Weights], ...] = ()  # linear schemes for fixed switches; for muscl see its limiter
+    # linear schemes for fixed switches; for muscl see its limiter
+    branches: tuple[tuple[str, Weights], ...] = ()
 
     @property
     def limited(self) -> bool:
@@ -85,7 +87,9 @@ class Scheme:
         """True if the scheme `smooth` gives x^degree exactly at the face x = 1, from averages over cells [k, k + 1]."""
         power = degree + 1
         averages = (Fraction((k + 1) ** power - k**power, power) for k in STENCIL)
-        return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
+        return (
+            sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
+        )
 
     @property
     def order(self) -> int:
@@ -152,7 +156,10 @@ SCHEMES = {
     )
 }  # fmt: skip
 LINEAR = dict(
-    sorted(((name, scheme) for name, scheme in SCHEMES.items() if not scheme.limited), key=lambda pair: pair[1].order)
+    sorted(
+        ((name, scheme) for name, scheme in SCHEMES.items() if not scheme.limited),
+        key=lambda pair: pair[1].order,
+    )
 )
 LIMITED = {name: scheme for name, scheme in SCHEMES.items() if scheme.limited}
 
@@ -226,8 +233,12 @@ class Limiter(NamedTuple):
         return not (self.own and self.own.departures)
 
 
-UNITY, DOUBLE, HALF, ZERO = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)
-LIMITERS_VARIABLE = "FVSOLVE_LIMITERS"  # environment variable with the limiters of users, for other processes
+UNITY = Fraction(1)
+DOUBLE = Fraction(2)
+HALF = Fraction(1, 2)
+ZERO = Fraction(0)
+# environment variable with the limiters of users, for other processes
+LIMITERS_VARIABLE = "FVSOLVE_LIMITERS"
 LIMITERS = {
     "minmod": Limiter(((UNITY, ZERO), (ZERO, UNITY)), 1.0),
     "van-leer": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),

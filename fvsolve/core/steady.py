@@ -19,7 +19,8 @@ DENSE_LIMIT = 150  # number of unknowns up to which a dense solver is faster
 DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular system
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding
 SMALL = 1e-9  # relative residual below which a node counts as balanced
-LARGEST_IMBALANCE = 1e-6  # relative residual of the balance of a node above which a solution is refused
+# relative residual of the balance of a node above which a solution is refused
+LARGEST_IMBALANCE = 1e-6
 ROUNDING_SHARE = 1e-12  # flows below this share of the flow scale are rounding
 LEAST_SCALE = 1e-9  # least typical mass flow of a piece [kg/s]
 
@@ -55,9 +56,12 @@ class Edge:
         """This edge with other numbers of nodes; number : number of a node -> its other number."""
         held = self.held_potential
         return replace(
-            self, i=number[self.i], j=number[self.j], sensed_nodes=tuple(number[i] for i in self.sensed_nodes),
+            self,
+            i=number[self.i],
+            j=number[self.j],
+            sensed_nodes=tuple(number[i] for i in self.sensed_nodes),
             held_potential=None if held is None else (number[held[0]], held[1]),
-        )  # fmt: skip
+        )
 
 
 @dataclass
@@ -80,7 +84,9 @@ class SteadyState:
     pieces: list[tuple[np.ndarray, np.ndarray, float]] = field(default_factory=list)
 
 
-def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, Any]) -> SteadyState:
+def solve_steady(
+    held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, Any]
+) -> SteadyState:
     """Solve for the flows of edges that balance the demands of nodes, and for the potentials of these nodes.
 
     Pieces of the network that no edge connects do not affect each other: each has the bits of its own problem.
@@ -108,11 +114,18 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
         _newton(alike)
         for problem in alike:
             _through_shut(problem)
-            result.potential[problem.nodes], result.flow[problem.own] = problem.potential, problem.flow
+            result.potential[problem.nodes], result.flow[problem.own] = (
+                problem.potential,
+                problem.flow,
+            )
             result.converged &= problem.converged
             result.split |= problem.split
-            if problem.split and (weakest := int(np.abs(problem.open_part()).argmax())) >= len(problem.active):
-                result.undetermined.append(int(problem.nodes[problem.unknown[weakest - len(problem.active)]]))
+            if problem.split and (weakest := int(np.abs(problem.open_part()).argmax())) >= len(
+                problem.active
+            ):
+                result.undetermined.append(
+                    int(problem.nodes[problem.unknown[weakest - len(problem.active)]])
+                )
     return result
 
 
@@ -127,7 +140,9 @@ def _pieces(count: int, edges: list[Edge]) -> list[tuple[np.ndarray, np.ndarray]
     """Nodes and edges of each piece of a network, in order; edges connect the nodes that they join, sense or hold."""
     joined = [(edge.i, edge.j) for edge in edges]
     joined += [(edge.i, i) for edge in edges for i in edge.sensed_nodes]
-    joined += [(edge.i, edge.held_potential[0]) for edge in edges if edge.held_potential is not None]
+    joined += [
+        (edge.i, edge.held_potential[0]) for edge in edges if edge.held_potential is not None
+    ]
     nodes: dict[int, list[int]] = {}
     links: dict[int, list[int]] = {}
     labels = union(count, joined)
@@ -135,7 +150,9 @@ def _pieces(count: int, edges: list[Edge]) -> list[tuple[np.ndarray, np.ndarray]
         nodes.setdefault(label, []).append(i)
     for e, edge in enumerate(edges):
         links.setdefault(labels[edge.i], []).append(e)
-    return [(np.array(own), np.array(links.get(label, []), dtype=int)) for label, own in nodes.items()]
+    return [
+        (np.array(own), np.array(links.get(label, []), dtype=int)) for label, own in nodes.items()
+    ]
 
 
 class _Problem:
@@ -151,7 +168,8 @@ class _Problem:
     def __init__(self, held, demand, edges, scale, potential) -> None:
         self.held, self.demand, self.scale, self.potential = held, demand, scale, potential
         self.converged, self.split = True, False
-        self.open_part: Callable[[], np.ndarray] = lambda: np.zeros(1)  # of the last singular system
+        # of the last singular system
+        self.open_part: Callable[[], np.ndarray] = lambda: np.zeros(1)
         quiet = _quiet(held, demand, edges)
         self.edges = [
             replace(edge, row=None, flow=0.0, drop=lambda flow: 0.0) if e in quiet else edge
@@ -160,11 +178,17 @@ class _Problem:
         self.flow = np.array([edge.flow for edge in self.edges])
         parts, self.free_sets = _components(held, self.edges)
         dropped, entries = _references(held, demand, self.edges, parts, self.free_sets)
-        self.floating = {i for group in self.free_sets if group not in entries.values() for i in group}
+        self.floating = {
+            i for group in self.free_sets if group not in entries.values() for i in group
+        }
         self.no_solution = [
-            i for i in self.floating if abs(sum(demand[k] for k in _group_of(self.free_sets, i))) > SMALL * scale[1]
+            i
+            for i in self.floating
+            if abs(sum(demand[k] for k in _group_of(self.free_sets, i))) > SMALL * scale[1]
         ]
-        self.active = [e for e, edge in enumerate(self.edges) if edge.row is not None and not edge.shut]
+        self.active = [
+            e for e, edge in enumerate(self.edges) if edge.row is not None and not edge.shut
+        ]
         self.rows = self.active + [e for e in entries]
         self.unknown = [i for i in range(held.size) if np.isnan(held[i])]
         self.balances = [i for i in self.unknown if i not in dropped and i not in self.floating]
@@ -180,13 +204,17 @@ class _Problem:
         for edge, flow in zip(self.edges, self.flow, strict=True):
             missing[edge.i] += flow
             missing[edge.j] -= flow
-        largest = max(np.abs(self.flow).max(initial=0.0), np.abs(self.demand[self.unknown]).max(initial=0.0))
+        largest = max(
+            np.abs(self.flow).max(initial=0.0), np.abs(self.demand[self.unknown]).max(initial=0.0)
+        )
         least = LARGEST_IMBALANCE * largest + ROUNDING_SHARE * self.scale[1]
         return bool(np.all(np.abs(missing[self.balances]) <= least))
 
     def pattern(self) -> tuple:
         """Structure of the system: equal for problems that one call of `_newton` solves together."""
-        ends = tuple((edge.i, edge.j, edge.shut, isinstance(edge.row, np.ndarray)) for edge in self.edges)
+        ends = tuple(
+            (edge.i, edge.j, edge.shut, isinstance(edge.row, np.ndarray)) for edge in self.edges
+        )
         lists = (self.active, self.rows, self.unknown, self.balances, self.anchors, self.columns)
         return ends, *map(tuple, lists)
 
@@ -204,11 +232,21 @@ def _quiet(held, demand, edges) -> set[int]:
     quiet = set()
     for group in _components(held, edges)[0]:
         given = [held[i] for i in group if held[i] == held[i]]
-        driven = any(edge.i in group and (edge.drives or edge.held_potential is not None) for edge in edges)
-        if driven or not given or any(demand[i] != 0.0 or (i in fed and held[i] != held[i]) for i in group):
+        driven = any(
+            edge.i in group and (edge.drives or edge.held_potential is not None) for edge in edges
+        )
+        if (
+            driven
+            or not given
+            or any(demand[i] != 0.0 or (i in fed and held[i] != held[i]) for i in group)
+        ):
             continue
         if max(given) - min(given) <= SMALL_DROP * (1e5 + max(map(abs, given))):
-            quiet |= {e for e, edge in enumerate(edges) if edge.row is not None and not edge.shut and edge.i in group}
+            quiet |= {
+                e
+                for e, edge in enumerate(edges)
+                if edge.row is not None and not edge.shut and edge.i in group
+            }
     return quiet
 
 
@@ -306,14 +344,26 @@ def _newton(problems: list[_Problem]) -> None:
     sizes, ended = np.full(len(problems), np.inf), np.zeros(len(problems), dtype=int)
     waiting = np.arange(len(problems))
     for sweep in range(200):
-        take_changes(waiting, system.changes(waiting), active, unknown, system.scales, system.flow, system.potential,
-                     sizes, sweep, ended)  # fmt: skip
+        take_changes(
+            waiting,
+            system.changes(waiting),
+            active,
+            unknown,
+            system.scales,
+            system.flow,
+            system.potential,
+            sizes,
+            sweep,
+            ended,
+        )
         waiting = np.flatnonzero(ended == 0)
         if not waiting.size:
             break
     for k, problem in enumerate(problems):
         problem.flow, problem.potential = system.flow[k], system.potential[k]
-        problem.converged = bool(ended[k] == 1 or (ended[k] == 0 and sizes[k] < 1e-9)) and problem.is_balanced()
+        problem.converged = (
+            bool(ended[k] == 1 or (ended[k] == 0 and sizes[k] < 1e-9)) and problem.is_balanced()
+        )
 
 
 class _System:
@@ -332,32 +382,54 @@ class _System:
         begin = np.cumsum([0, *(sum(c >= 0 for c in row) for row in first.columns)]).tolist()
         at = {i: k for k, i in enumerate(first.balances, start=len(first.rows))}
         height = len(first.rows) + len(first.balances) + len(first.anchors)
-        ends = [(at[i], e, sign, first.column.get(("flow", e), -1)) for e, edge in enumerate(first.edges)
-                for i, sign in ((edge.i, -1), (edge.j, 1)) if i in at and not edge.shut]  # fmt: skip
+        ends = [
+            (at[i], e, sign, first.column.get(("flow", e), -1))
+            for e, edge in enumerate(first.edges)
+            for i, sign in ((edge.i, -1), (edge.j, 1))
+            if i in at and not edge.shut
+        ]
         self.terms = np.array([end[:3] for end in ends], dtype=int).reshape(-1, 3)
         entries = [(k, c) for k, row in enumerate(first.columns) for c in row if c >= 0]
         entries += [(k, own) for k, _, _, own in ends if own >= 0]
         last = enumerate(first.anchors, start=len(first.rows) + len(first.balances))
         entries += [(k, first.column["node", i]) for k, i in last]
         self.places = np.array([k * self.width + c for k, c in entries], dtype=int)
-        constant = [float(sign) for _, _, sign, own in ends if own >= 0] + [1.0] * len(first.anchors)
-        self.values, self.drawn = np.zeros((len(problems), len(entries))), np.zeros((len(problems), height))
+        constant = [float(sign) for _, _, sign, own in ends if own >= 0] + [1.0] * len(
+            first.anchors
+        )
+        self.values, self.drawn = (
+            np.zeros((len(problems), len(entries))),
+            np.zeros((len(problems), height)),
+        )
         self.values[:, begin[-1] :] = constant
         for k, problem in enumerate(problems):
-            self.drawn[k, len(first.rows) :][: len(first.balances)] = problem.demand[first.balances] / problem.scale[1]
+            self.drawn[k, len(first.rows) :][: len(first.balances)] = (
+                problem.demand[first.balances] / problem.scale[1]
+            )
         self.right = self.drawn.copy()
         dense = max(height, self.width) <= DENSE_LIMIT
         self.matrices = np.zeros((len(problems), height * self.width if dense else 0))
         lawful = [k for k, e in enumerate(first.rows) if isinstance(first.edges[e].row, np.ndarray)]
         edges = [first.rows[k] for k in lawful]
-        rows = [(k, begin[k], e, first.edges[e].i, first.edges[e].j, *(c >= 0 for c in first.columns[k][1:]))
-                for k, e in zip(lawful, edges, strict=True)]  # fmt: skip
+        rows = [
+            (
+                k,
+                begin[k],
+                e,
+                first.edges[e].i,
+                first.edges[e].j,
+                *(c >= 0 for c in first.columns[k][1:]),
+            )
+            for k, e in zip(lawful, edges, strict=True)
+        ]
         self.law_rows = np.array(rows, dtype=int).reshape(-1, 7)
         laws = [problem.edges[e].row for problem in problems for e in edges]
         self.laws = np.array(laws, dtype=float).reshape(len(problems), len(edges), LAW_SIZE)
         # numbers of the other rows, with their values
         by_law = set(lawful)
-        self.others = [(k, slice(begin[k], begin[k + 1])) for k in range(len(first.rows)) if k not in by_law]
+        self.others = [
+            (k, slice(begin[k], begin[k + 1])) for k in range(len(first.rows)) if k not in by_law
+        ]
 
     def changes(self, numbers: np.ndarray) -> np.ndarray:
         """Changes of the unknowns of some problems in the next iteration; NaN where a number is not finite."""
@@ -365,11 +437,33 @@ class _System:
             for k in numbers:
                 found = _edge_row(self.problems[k], row, self.flow[k], self.potential[k])
                 self.values[k, own], self.right[k, row] = found
-        fill_systems(numbers, self.law_rows, self.laws, self.terms, self.places, self.drawn, self.scales, self.flow,
-                     self.potential, self.values, self.right, self.matrices)  # fmt: skip
-        matrices = self.matrices[numbers].reshape(numbers.size, -1, self.width) if self.matrices.size else None
-        return _solve(self.places, self.values[numbers], self.right[numbers], matrices, self.width,
-                      [self.problems[k] for k in numbers])  # fmt: skip
+        fill_systems(
+            numbers,
+            self.law_rows,
+            self.laws,
+            self.terms,
+            self.places,
+            self.drawn,
+            self.scales,
+            self.flow,
+            self.potential,
+            self.values,
+            self.right,
+            self.matrices,
+        )
+        matrices = (
+            self.matrices[numbers].reshape(numbers.size, -1, self.width)
+            if self.matrices.size
+            else None
+        )
+        return _solve(
+            self.places,
+            self.values[numbers],
+            self.right[numbers],
+            matrices,
+            self.width,
+            [self.problems[k] for k in numbers],
+        )
 
 
 def _columns(column, e, edge) -> tuple[int, ...]:
@@ -396,8 +490,12 @@ def _edge_row(problem, row, flow, potential) -> tuple[list[float], float]:
     drop, values = potential[edge.i] - potential[edge.j], []
     *sensed, own, start, end = problem.columns[row]
     if own >= 0:
-        alpha, beta, gamma, *lifts = edge.row(flow[e], drop, *(potential[i] for i in edge.sensed_nodes))
-        values = [-lift for lift, at in zip(lifts, sensed, strict=True) if at >= 0] + [alpha * scale[1] / scale[0]]
+        alpha, beta, gamma, *lifts = edge.row(
+            flow[e], drop, *(potential[i] for i in edge.sensed_nodes)
+        )
+        values = [-lift for lift, at in zip(lifts, sensed, strict=True) if at >= 0] + [
+            alpha * scale[1] / scale[0]
+        ]
     else:
         beta, gamma = 1.0, drop - edge.drop(flow[e])
     values += [-beta] * (start >= 0) + [beta] * (end >= 0)
@@ -417,7 +515,8 @@ def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
     if matrices is not None and right.shape[1] == size and finite.all():
         try:
             solutions = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
-            if np.abs(np.matmul(matrices, solutions[:, :, None])[:, :, 0] - right).max() < 1e-6:  # False for NaN
+            # False for NaN
+            if np.abs(np.matmul(matrices, solutions[:, :, None])[:, :, 0] - right).max() < 1e-6:
                 return solutions
         except np.linalg.LinAlgError:
             pass
@@ -426,7 +525,9 @@ def _solve(places, values, right, matrices, size, problems) -> np.ndarray:
         if matrices is not None:
             solutions[k], open_part = _solve_dense(matrices[k], right[k])
         else:
-            solutions[k], open_part = _solve_sparse(values[k], places // size, places % size, right[k], size)
+            solutions[k], open_part = _solve_sparse(
+                values[k], places // size, places % size, right[k], size
+            )
         if open_part is not None:
             problems[k].split, problems[k].open_part = True, open_part
     return solutions
@@ -443,7 +544,8 @@ def _solve_dense(matrix, right):
             pass
     solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=1e-12)
     regular = rank == matrix.shape[1]
-    return solution, None if regular else lambda: np.linalg.svd(matrix)[2][-1]  # which costs more than the solution
+    # which costs more than the solution
+    return solution, None if regular else lambda: np.linalg.svd(matrix)[2][-1]
 
 
 def _solve_sparse(values, i, j, right, size):
@@ -465,7 +567,9 @@ def _solve_sparse(values, i, j, right, size):
                 return solution, None
         except RuntimeError:  # singular
             pass
-    system = bmat([[identity(len(right)), matrix], [matrix.T, -DAMPING * identity(size)]], format="csc")
+    system = bmat(
+        [[identity(len(right)), matrix], [matrix.T, -DAMPING * identity(size)]], format="csc"
+    )
     factors = splu(system)
 
     def open_part() -> np.ndarray:
@@ -487,8 +591,11 @@ def _through_shut(problem) -> None:
     for _ in range(60):
         moved = 0.0
         for group in groups:
-            around = [potential[edge.j if edge.i in group else edge.i] for edge in edges
-                      if edge.shut and ((edge.i in group) != (edge.j in group))]  # fmt: skip
+            around = [
+                potential[edge.j if edge.i in group else edge.i]
+                for edge in edges
+                if edge.shut and ((edge.i in group) != (edge.j in group))
+            ]
             if not around:
                 continue
             low, high = min(around), max(around)

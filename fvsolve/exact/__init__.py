@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 __all__ = ["NAMES", "Exact", "ExactStart", "Solution", "find_faults", "solution"]
 
 HEADER = re.compile(r'\n(?P<attribute>[A-Z_]+) = Exact\(\s*"(?P<name>[\w-]+)"')
-NAMES = Declarations("exact solution", "exact solutions", ("exact/*.py",), HEADER)  # names in the case file
+# names in the case file
+NAMES = Declarations("exact solution", "exact solutions", ("exact/*.py",), HEADER)
 
 
 def find_faults(case) -> Iterator[tuple[tuple, str]]:
@@ -44,7 +45,11 @@ def _exact(name: str) -> "Exact":
     value = NAMES.load(name)
     if not isinstance(value, Exact):
         found = NAMES[name]
-        raise FvsolveError(unreadable(found.source, found.place, "it is not an Exact; expected one of fvsolve.exact"))
+        raise FvsolveError(
+            unreadable(
+                found.source, found.place, "it is not an Exact; expected one of fvsolve.exact"
+            )
+        )
     return value
 
 

@@ -17,11 +17,20 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.solution import Exact, ExactStart, Solution, count_faults, fault, reservoirs, value
+from fvsolve.exact.solution import (
+    Exact,
+    ExactStart,
+    Solution,
+    count_faults,
+    fault,
+    reservoirs,
+    value,
+)
 
 LAMINAR = 2000.0  # largest Reynolds number that is certainly laminar
 TALBOT = 24  # points of the contour: twelve digits for smooth functions
-PERIOD, DAMPING = 2.5, 18.0  # of the Bromwich line: period / time span, and damping exponent of the next period
+# of the Bromwich line: period / time span, and damping exponent of the next period
+PERIOD, DAMPING = 2.5, 18.0
 TAIL = 1e-10  # relative size at which the transform of a smooth demand is cut off
 
 
@@ -42,16 +51,27 @@ def laminar_faults(case):
             yield fault(case, ("links", link), text)
             continue
         if pipe.creep_elements and name == "laminar-line":
-            yield fault(case, ("links", link, "wall", "creep"), "holds only for walls without creep")
+            yield fault(
+                case, ("links", link, "wall", "creep"), "holds only for walls without creep"
+            )
         law = pipe.friction
-        if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
+        if (
+            law.model != "unsteady"
+            or law.weighting == "vardy-brown"
+            or law.roughness is None
+            or pipe.minor_loss
+        ):
             other = ' (or model = "none")' if name == "creeping-line" else ""
             text = 'needs friction with model = "unsteady", `roughness` instead of `factor`, and `weighting` "zielke" '
-            yield fault(case, ("links", link, "friction"), f"{text}or left out{other}, and no `minor_loss`")
+            yield fault(
+                case, ("links", link, "friction"), f"{text}or left out{other}, and no `minor_loss`"
+            )
         elif case.properties.viscosity is None:
             yield ("fluid",), f'viscosity is missing; the exact solution "{name}" needs it'
         elif reynolds(case, pipe) >= LAMINAR:
-            text = f"is laminar, but the demand reaches the Reynolds number {reynolds(case, pipe):.0f}"
+            text = (
+                f"is laminar, but the demand reaches the Reynolds number {reynolds(case, pipe):.0f}"
+            )
             yield fault(case, ("links", link, "friction"), f"{text}; expected below {LAMINAR:g}")
 
 
@@ -59,7 +79,12 @@ def creep_faults(case):
     """Yield a fault (keys, message) for each difference of a case from one pipe with wall creep and a demand."""
     for keys, text in laminar_faults(case):
         link = case.links[keys[1]] if keys[0] == "links" and len(keys) > 2 else None
-        if link is None or keys[2] != "friction" or link.friction.model != "none" or link.minor_loss:
+        if (
+            link is None
+            or keys[2] != "friction"
+            or link.friction.model != "none"
+            or link.minor_loss
+        ):
             yield keys, text
     for link, pipe in case.links.items():
         if not pipe.creep_elements:
@@ -68,9 +93,15 @@ def creep_faults(case):
 
 def reynolds(case, pipe) -> float:
     """Reynolds number of the greatest possible flow: the greatest demand plus its range, which reflections may add."""
-    demand = next(case.nodes[end].demand for end in (pipe.from_, pipe.to) if case.nodes[end].kind == "junction")
+    demand = next(
+        case.nodes[end].demand
+        for end in (pipe.from_, pipe.to)
+        if case.nodes[end].kind == "junction"
+    )
     flow = float(np.max(np.abs(demand.value)) + np.ptp(demand.value))
-    return 4.0 * flow * case.properties.density / (math.pi * pipe.diameter * case.properties.viscosity)
+    return (
+        4.0 * flow * case.properties.density / (math.pi * pipe.diameter * case.properties.viscosity)
+    )
 
 
 def solution(case, start: ExactStart) -> Solution:
@@ -84,7 +115,9 @@ def solution(case, start: ExactStart) -> Solution:
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         p, m = line.waves(pipe.length - x if line.reversed else x, t)
         m = -m if line.reversed else m
-        return start.pressure[pipe.from_] + drop * x / pipe.length + p, flow + m / case.properties.density
+        return start.pressure[
+            pipe.from_
+        ] + drop * x / pipe.length + p, flow + m / case.properties.density
 
     end = 0.0 if line.reversed else pipe.length
     pressures = reservoirs(case) | {line.gate: lambda t: along(name, end, t)[0]}
@@ -97,12 +130,22 @@ class LineDeviation:
     def __init__(self, case, pipe) -> None:
         self.reversed = case.nodes[pipe.to].kind == "reservoir"
         self.gate = pipe.from_ if self.reversed else pipe.to
-        self.demand, self.rho, self.t0 = case.nodes[self.gate].demand, case.properties.density, case.numerics.start
-        self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(next(iter(case.links)))
+        self.demand, self.rho, self.t0 = (
+            case.nodes[self.gate].demand,
+            case.properties.density,
+            case.numerics.start,
+        )
+        self.end, self.length, self.a = (
+            case.numerics.end,
+            pipe.length,
+            case.wave_speed(next(iter(case.links))),
+        )
         self.area, self.viscosity = math.pi / 4.0 * pipe.diameter**2, case.properties.viscosity
         self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
         self.plug_flow = pipe.friction.model == "none"
-        self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.creep_elements]
+        self.elements = [
+            (growth * self.rho * self.a**2, time) for growth, time in pipe.creep_elements
+        ]
 
     def waves(self, x, t):
         """Deviations of pressure [Pa] and mass flow [kg/s] at distances x [m] and times t [s].
@@ -121,7 +164,12 @@ class LineDeviation:
         places = []
         for when, _ in self._demand_jumps():
             place = (t - when) * self.a % (4.0 * self.length)
-            back = [self.length - place, place - self.length, 3.0 * self.length - place, place - 3.0 * self.length]
+            back = [
+                self.length - place,
+                place - self.length,
+                3.0 * self.length - place,
+                place - 3.0 * self.length,
+            ]
             places += [x for x in back if t > when and 0.0 <= x <= self.length]
         places = np.array(places)
         return self.length - places if self.reversed else places
@@ -164,8 +212,13 @@ class LineDeviation:
         p, m = np.zeros(x.shape), np.zeros(x.shape)
         for when, change in self._demand_jumps() if self.demand.kind == "step" else ():
             age = t - when
-            for k in range(1 + int(max(0.0, np.max(age, initial=0.0)) * self.a / (2.0 * self.length))):
-                for sign, d in ((1.0, (2 * k + 1) * self.length - x), (-1.0, (2 * k + 1) * self.length + x)):
+            for k in range(
+                1 + int(max(0.0, np.max(age, initial=0.0)) * self.a / (2.0 * self.length))
+            ):
+                for sign, d in (
+                    (1.0, (2 * k + 1) * self.length - x),
+                    (-1.0, (2 * k + 1) * self.length + x),
+                ):
                     wave_p, wave_m = self._unit_jump(d, age - d / self.a)
                     p -= (-1) ** k * sign * change * wave_p
                     m += (-1) ** k * change * wave_m
@@ -185,12 +238,17 @@ class LineDeviation:
         theta = np.arange(1, TALBOT) * (math.pi / TALBOT)
         cot = 1.0 / np.tan(theta)
         node = np.concatenate([[1.0 + 0.0j], theta * (cot + 1j)]) * (0.4 * TALBOT)  # s tau
-        weight = np.concatenate([[0.5 + 0.0j], 1.0 + 1j * (theta + (theta * cot - 1.0) * cot)]) * np.exp(node) * 0.4
+        weight = (
+            np.concatenate([[0.5 + 0.0j], 1.0 + 1j * (theta + (theta * cot - 1.0) * cot)])
+            * np.exp(node)
+            * 0.4
+        )
         for s, w in zip(node, weight, strict=True):
             inertia, storage = self.ratio(s / tau), self.storage_ratio(s / tau)
             ratio = inertia * storage
             root = np.sqrt(ratio)
-            slow = np.exp(-(s / tau) * (d / self.a) * (ratio - 1.0) / (root + 1.0))  # without the pure delay
+            # without the pure delay
+            slow = np.exp(-(s / tau) * (d / self.a) * (ratio - 1.0) / (root + 1.0))
             m[here] += (w / s * slow).real
             p[here] += (w / s * slow * root / storage).real * (self.a / self.area)
         return p, m
@@ -204,9 +262,15 @@ class LineDeviation:
         gamma, far = s / self.a * root, np.exp(-2.0 * s / self.a * root * self.length)
         p, m = np.empty(x.size), np.empty(x.size)
         for k, (place, age) in enumerate(zip(np.ravel(x), np.ravel(t) - self.t0, strict=True)):
-            first, second = np.exp(-gamma * (self.length - place)), np.exp(-gamma * (self.length + place))
+            first = np.exp(-gamma * (self.length - place))
+            second = np.exp(-gamma * (self.length + place))
             turn = np.exp(s * age) * input_ / (1.0 + far)
-            p[k] = -(step / math.pi) * np.sum((turn * (first - second) * root / storage).real) * self.a / self.area
+            p[k] = (
+                -(step / math.pi)
+                * np.sum((turn * (first - second) * root / storage).real)
+                * self.a
+                / self.area
+            )
             m[k] = (step / math.pi) * np.sum((turn * (first + second)).real)
         return p.reshape(x.shape), m.reshape(x.shape)
 
@@ -219,7 +283,10 @@ class LineDeviation:
             while True:
                 s = DAMPING / (PERIOD * span) + 1j * step * np.arange(count)
                 transform = self._transform(s)
-                if np.max(np.abs(transform[-count // 4 :])) <= TAIL * np.abs(transform[0]) or count >= 65536:
+                if (
+                    np.max(np.abs(transform[-count // 4 :])) <= TAIL * np.abs(transform[0])
+                    or count >= 65536
+                ):
                     break
                 count *= 2
             transform[0] *= 0.5
@@ -234,8 +301,10 @@ class LineDeviation:
         t = (middle[:, None] + 0.5 * width[:, None] * places).ravel()
         w = (0.5 * width[:, None] * weights).ravel()
         hair = 0.05 * np.repeat(width, places.size)  # four values give the exact slope of a cubic
-        slope = (8.0 * (self._flow(t + 0.5 * hair) - self._flow(t - 0.5 * hair))
-                 - (self._flow(t + hair) - self._flow(t - hair))) / (6.0 * hair)  # fmt: skip
+        slope = (
+            8.0 * (self._flow(t + 0.5 * hair) - self._flow(t - 0.5 * hair))
+            - (self._flow(t + hair) - self._flow(t - hair))
+        ) / (6.0 * hair)
         nonzero = np.flatnonzero(slope)
         result = np.zeros(s.size, dtype=complex)
         for i in nonzero:

@@ -53,14 +53,23 @@ def column_faults(case):
             yield fault(case, ("nodes", node), "needs constant pressures and no demand")
     held = {node for node, part in case.nodes.items() if part.kind == "reservoir"}
     fixed = set(held)
-    fixed |= {end for _, part in valves if {part.from_, part.to} & fixed for end in (part.from_, part.to)}
+    fixed |= {
+        end for _, part in valves if {part.from_, part.to} & fixed for end in (part.from_, part.to)
+    }
     for link, part in columns:
         for end in {part.from_, part.to} - fixed:
-            yield fault(case, ("links", link), f"needs a reservoir at {end}, or a valve to a reservoir")
+            yield fault(
+                case, ("links", link), f"needs a reservoir at {end}, or a valve to a reservoir"
+            )
         if {part.from_, part.to}.isdisjoint(held):
             yield fault(case, ("links", link), "needs a reservoir at one end or both")
-        if part.friction.model not in ("none", "steady", "quasi-steady") or part.friction.roughness is not None:
-            yield fault(case, ("links", link, "friction"), "supports only friction with a Darcy `factor`")
+        if (
+            part.friction.model not in ("none", "steady", "quasi-steady")
+            or part.friction.roughness is not None
+        ):
+            yield fault(
+                case, ("links", link, "friction"), "supports only friction with a Darcy `factor`"
+            )
     joined = {end for _, part in columns for end in (part.from_, part.to)}
     for link, part in valves:
         if len(joined & {part.from_, part.to}) != 1:
@@ -82,12 +91,18 @@ def column_solution(case, start: ExactStart) -> Solution:
     [(name, column)], valves = columns_and_valves(case)
     rho, t0 = case.properties.density, case.numerics.start
     area = 0.25 * math.pi * column.diameter**2
-    potential = {node: law(t0) + rho * case.gravity * case.elevation(node) for node, law in reservoirs(case).items()}
-    wall = ((column.friction.factor or 0.0) * column.length / column.diameter + column.minor_loss) / (2 * rho * area**2)
+    potential = {
+        node: law(t0) + rho * case.gravity * case.elevation(node)
+        for node, law in reservoirs(case).items()
+    }
+    wall = (
+        (column.friction.factor or 0.0) * column.length / column.diameter + column.minor_loss
+    ) / (2 * rho * area**2)
     valve = valves[0][1] if valves else None
     ends = [column.from_, column.to]
     drive = sum(
-        sign * potential[reservoir_beyond(case, end, valve)] for sign, end in zip((1.0, -1.0), ends, strict=True)
+        sign * potential[reservoir_beyond(case, end, valve)]
+        for sign, end in zip((1.0, -1.0), ends, strict=True)
     )
 
     def resistance(t):
@@ -99,10 +114,18 @@ def column_solution(case, start: ExactStart) -> Solution:
     pieces, m = [], start.flow[name] * rho
     for begin, end in zip([t0, *jumps], [*jumps, math.inf], strict=True):
         pieces.append((begin, m, wall + resistance(begin), resistance(begin)))
-        m = float(flow_after(m, drive, pieces[-1][2], area / column.length, np.array(min(end, 1e300) - begin)))
+        m = float(
+            flow_after(
+                m, drive, pieces[-1][2], area / column.length, np.array(min(end, 1e300) - begin)
+            )
+        )
 
     def mass_flow(t):
-        return _piecewise(pieces, t, lambda s, piece: flow_after(piece[1], drive, piece[2], area / column.length, s))
+        return _piecewise(
+            pieces,
+            t,
+            lambda s, piece: flow_after(piece[1], drive, piece[2], area / column.length, s),
+        )
 
     def valve_drop(t):  # in the direction of the column
         m = mass_flow(t)
@@ -110,11 +133,14 @@ def column_solution(case, start: ExactStart) -> Solution:
 
     result = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
     if valve is not None:
-        same = valve.from_ == column.to or valve.to == column.from_  # positive flow directions of valve and column
+        # positive flow directions of valve and column
+        same = valve.from_ == column.to or valve.to == column.from_
         result.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * (1.0 if same else -1.0)
         node = valve.from_ if valve.from_ in ends else valve.to
         sign = 1.0 if node == column.to else -1.0
-        base = potential[reservoir_beyond(case, node, valve)] - rho * case.gravity * case.elevation(node)
+        base = potential[reservoir_beyond(case, node, valve)] - rho * case.gravity * case.elevation(
+            node
+        )
         result.pressure[node] = lambda t: base + sign * valve_drop(t)
     return result
 
@@ -174,7 +200,10 @@ def with_level_faults(faults: Callable, solution: Callable) -> Callable:
         found = list(faults(case))
         yield from found
         if not found:
-            flows = {name: getattr(link, "initial_flow", None) or 0.0 for name, link in case.links.items()}
+            flows = {
+                name: getattr(link, "initial_flow", None) or 0.0
+                for name, link in case.links.items()
+            }
             yield from level_faults(solution(case, ExactStart({}, flows)))
 
     return find_faults
@@ -193,12 +222,19 @@ def levelling_faults(case):
 
 def levelling_solution(case, start: ExactStart) -> Solution:
     """Pressures [Pa] and levels [m] of the vessels, and flow [m3/s] of the orifice, as functions of time."""
-    (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
+    (link, part), rho, t0 = (
+        next(iter(case.links.items())),
+        case.properties.density,
+        case.numerics.start,
+    )
     ends, weight = (part.from_, part.to), rho * case.gravity
     area = part.flow_area() * float(value(part.opening, t0))
     pressures = [initial_pressure(case, node) for node in ends]
     softness = [pressure_per_volume(case, node) for node in ends]  # pressure per volume of inflow
-    drop = sum(s * (p + weight * case.elevation(n)) for s, p, n in zip((1, -1), pressures, ends, strict=True))
+    drop = sum(
+        s * (p + weight * case.elevation(n))
+        for s, p, n in zip((1, -1), pressures, ends, strict=True)
+    )
     slope = sum(softness) * area * np.sqrt(2.0 / rho)
 
     def left(t):
@@ -208,14 +244,22 @@ def levelling_solution(case, start: ExactStart) -> Solution:
         return np.sign(drop) * area * np.sqrt(2.0 / rho) * left(t)
 
     def moved(t):  # volume that has left `from`
-        return np.sign(drop) * (abs(drop) - left(t) ** 2) / sum(softness) if sum(softness) else 0.0 * left(t)
+        return (
+            np.sign(drop) * (abs(drop) - left(t) ** 2) / sum(softness)
+            if sum(softness)
+            else 0.0 * left(t)
+        )
 
     result = Solution(case, flow={link: flow})
     for k, (sign, node) in enumerate(zip((-1.0, 1.0), ends, strict=True)):
-        result.pressure[node] = lambda t, k=k, sign=sign: pressures[k] + sign * softness[k] * moved(t)
+        result.pressure[node] = lambda t, k=k, sign=sign: (
+            pressures[k] + sign * softness[k] * moved(t)
+        )
         if case.nodes[node].kind == "tank":
             tank = case.nodes[node]
-            result.level[node] = lambda t, tank=tank, sign=sign: tank.level + sign * moved(t) / tank.area
+            result.level[node] = lambda t, tank=tank, sign=sign: (
+                tank.level + sign * moved(t) / tank.area
+            )
     return result
 
 
@@ -252,7 +296,9 @@ def oscillation_faults(case):
 def oscillation_solution(case, start: ExactStart) -> Solution:
     """Levels [m] and pressures [Pa] of both end nodes, and flow [m3/s] of the column, as functions of time."""
     name, column = next(iter(case.links.items()))
-    rho, g, t0 = case.properties.density, case.gravity, case.numerics.start
+    rho = case.properties.density
+    g = case.gravity
+    t0 = case.numerics.start
     slope = 0.25 * math.pi * column.diameter**2 / column.length
     ends = (column.from_, column.to)
     soft = [1.0 / case.nodes[n].area if case.nodes[n].kind == "tank" else 0.0 for n in ends]
@@ -281,11 +327,15 @@ def oscillation_solution(case, start: ExactStart) -> Solution:
 
 def spring_mass_faults(case):
     """Yield a fault (keys, message) for each difference of a case from one mass on springs and dampers."""
-    yield from count_faults(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
+    yield from count_faults(
+        case, [node for node in case.nodes.values() if node.kind == "mass"], "mass"
+    )
     if not any(link.kind == "spring" for link in case.links.values()):
         yield fault(case, ("links",), "needs a spring")
     for name, link in case.links.items():
-        if not any(end is not None and case.nodes[end].kind == "mass" for end in (link.from_, link.to)):
+        if not any(
+            end is not None and case.nodes[end].kind == "mass" for end in (link.from_, link.to)
+        ):
             yield fault(case, ("links", name), "supports only links that join the mass")
         if link.kind == "force" and not constant_from(link.force, -math.inf):
             yield fault(case, ("links", name, "force"), "needs a constant force")
@@ -294,24 +344,36 @@ def spring_mass_faults(case):
 def spring_mass_solution(case, start: ExactStart) -> Solution:
     """Position [m] and velocity [m/s] of the only mass of a case, as functions of time."""
     name, mass = next(item for item in case.nodes.items() if item[1].kind == "mass")
-    at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}
+    at = {
+        body: part.initial_position
+        for body, part in case.nodes.items()
+        if part.domain == "translational"
+    }
     stiffness = damping = force = 0.0
     for link in case.links.values():
         sign = 1.0 if link.to == name else -1.0
         if link.kind == "spring":
             stiffness += link.stiffness
             length = at[link.to] - at[link.from_]
-            push = link.preload if link.preload is not None else -link.stiffness * (length - link.free_length)
+            push = (
+                link.preload
+                if link.preload is not None
+                else -link.stiffness * (length - link.free_length)
+            )
             force += sign * push
         elif link.kind == "damper":
             damping += link.damping
         else:
             force += sign * link.force.first
-    decay, v0, t0 = damping / (2.0 * mass.mass), mass.initial_velocity, case.numerics.start
+    decay = damping / (2.0 * mass.mass)
+    v0 = mass.initial_velocity
+    t0 = case.numerics.start
     kappa = cmath.sqrt(decay**2 - stiffness / mass.mass)
     end, place = force / stiffness, mass.initial_position
     if case.numerics.initial == "equilibrium":  # the mass then starts at the equilibrium
-        place, end, force = place + end, 0.0, 0.0
+        place = place + end
+        end = 0.0
+        force = 0.0
 
     def parts(t):
         """exp(-decay s) cosh(kappa s) and exp(-decay s) sinh(kappa s) / kappa, with the time s since the start.
@@ -336,7 +398,11 @@ def spring_mass_solution(case, start: ExactStart) -> Solution:
 
 
 COLUMN = Exact(
-    "column", ("reservoir", "junction"), ("rigid-column", "valve", "orifice"), column_faults, column_solution
+    "column",
+    ("reservoir", "junction"),
+    ("rigid-column", "valve", "orifice"),
+    column_faults,
+    column_solution,
 )
 LEVELLING = Exact(
     "levelling",

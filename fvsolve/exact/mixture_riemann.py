@@ -28,7 +28,9 @@ class Mixture:
         return self.area * (1.0 + self.compliance * (p - self.pressure))
 
     def rho(self, p):
-        return self.density / (1.0 - (p - self.pressure) / self.bulk_modulus + self.gas / (p - self.floor))
+        return self.density / (
+            1.0 - (p - self.pressure) / self.bulk_modulus + self.gas / (p - self.floor)
+        )
 
     def m(self, p):
         return self.rho(p) * self.swollen(p)
@@ -39,7 +41,11 @@ class Mixture:
 
     def c(self, p):
         """Wave speed sqrt(A dp / dm) [m/s]."""
-        fall = (1.0 / self.bulk_modulus + self.gas / (p - self.floor) ** 2) * self.rho(p) / self.density
+        fall = (
+            (1.0 / self.bulk_modulus + self.gas / (p - self.floor) ** 2)
+            * self.rho(p)
+            / self.density
+        )
         return np.sqrt(1.0 / (self.rho(p) * (fall + self.compliance * self.area / self.swollen(p))))
 
     def void(self, p):
@@ -50,7 +56,9 @@ class Mixture:
         def gap(log_x: float) -> float:
             return self.m(self.floor + math.exp(log_x)) - m
 
-        return self.floor + math.exp(brentq(gap, -60.0, math.log(0.5 * self.bulk_modulus), xtol=1e-13, rtol=1e-15))
+        return self.floor + math.exp(
+            brentq(gap, -60.0, math.log(0.5 * self.bulk_modulus), xtol=1e-13, rtol=1e-15)
+        )
 
     def thinned(self, p_low: float, p_high: float) -> float:
         """Riemann integral of dp / (rho c) [m/s], over panels of width 1/8 in ln(p - floor)."""
@@ -116,6 +124,8 @@ class RiemannProblem:
         rays = v + law.c(fan)
 
         def at(ray):
-            return law.floor + np.exp(np.interp(ray, rays, np.log(fan - law.floor))), np.interp(ray, rays, v)
+            return law.floor + np.exp(np.interp(ray, rays, np.log(fan - law.floor))), np.interp(
+                ray, rays, v
+            )
 
         return at

@@ -9,11 +9,21 @@ Allievi 1902).
 
 import numpy as np
 
-from fvsolve.exact.solution import Exact, ExactStart, Solution, fault, kinks, reservoirs, value, valve_faults
+from fvsolve.exact.solution import (
+    Exact,
+    ExactStart,
+    Solution,
+    fault,
+    kinks,
+    reservoirs,
+    value,
+    valve_faults,
+)
 
 MAX_PATHS = 20000
 BLOCK = 400_000  # values traced together: number of times x number of paths
-MERGE = 1e-11  # sums of travel times closer than this are merged, relative to the duration of the run
+# sums of travel times closer than this are merged, relative to the duration of the run
+MERGE = 1e-11
 
 
 def find_faults(case):
@@ -26,16 +36,26 @@ def find_faults(case):
                 valves.setdefault(end, []).append(name)
             continue
         if link.friction.model != "none":
-            yield fault(case, ("links", name, "friction"), 'holds only without friction; expected model = "none"')
+            yield fault(
+                case,
+                ("links", name, "friction"),
+                'holds only without friction; expected model = "none"',
+            )
         if link.creep_elements:
-            yield fault(case, ("links", name, "wall", "creep"), "holds only for walls without creep")
+            yield fault(
+                case, ("links", name, "wall", "creep"), "holds only for walls without creep"
+            )
         if link.minor_loss != 0.0:
-            yield fault(case, ("links", name, "minor_loss"), "holds only without losses; expected 0")
+            yield fault(
+                case, ("links", name, "minor_loss"), "holds only without losses; expected 0"
+            )
     for node, names in valves.items():
         if case.nodes[node].kind != "reservoir" and len(names) > 1:
             text = f"supports a single valve at {node}; the case has {len(names)} there"
             yield fault(case, ("links", names[1]), text)
-    piped = {end for link in case.links.values() if link.kind == "pipe" for end in (link.from_, link.to)}
+    piped = {
+        end for link in case.links.values() if link.kind == "pipe" for end in (link.from_, link.to)
+    }
     for node in valves:
         if case.nodes[node].kind in ("junction", "inflow") and node not in piped:
             yield fault(case, ("nodes", node), "needs a pipe at every junction")
@@ -64,17 +84,23 @@ class RayPaths:
         self.weight = self.rho * case.gravity
         self.z = {name: case.elevation(name) for name in case.nodes}
         self.pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
-        self.valves = {name: link for name, link in case.links.items() if link.kind in ("valve", "orifice")}
+        self.valves = {
+            name: link for name, link in case.links.items() if link.kind in ("valve", "orifice")
+        }
         self.speed = {name: case.wave_speed(name) for name in self.pipes}
         self.travel = {name: link.length / self.speed[name] for name, link in self.pipes.items()}
-        self.impedance = {k: self.speed[k] / (0.25 * np.pi * link.diameter**2) for k, link in self.pipes.items()}
+        self.impedance = {
+            k: self.speed[k] / (0.25 * np.pi * link.diameter**2) for k, link in self.pipes.items()
+        }
         self.start, self.reservoirs = start, reservoirs(case)
         self.span = case.numerics.end - self.t0
         self.near = MERGE * self.span
         self.group = {name: name for name in case.nodes}
         for valve in self.valves.values():
             old, new = self.group[valve.from_], self.group[valve.to]
-            self.group = {name: new if member == old else member for name, member in self.group.items()}
+            self.group = {
+                name: new if member == old else member for name, member in self.group.items()
+            }
         self.ends: dict[str, list[tuple[str, int]]] = {name: [] for name in self.group.values()}
         for name, link in self.pipes.items():
             self.ends[self.group[link.from_]].append((name, 0))
@@ -98,16 +124,23 @@ class RayPaths:
                 if when > self.span + self.near:
                     continue
                 key = round(when / self.near)
-                known = next((place[k, other] for k in (key - 1, key, key + 1) if (k, other) in place), None)
+                known = next(
+                    (place[k, other] for k in (key - 1, key, key + 1) if (k, other) in place), None
+                )
                 if known is None:
                     known = place[key, other] = len(paths)
                     paths.append((when, other, {}))
                 sources[pipe, end] = known
             if len(paths) > MAX_PATHS:
-                raise OverflowError("too many reflections to trace; expected a shorter run, or fewer pipes")
+                raise OverflowError(
+                    "too many reflections to trace; expected a shorter run, or fewer pipes"
+                )
         order = sorted(range(len(paths)), key=lambda k: -paths[k][0])
         rank = {old: new for new, old in enumerate(order)}
-        return [(paths[k][0], paths[k][1], {end: rank[old] for end, old in paths[k][2].items()}) for k in order]
+        return [
+            (paths[k][0], paths[k][1], {end: rank[old] for end, old in paths[k][2].items()})
+            for k in order
+        ]
 
     # characteristics and nodes ---------------------------------------------------------------------------------------
 
@@ -117,11 +150,16 @@ class RayPaths:
         It is P + Z M at `to` (end 1) and P - Z M at `from` (end 0), with P = p + rho g z, impedance Z and mass flow M.
         """
         p = [
-            self.start.pressure[node] + self.weight * self.z[node] for node in (self.node(pipe, 0), self.node(pipe, 1))
+            self.start.pressure[node] + self.weight * self.z[node]
+            for node in (self.node(pipe, 0), self.node(pipe, 1))
         ]
         share = np.clip(age / self.travel[pipe], 0.0, 1.0)  # fraction of the length, from this end
         sign = 1.0 if end == 1 else -1.0
-        return p[end] + share * (p[1 - end] - p[end]) + sign * self.impedance[pipe] * self.rho * self.start.flow[pipe]
+        return (
+            p[end]
+            + share * (p[1 - end] - p[end])
+            + sign * self.impedance[pipe] * self.rho * self.start.flow[pipe]
+        )
 
     def trace(self, group: str, t: np.ndarray) -> dict:
         """State of a group of nodes at times t, as a dict of arrays over t.
@@ -156,28 +194,39 @@ class RayPaths:
 
         arrived : (pipe, end) -> arriving characteristic [Pa] at these times, see `first`
         """
-        result, admittance, level = {}, {}, {}
+        result = {}
+        admittance = {}
+        level = {}
         for node in (name for name, own in self.group.items() if own == group):
             ends = [end for end in arrived if self.node(*end) == node]
             if node in self.reservoirs:
-                level[node], admittance[node] = self.reservoirs[node](now) + self.weight * self.z[node], np.inf
+                level[node], admittance[node] = (
+                    self.reservoirs[node](now) + self.weight * self.z[node],
+                    np.inf,
+                )
                 continue
             admittance[node] = sum(1.0 / self.impedance[pipe] for pipe, _ in ends)
             part = self.case.nodes[node]
             demand = value(part.demand, now) if part.kind == "junction" else -value(part.flow, now)
-            incoming = sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * demand
+            incoming = (
+                sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * demand
+            )
             level[node] = incoming / admittance[node]
         for name, valve in self.valves.items():
             if self.group[valve.to] != group:
                 continue
             i, j = valve.from_, valve.to
-            slack = 1.0 / admittance[i] + 1.0 / admittance[j]  # decrease of the potential drop per flow
+            # decrease of the potential drop per flow
+            slack = 1.0 / admittance[i] + 1.0 / admittance[j]
             conductance = 2.0 * self.rho * (valve.flow_area() * value(valve.opening, now)) ** 2
             flow = valve_equation_flow(conductance, slack, level[i] - level[j])
             result["valve", name, 0] = flow / self.rho
             level[i], level[j] = level[i] - flow / admittance[i], level[j] + flow / admittance[j]
         result |= {("node", node, 0): values for node, values in level.items()}
-        result |= {("sent", *end): 2.0 * level[self.node(*end)] - incoming for end, incoming in arrived.items()}
+        result |= {
+            ("sent", *end): 2.0 * level[self.node(*end)] - incoming
+            for end, incoming in arrived.items()
+        }
         return result
 
     # results ---------------------------------------------------------------------------------------------------------
@@ -195,7 +244,9 @@ class RayPaths:
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         link = self.pipes[pipe]
         forward = self._outgoing(pipe, 0, t - x / self.speed[pipe], x)
-        backward = self._outgoing(pipe, 1, t - (link.length - x) / self.speed[pipe], link.length - x)
+        backward = self._outgoing(
+            pipe, 1, t - (link.length - x) / self.speed[pipe], link.length - x
+        )
         z = self.z[link.from_] + x / link.length * (self.z[link.to] - self.z[link.from_])
         p = 0.5 * (forward + backward) - self.weight * z
         return p, 0.5 * (forward - backward) / (self.impedance[pipe] * self.rho)
@@ -237,7 +288,9 @@ class RayPaths:
         for group, part in parts:
             for key in ("pressure", "head", "demand", "flow", "opening"):
                 if hasattr(getattr(part, key, None), "kind"):
-                    result.setdefault(group, set()).update(t for t in kinks(getattr(part, key)) if t >= self.t0)
+                    result.setdefault(group, set()).update(
+                        t for t in kinks(getattr(part, key)) if t >= self.t0
+                    )
             if not self._is_steady(group):
                 result.setdefault(group, set()).add(self.t0)
         return {group: np.array(sorted(times)) for group, times in result.items() if times}
@@ -246,10 +299,15 @@ class RayPaths:
         """True if the pressures of a group of nodes do not change just after the start."""
         after = self.trace(group, np.array([self.t0 + self.near]))
         return all(
-            abs(float(after["node", node, 0][0]) - self.start.pressure[node] - self.weight * self.z[node])
+            abs(
+                float(after["node", node, 0][0])
+                - self.start.pressure[node]
+                - self.weight * self.z[node]
+            )
             <= 1e-9 * abs(self.start.pressure[node])
-            for node, own in self.group.items() if own == group
-        )  # fmt: skip
+            for node, own in self.group.items()
+            if own == group
+        )
 
 
 def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
@@ -260,8 +318,12 @@ def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
     b = conductance * slack
     size = np.abs(drop)
     root = np.sqrt(b * b + 4.0 * conductance * size)
-    flow = np.where(size > 0.0, 2.0 * conductance * size / np.where(b + root > 0.0, b + root, 1.0), 0.0)
+    flow = np.where(
+        size > 0.0, 2.0 * conductance * size / np.where(b + root > 0.0, b + root, 1.0), 0.0
+    )
     return np.copysign(flow, drop)
 
 
-RAYS = Exact("rays", ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice"), find_faults, solution)
+RAYS = Exact(
+    "rays", ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice"), find_faults, solution
+)

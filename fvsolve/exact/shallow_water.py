@@ -69,7 +69,8 @@ def bump(x, t, flow: float = 4.42, level: float = 2.0, transcritical: float = 0.
     before, after = depths(flow, top - bed, True), depths(flow, top - bed, False)
     h = np.where(x <= 10.0, before, after)
     if transcritical == 2.0:
-        first = 10.0 + np.sqrt((top - outlet) / 0.05)  # from here on the head of the outlet is enough to pass
+        # from here on the head of the outlet is enough to pass
+        first = 10.0 + np.sqrt((top - outlet) / 0.05)
         at = brentq(jump_imbalance, first + 1e-9, 12.0, args=(flow, top, outlet))
         h = np.where(x < at, h, depths(flow, outlet - bed, True))
     return Flow(h, flow / h, bed)
@@ -93,7 +94,9 @@ def depths(flow: float, energy: np.ndarray, subcritical: bool) -> np.ndarray:
 
 
 @solution
-def macdonald(x, t, flow: float = 2.0, manning: float = 0.0, factor: float = 0.0, supercritical: float = 0.0) -> Flow:
+def macdonald(
+    x, t, flow: float = 2.0, manning: float = 0.0, factor: float = 0.0, supercritical: float = 0.0
+) -> Flow:
     """Steady flow in a channel of 1 km with friction, whose bed is made for a given depth (MacDonald 1997).
 
     h = (4 / g)^(1/3) (1 + exp(-16 (x/L - 1/2)^2) / 2), or (1 - exp(-36 (x/L - 1/2)^2) / 5) if `supercritical` is 1;
@@ -102,16 +105,22 @@ def macdonald(x, t, flow: float = 2.0, manning: float = 0.0, factor: float = 0.0
     size, rate = (-0.2, 36.0) if supercritical else (0.5, 16.0)
 
     def depth(s):
-        return (4.0 / GRAVITY) ** (1.0 / 3.0) * (1.0 + size * np.exp(-rate * (s / 1000.0 - 0.5) ** 2))
+        return (4.0 / GRAVITY) ** (1.0 / 3.0) * (
+            1.0 + size * np.exp(-rate * (s / 1000.0 - 0.5) ** 2)
+        )
 
     def slope(s, _):
         h, bell = depth(s), size * np.exp(-rate * (s / 1000.0 - 0.5) ** 2)
         rise = (4.0 / GRAVITY) ** (1.0 / 3.0) * bell * -2.0 * rate * (s / 1000.0 - 0.5) / 1000.0
-        friction = manning**2 * flow**2 / h ** (10.0 / 3.0) + factor * flow**2 / (8.0 * GRAVITY * h**3)
+        friction = manning**2 * flow**2 / h ** (10.0 / 3.0) + factor * flow**2 / (
+            8.0 * GRAVITY * h**3
+        )
         return (flow**2 / (GRAVITY * h**3) - 1.0) * rise - friction
 
     line = np.linspace(0.0, 1000.0, 4001)
-    fall = solve_ivp(slope, (0.0, 1000.0), [0.0], t_eval=line, rtol=1e-10, atol=1e-12, max_step=5.0).y[0]
+    fall = solve_ivp(
+        slope, (0.0, 1000.0), [0.0], t_eval=line, rtol=1e-10, atol=1e-12, max_step=5.0
+    ).y[0]
     return Flow(h := depth(x), flow / h, np.interp(x, line, fall - fall[-1]))
 
 
@@ -128,7 +137,12 @@ def dam_break(x, t, left: float = 0.005, right: float = 0.001, dam: float = 5.0)
     fan = np.clip((2.0 * c - ray) / 3.0, 0.0, c)
     h, u = fan**2 / GRAVITY, 2.0 * (c - fan)
     if right > 0.0:
-        middle = brentq(lambda d: 2.0 * (c - np.sqrt(GRAVITY * d)) - behind_bore(d, right), right, left, xtol=1e-15)
+        middle = brentq(
+            lambda d: 2.0 * (c - np.sqrt(GRAVITY * d)) - behind_bore(d, right),
+            right,
+            left,
+            xtol=1e-15,
+        )
         speed = 2.0 * (c - np.sqrt(GRAVITY * middle))
         front = middle * speed / (middle - right)
         h, u = np.where(h < middle, middle, h), np.where(h < middle, speed, u)
@@ -158,9 +172,14 @@ def dressler(x, t, left: float = 6.0, dam: float = 1000.0, chezy: float = 40.0) 
         ray = (place - dam) / (t * c)
         gap = np.maximum(2.0 - ray, 1e-9)
         first = 6.0 / (5.0 * gap) - 2.0 / 3.0 + 4.0 * np.sqrt(3.0) / 135.0 * gap**1.5
-        second = 12.0 / gap - 8.0 / 3.0 + 8.0 * np.sqrt(3.0) / 189.0 * gap**1.5 - 108.0 / (7.0 * gap**2)
+        second = (
+            12.0 / gap - 8.0 / 3.0 + 8.0 * np.sqrt(3.0) / 189.0 * gap**1.5 - 108.0 / (7.0 * gap**2)
+        )
         weight = GRAVITY**2 / chezy**2 * t
-        depth = np.maximum(2.0 / 3.0 * c - (place - dam) / (3.0 * t) + weight * first, 0.0) ** 2 / GRAVITY
+        depth = (
+            np.maximum(2.0 / 3.0 * c - (place - dam) / (3.0 * t) + weight * first, 0.0) ** 2
+            / GRAVITY
+        )
         return depth, 2.0 / 3.0 * c + 2.0 * (place - dam) / (3.0 * t) + weight * second
 
     h, u = corrected(x)

@@ -65,13 +65,17 @@ class Solution:
             return self._along(probe, t)
         if quantity == "force" and self.pipe is not None:
             return self._force(self.case.links[name], t)
-        laws = getattr(self, quantity if quantity in ("level", "flow", "position", "velocity") else "pressure")
+        laws = getattr(
+            self, quantity if quantity in ("level", "flow", "position", "velocity") else "pressure"
+        )
         if name not in laws and quantity in ("pressure", "gauge_pressure", "head"):
             laws = reservoirs(self.case)
         if name not in laws:
             return np.full(t.shape, np.nan)
         values = laws[name](t)
-        return self._converted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
+        return self._converted(
+            values, quantity, self.case.elevation(name) if quantity == "head" else 0.0
+        )
 
     def averages(self, name: str, edges: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Averages of pressure [Pa] and flow [m3/s] over the cells of a pipe between `edges` [m] at time t.
@@ -85,7 +89,9 @@ class Solution:
     def _force(self, pipe, t):
         """Unbalanced axial force on a frictionless pipe [N]: area times change of p(to) - p(from) since the start."""
         start = np.array([self.case.numerics.start])
-        rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
+        rise, first = (
+            self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start)
+        )
         return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
 
     def _along(self, probe, t):
@@ -112,7 +118,9 @@ class Solution:
         return pressure
 
 
-def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+def averages(
+    f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None
+) -> tuple[np.ndarray, ...]:
     """Averages over each interval of `edges` of the quantities whose values f(x) returns : tuple of float64[intervals].
 
     They are computed with five Gauss points between `cuts`.
@@ -155,7 +163,9 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
         mean, amplitude, period, phase = schedule.wave
         return mean + amplitude * np.sin(2.0 * np.pi * t / period + phase)
     if schedule.kind == "formula":
-        found = [schedule.program.value(time, time if left else np.inf) for time in t.ravel().tolist()]
+        found = [
+            schedule.program.value(time, time if left else np.inf) for time in t.ravel().tolist()
+        ]
         return np.array(found).reshape(t.shape)
     if schedule.kind == "control":
         return np.full(t.shape, np.nan)  # known only in a run
@@ -176,13 +186,19 @@ def kinks(schedule) -> list[float]:
         return []
     if schedule.kind == "formula":
         return schedule.program.break_times
-    return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
+    return [
+        float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)
+    ]
 
 
 def constant_from(schedule, t: float) -> bool:
     """True if a schedule is constant from time t on."""
     later = schedule.time > t
-    return schedule.constant or not np.any(later) or bool(np.all(schedule.value[later] == value(schedule, t)))
+    return (
+        schedule.constant
+        or not np.any(later)
+        or bool(np.all(schedule.value[later] == value(schedule, t)))
+    )
 
 
 def fault(case, keys: tuple, text: str) -> tuple[tuple, str]:
@@ -214,16 +230,23 @@ def count_faults(case, items: list, noun: str):
     noun : name of such a part in the message
     """
     if len(items) != 1:
-        yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
+        yield (
+            ("exact", "name"),
+            f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}',
+        )
 
 
 def valve_faults(case, name: str):
     """Yield a fault (keys, message) if a valve or orifice of a case has a law other than the turbulent one."""
     part = case.links[name]
     if part.characteristic != "linear":
-        yield fault(case, ("links", name, "characteristic"), 'supports only characteristic = "linear"')
+        yield fault(
+            case, ("links", name, "characteristic"), 'supports only characteristic = "linear"'
+        )
     if part.laminar_reynolds is not None:
-        yield fault(case, ("links", name, "laminar_reynolds"), "supports no laminar flow; remove this key")
+        yield fault(
+            case, ("links", name, "laminar_reynolds"), "supports no laminar flow; remove this key"
+        )
 
 
 def level_faults(exact: Solution):

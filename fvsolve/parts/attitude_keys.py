@@ -13,7 +13,8 @@ from fvsolve.parts.value import Matrix, Quantity, ReadContext, Rows, UsualRange,
 
 USUAL_ANGLES = UsualRange(-6.3, 6.3, "one turn in either direction")
 ROUNDING = 1e-6  # rounding of numbers typed with six digits; larger deviations give a notice
-TOLERANCE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; larger deviations are faults
+# R'R - I of a matrix typed with three digits, and [rad] between forms; larger deviations are faults
+TOLERANCE = 1e-3
 SHORTEST = 1e-100  # smallest length of an axis
 ANGLES = ("roll", "pitch", "yaw")
 
@@ -30,28 +31,50 @@ class Attitude(Table):
     (45); a matrix. If several forms are given, they must agree; the first in this order is used.
     """
 
-    roll: Annotated[float | None, Angle("angle about x, the last rotation [rad]; 0 if left out")] = None
-    pitch: Annotated[float | None, Angle("angle about y, the second rotation [rad]; 0 if left out")] = None
-    yaw: Annotated[float | None, Angle("angle about z, the first rotation [rad]; 0 if left out")] = None
-    zyz: Annotated[tuple[float, ...] | None, Rows(
-        "angle", length=3, about="classical Euler angles [psi, theta, phi] about z, y and z [rad]", usual=USUAL_ANGLES,
-    )] = None  # fmt: skip
+    roll: Annotated[
+        float | None, Angle("angle about x, the last rotation [rad]; 0 if left out")
+    ] = None
+    pitch: Annotated[
+        float | None, Angle("angle about y, the second rotation [rad]; 0 if left out")
+    ] = None
+    yaw: Annotated[
+        float | None, Angle("angle about z, the first rotation [rad]; 0 if left out")
+    ] = None
+    zyz: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "angle",
+            length=3,
+            about="classical Euler angles [psi, theta, phi] about z, y and z [rad]",
+            usual=USUAL_ANGLES,
+        ),
+    ] = None
     axis: Annotated[
-        tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by `angle`")
+        tuple[float, ...] | None,
+        Rows("number", length=3, about="axis of a single rotation by `angle`"),
     ] = None
     angle: Annotated[float | None, Angle("angle of a single rotation about `axis` [rad]")] = None
     euler_parameters: Annotated[
-        tuple[float, ...] | None, Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]")
+        tuple[float, ...] | None,
+        Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]"),
     ] = None
     matrix: Annotated[
         tuple | None,
-        Matrix("number", about="rotation matrix R; its columns are the rotated axes in the reference axes"),
+        Matrix(
+            "number",
+            about="rotation matrix R; its columns are the rotated axes in the reference axes",
+        ),
     ] = None
 
     synonyms: ClassVar[dict[str, str]] = {
-        "rpy": "roll, pitch, yaw", "heel": "roll", "trim": "pitch", "heading": "yaw", "rotation": "matrix",
-        "quaternion": "euler_parameters = [eta, e1, e2, e3]", "euler_angles": "zyz, or roll, pitch, yaw",
-    }  # fmt: skip
+        "rpy": "roll, pitch, yaw",
+        "heel": "roll",
+        "trim": "pitch",
+        "heading": "yaw",
+        "rotation": "matrix",
+        "quaternion": "euler_parameters = [eta, e1, e2, e3]",
+        "euler_angles": "zyz, or roll, pitch, yaw",
+    }
     forms: ClassVar[dict[tuple[str, ...], Callable[..., np.ndarray]]] = {
         ANGLES: attitude.of_roll_pitch_yaw,
         ("zyz",): lambda zyz: attitude.of_zyz(*zyz),
@@ -74,23 +97,34 @@ class Attitude(Table):
     def key_faults(cls, given: dict[str, Any]) -> list:
         pairs = (("axis", "angle"), ("angle", "axis"))
         alone = [(key, other) for key, other in pairs if key in given and other not in given]
-        return super().key_faults(given) + [((key,), f"needs the key `{other}` too") for key, other in alone]
+        return super().key_faults(given) + [
+            ((key,), f"needs the key `{other}` too") for key, other in alone
+        ]
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Return the table unchanged. Raises ValueFault if a form is not a rotation, or differs from the first form."""
         values = valid_values(cls, given, setting)
         faults = {}
-        for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
+        for key, example in (
+            ("axis", "[0, 0, 1]"),
+            ("euler_parameters", "[1, 0, 0, 0], the identity"),
+        ):
             if is_zero_vector(values.get(key)):
                 faults[key] = f"has zero length; expected a length of 1, for example {example}"
         faults |= dict(_rotation_faults(values))
         complete = [
-            keys for keys in cls.forms if all(item in values and item not in faults for item in keys if item in given)
+            keys
+            for keys in cls.forms
+            if all(item in values and item not in faults for item in keys if item in given)
         ]
-        sound = cls.model_construct(**{key: values[key] for keys in complete for key in keys if key in values})
+        sound = cls.model_construct(
+            **{key: values[key] for keys in complete for key in keys if key in values}
+        )
         faults |= {
-            key: f"{text}; expected the same rotation" for key, text, apart in sound._deviations() if apart > TOLERANCE
+            key: f"{text}; expected the same rotation"
+            for key, text, apart in sound._deviations()
+            if apart > TOLERANCE
         }
         if faults:
             raise ValueFault([((key,), text) for key, text in faults.items()])
@@ -102,7 +136,8 @@ class Attitude(Table):
         off = attitude.defect(np.array(self.matrix))[0] if self.matrix else 0.0
         if off > ROUNDING:
             message = (
-                f"is not exactly a rotation: R'R differs from the identity by {off:.2g}; the nearest rotation is used"
+                "is not exactly a rotation: R'R differs from the identity by "
+                f"{off:.2g}; the nearest rotation is used"
             )
             yield ("matrix",), off, ROUNDING, message
         for key, text, apart in self._deviations():
@@ -131,7 +166,8 @@ class Attitude(Table):
             angle = attitude.axis_angle(attitude.deviation(other, rotation))[1]
             name = "roll, pitch, yaw" if first == "roll" else first
             text = (
-                f"is {math.degrees(angle):.3g} deg from the attitude that {name} give{'' if first == 'roll' else 's'}"
+                f"is {math.degrees(angle):.3g} deg from the attitude that {name} "
+                f"give{'' if first == 'roll' else 's'}"
             )
             yield (key, text, angle)
 
@@ -148,14 +184,21 @@ def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext
     return result
 
 
-def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+def length_notices(
+    key: str, given: tuple[float, ...] | None
+) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
     """Yield a notice if a direction or Euler parameters have a length other than 1; they are divided by their length.
 
     key : key of the vector; given : its components
     """
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > ROUNDING:
-        yield ((key,), length, 1.0, f"the vector has length {length:.6g}, not 1, and is divided by this length")
+        yield (
+            (key,),
+            length,
+            1.0,
+            f"the vector has length {length:.6g}, not 1, and is divided by this length",
+        )
 
 
 def is_zero_vector(given: tuple[float, ...] | None) -> bool:

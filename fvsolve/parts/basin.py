@@ -43,14 +43,19 @@ MANNING_RANGE = UsualRange(0.008, 0.3, "smooth plastic to dense grass")
 SIDES = ("west", "east", "south", "north")
 RECTANGLE_KEYS = ("size", "cells", "grading", "holes")  # keys of rectangles
 SLOSHING_MODELS = ("frozen", "modes", "cells")
-VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of a physics that has velocities
+# fields of a physics that has velocities
+VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}
 
 
 class Rating(Table):
     """Flow out of a basin by the level of its water."""
 
-    level: Annotated[tuple[float, ...], Rows("level", rising=True, about="levels above the elevation [m]")]
-    flow: Annotated[tuple[float, ...], Rows("flow", nonnegative, about="flow out at each level [m3/s]")]
+    level: Annotated[
+        tuple[float, ...], Rows("level", rising=True, about="levels above the elevation [m]")
+    ]
+    flow: Annotated[
+        tuple[float, ...], Rows("flow", nonnegative, about="flow out at each level [m3/s]")
+    ]
 
     @property
     def fault(self) -> tuple[str, str] | None:
@@ -63,7 +68,10 @@ class Rating(Table):
         rises = np.diff(self.flow)
         first = int(np.argmax(rises > 0.0))
         if not rises.any() or (rises[first:] <= 0.0).any():
-            return "flow", "does not rise; expected flows that rise above the highest level without flow"
+            return (
+                "flow",
+                "does not rise; expected flows that rise above the highest level without flow",
+            )
         return None
 
     @property
@@ -87,11 +95,17 @@ class PointList(Value):
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or len(given) < self.least:
             text = f"{show(given)} is not a list of {self.least} or more points"
-            raise ValueError(f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]][: self.least])}")
+            raise ValueError(
+                f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]][: self.least])}"
+            )
         read_point = Rows("length", length=2).read
-        points = tuple(read_each(enumerate(given), lambda point: read_point(point, setting)).values())
+        points = tuple(
+            read_each(enumerate(given), lambda point: read_point(point, setting)).values()
+        )
         if any(start == stop for start, stop in zip(points, points[1:], strict=False)):
-            raise ValueError(f"{show(given)} has two equal points in succession; expected different points")
+            raise ValueError(
+                f"{show(given)} has two equal points in succession; expected different points"
+            )
         return points
 
     def json(self) -> dict[str, Any]:
@@ -101,27 +115,52 @@ class PointList(Value):
 class Patch(Table):
     """A section of the boundary of a basin: a node `BASIN.PATCH` for links, an open boundary, or a moving wall."""
 
-    boundary_keys: ClassVar[tuple[str, ...]] = ("boundary", "impedance", *CLOSURES)  # those that exclude a link
+    # those that exclude a link
+    boundary_keys: ClassVar[tuple[str, ...]] = ("boundary", "impedance", *CLOSURES)
 
     side: Annotated[
         str | None,
-        Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),
+        Choice(
+            "side",
+            SIDES,
+            "side of the rectangle, required for a rectangle; a mesh file names its own patches",
+        ),
     ] = None
-    at: Annotated[tuple[float, float] | None, Rows(
-        "length", length=2, about="middle of an interior patch, a square of the size `area` [m]", changes=SHAPE,
-    )] = None  # fmt: skip
+    at: Annotated[
+        tuple[float, float] | None,
+        Rows(
+            "length",
+            length=2,
+            about="middle of an interior patch, a square of the size `area` [m]",
+            changes=SHAPE,
+        ),
+    ] = None
     area: Annotated[
         float | None,
-        Quantity("area", positive, "area about `at`: the cells with their centre in it, one at least", changes=SHAPE),
+        Quantity(
+            "area",
+            positive,
+            "area about `at`: the cells with their centre in it, one at least",
+            changes=SHAPE,
+        ),
     ] = None
     polygon: Annotated[
         tuple[tuple[float, ...], ...] | None,
-        PointList(3, "corners of an interior patch, instead of `at`: the cells with their centre in it, one at least"),
+        PointList(
+            3,
+            "corners of an interior patch, instead of `at`: the cells with their centre in it, one at least",
+        ),
     ] = None
-    span: Annotated[tuple[float, float] | None, Rows(
-        "length", nonnegative, length=2,
-        about="start and end along the side, on grid lines [m]; the whole side if left out", changes=SHAPE,
-    )] = None  # fmt: skip
+    span: Annotated[
+        tuple[float, float] | None,
+        Rows(
+            "length",
+            nonnegative,
+            length=2,
+            about="start and end along the side, on grid lines [m]; the whole side if left out",
+            changes=SHAPE,
+        ),
+    ] = None
     boundary: Annotated[
         str | None,
         Choice(
@@ -130,54 +169,95 @@ class Patch(Table):
             "boundary condition: open (waves leave) or critical (free overfall); a wall if left out",
         ),
     ] = None
-    impedance: Annotated[float | None, Quantity(
-        "impedance", nonnegative, "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
-    )] = None  # fmt: skip
+    impedance: Annotated[
+        float | None,
+        Quantity(
+            "impedance",
+            nonnegative,
+            "ratio of pressure to velocity of waves in a liquid, instead of `boundary` [Pa s/m]",
+        ),
+    ] = None
     stage: Annotated[
         Schedule | None,
-        Scheduled("level", about="level of the water at the patch above the elevation [m]", needs_unit=True),
+        Scheduled(
+            "level",
+            about="level of the water at the patch above the elevation [m]",
+            needs_unit=True,
+        ),
     ] = None
-    discharge: Annotated[Schedule | None, Scheduled("flow", about="flow into the basin through the patch [m3/s]")] = (
-        None
-    )
-    depth: Annotated[Schedule | None, Scheduled(
-        "length", nonnegative, "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, "
-        "and while a schedule is 0",
-    )] = None  # fmt: skip
+    discharge: Annotated[
+        Schedule | None, Scheduled("flow", about="flow into the basin through the patch [m3/s]")
+    ] = None
+    depth: Annotated[
+        Schedule | None,
+        Scheduled(
+            "length",
+            nonnegative,
+            "depth of a supercritical inflow by `discharge` [m]; at most critical flow if left out, "
+            "and while a schedule is 0",
+        ),
+    ] = None
     rating: Annotated[
-        Rating | None, Nested(Rating, "flow out of the basin by the level at the patch, linear between points")
+        Rating | None,
+        Nested(Rating, "flow out of the basin by the level at the patch, linear between points"),
     ] = None
-    normal_slope: Annotated[float | None, Quantity(
-        "number", positive, "slope of the uniform outflow through the patch, which needs `manning` [-]",
-        UsualRange(1e-5, 0.1, "lowland river to torrent"), VALUE,
-    )] = None  # fmt: skip
-    body: Annotated[str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")] = None
+    normal_slope: Annotated[
+        float | None,
+        Quantity(
+            "number",
+            positive,
+            "slope of the uniform outflow through the patch, which needs `manning` [-]",
+            UsualRange(1e-5, 0.1, "lowland river to torrent"),
+            VALUE,
+        ),
+    ] = None
+    body: Annotated[
+        str | None, Text("mass, or body on a prismatic joint, that moves this wall along x or y")
+    ] = None
     travel: Annotated[
         Schedule | None,
-        Scheduled("position", about="displacement of this wall along x or y, instead of `body` [m]", moves=True),
+        Scheduled(
+            "position",
+            about="displacement of this wall along x or y, instead of `body` [m]",
+            moves=True,
+        ),
     ] = None
-    zone: Annotated[float | None, Quantity(
-        "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
-        changes=VALUE,
-    )] = None  # fmt: skip
+    zone: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            positive,
+            "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
+            changes=VALUE,
+        ),
+    ] = None
     scalars: Annotated[
-        dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
+        dict[str, Any],
+        ScalarValues("scalar values of the inflow, for a given velocity or an open boundary"),
     ] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("boundary", "impedance", *CLOSURES), ("body", "travel"), ("side", "at", "polygon"), ("area", "polygon"),
-    )  # fmt: skip
+        ("boundary", "impedance", *CLOSURES),
+        ("body", "travel"),
+        ("side", "at", "polygon"),
+        ("area", "polygon"),
+    )
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults = super().key_faults(given)
-        if len({"side", "at", "polygon"} & given.keys()) > 1:  # a fault already, by which other keys are right or not
+        # a fault already, by which other keys are right or not
+        if len({"side", "at", "polygon"} & given.keys()) > 1:
             return faults
         if "polygon" not in given and ("at" in given) != ("area" in given):
             present, missing = ("at", "area") if "at" in given else ("area", "at")
-            faults.append(((), f"{missing} is missing, which an interior patch with `{present}` needs"))
+            faults.append(
+                ((), f"{missing} is missing, which an interior patch with `{present}` needs")
+            )
         if "at" in given or "polygon" in given:
             text = "applies to patches of the boundary, and this is an interior patch; leave this key out"
-            faults += [((key,), text) for key in given if key in cls.keys() and key not in INTERIOR_KEYS]
+            faults += [
+                ((key,), text) for key in given if key in cls.keys() and key not in INTERIOR_KEYS
+            ]
         return faults
 
     @property
@@ -211,9 +291,15 @@ class Cells(Value):
     takes = "[whole number, whole number]"
 
     def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:
-        is_pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(type(n) is int and n > 0 for n in given)
+        is_pair = (
+            isinstance(given, (list, tuple))
+            and len(given) == 2
+            and all(type(n) is int and n > 0 for n in given)
+        )
         if not is_pair:
-            raise ValueError(f"{show(given)} is not a pair of numbers of cells; expected for example [64, 32]")
+            raise ValueError(
+                f"{show(given)} is not a pair of numbers of cells; expected for example [64, 32]"
+            )
         return tuple(given)
 
 
@@ -224,8 +310,12 @@ class Holes(Value):
     takes = "list of [x0, y0, x1, y1], m"
 
     def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
-        if not isinstance(given, (list, tuple)) or (given and not isinstance(given[0], (list, tuple))):
-            raise ValueError(f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...]")
+        if not isinstance(given, (list, tuple)) or (
+            given and not isinstance(given[0], (list, tuple))
+        ):
+            raise ValueError(
+                f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...]"
+            )
         return tuple(Rows("length", length=4).read(hole, setting) for hole in given)
 
 
@@ -251,14 +341,20 @@ class BasinMesh(Table):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"), ("unit", "raster"))
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"),)
 
-    file: Annotated[str | None, File("mesh file that meshio reads, path relative to the case")] = None
+    file: Annotated[str | None, File("mesh file that meshio reads, path relative to the case")] = (
+        None
+    )
     unit: Annotated[str, Text("unit of the coordinates of the file")] = "m"
-    raster: Annotated[str | None, File("raster that the cells cover, instead of a mesh file")] = None
+    raster: Annotated[str | None, File("raster that the cells cover, instead of a mesh file")] = (
+        None
+    )
     cell: Annotated[
-        float | None, Quantity("length", positive, "side of the cells over the raster [m]", changes=SHAPE)
+        float | None,
+        Quantity("length", positive, "side of the cells over the raster [m]", changes=SHAPE),
     ] = None
     outside: Annotated[
-        str | None, Choice("choice", ("hole",), "hole: cells without data in the raster are left out")
+        str | None,
+        Choice("choice", ("hole",), "hole: cells without data in the raster are left out"),
     ] = None
     band: Annotated[int, Whole(between(1, 1e6), "band of a GeoTIFF")] = 1
     variable: Annotated[str, Text("variable of a NetCDF file; the only one if left out")] = ""
@@ -268,7 +364,9 @@ class BasinMesh(Table):
         faults = super().key_faults(given)
         if "raster" in given:
             return faults + (
-                [] if "cell" in given else [((), "cell is missing, the side of the cells over the raster")]
+                []
+                if "cell" in given
+                else [((), "cell is missing, the side of the cells over the raster")]
             )
         text = "applies to the cells over a `raster`; give `raster` instead of `file`, or leave this key out"
         return faults + [((key,), text) for key in cls.raster_keys if key in given]
@@ -276,7 +374,11 @@ class BasinMesh(Table):
     def table(self) -> dict[str, Any]:
         """Keys and values as in a case file: those of a mesh file, or those of a raster."""
         others = ("unit",) if self.raster else self.raster_keys
-        return {key: value for key, value in super().table().items() if key not in others and value != ""}
+        return {
+            key: value
+            for key, value in super().table().items()
+            if key not in others and value != ""
+        }
 
 
 class ReferenceSystem(Text):
@@ -284,14 +386,22 @@ class ReferenceSystem(Text):
 
     def read(self, given: Any, setting: ReadContext) -> str:
         if re.fullmatch(r"EPSG:\d+", text := super().read(given, setting)) is None:
-            raise ValueError(f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"')
+            raise ValueError(
+                f'{show(given)} is not a coordinate reference system; expected for example "EPSG:32633"'
+            )
         if is_in_degrees(text):
-            raise ValueError(f'{show(given)} is in degrees; expected a system in metres, for example "EPSG:32633"')
+            raise ValueError(
+                f'{show(given)} is in degrees; expected a system in metres, for example "EPSG:32633"'
+            )
         return text
 
 
-ORIGIN = Rows("length", length=2, about="easting and northing of x = 0, y = 0, for rasters [m]; default [0, 0]",
-              changes=SHAPE)  # fmt: skip
+ORIGIN = Rows(
+    "length",
+    length=2,
+    about="easting and northing of x = 0, y = 0, for rasters [m]; default [0, 0]",
+    changes=SHAPE,
+)
 
 
 class VelocityStart(Table):
@@ -321,7 +431,10 @@ class PatchNode(PlaceOnBody):
 class DrivenPatch(PatchNode):
     """A patch with a closure; probes: level above the elevation of the basin, Froude number of the flow through it."""
 
-    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | {"level": "level", "froude": "number"}
+    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | {
+        "level": "level",
+        "froude": "number",
+    }
 
 
 class PatchJunction(PatchNode):
@@ -339,7 +452,11 @@ class PatchJunction(PatchNode):
 class MovingWall(PatchNode):
     """A patch that is a moving wall; probes: force on the water (inward), power into the water, travel."""
 
-    wall_quantities: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
+    wall_quantities: ClassVar[dict[str, str]] = {
+        "force": "force",
+        "power": "power",
+        "travel": "position",
+    }
     quantities: ClassVar[dict[str, str]] = PatchNode.quantities | wall_quantities
 
 
@@ -384,7 +501,8 @@ class Physics(Table):
         super().__init_subclass__(**rest)
         cls.name = name
         if name:  # otherwise no basin of a case file may have these equations
-            Physics.kinds.declare(name, cls, "physics", "basin")  # whose modules are those of all physics
+            # whose modules are those of all physics
+            Physics.kinds.declare(name, cls, "physics", "basin")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
@@ -397,7 +515,9 @@ class Physics(Table):
                 if (own.metadata, own.default) != (known.metadata, known.default):
                     del Physics.kinds[cls.name]
                     text = f"physics {show(cls.name)} declares {key} differently from the existing key of a basin"
-                    raise FvsolveError(f"{text}; declare it identically in both, or choose another name")
+                    raise FvsolveError(
+                        f"{text}; declare it identically in both, or choose another name"
+                    )
         for table, keys in both:
             table.model_fields.update(keys)
             if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
@@ -433,7 +553,9 @@ class Physics(Table):
         return {"elevation": basin.elevation, "depth": None, "pressure": None}
 
     @classmethod
-    def formulas(cls, basin: "Basin", mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
+    def formulas(
+        cls, basin: "Basin", mesh: Any
+    ) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
         """Yield (key path, formula, points) for each field over the plane that the keys of these equations contain.
 
         points : float64[n, 2]  points at which the formula is evaluated; None if its means over the cells are used
@@ -443,7 +565,9 @@ class Physics(Table):
                 yield (key,), shape, None
 
     @classmethod
-    def value_faults(cls, basin: "Basin", place: tuple[str, ...], shape: Any, mesh: Any) -> Iterator[str]:
+    def value_faults(
+        cls, basin: "Basin", place: tuple[str, ...], shape: Any, mesh: Any
+    ) -> Iterator[str]:
         """Yield fault texts of the values of a field in the cells of a basin; place : its key path"""
         yield from ()
 
@@ -454,7 +578,12 @@ class Physics(Table):
         for key in given:
             owners = [name for name, kind in Physics.kinds.items() if key in kind.model_fields]
             if owners and cls.name not in owners:
-                faults.append(((key,), f"is not a key of physics {show(cls.name)}; it belongs to {listing(owners)}"))
+                faults.append(
+                    (
+                        (key,),
+                        f"is not a key of physics {show(cls.name)}; it belongs to {listing(owners)}",
+                    )
+                )
         needed = [key for key, info in cls.model_fields.items() if info.is_required()]
         return faults + [((), f"{key} is missing") for key in needed if key not in given]
 
@@ -470,38 +599,70 @@ class Basin(PlaceOnBody, kind="basin"):
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
 
-    physics: Annotated[str, Choice("physics", Physics.kinds, "equations solved in the basin")] = "free-surface"
+    physics: Annotated[str, Choice("physics", Physics.kinds, "equations solved in the basin")] = (
+        "free-surface"
+    )
     size: Annotated[
         tuple[float, float] | None,
-        Rows("length", positive, length=2, about="lengths along x and y [m]; required without `mesh`", changes=SHAPE),
+        Rows(
+            "length",
+            positive,
+            length=2,
+            about="lengths along x and y [m]; required without `mesh`",
+            changes=SHAPE,
+        ),
     ] = None
     cells: Annotated[Any, Cells()] = None
-    grading: Annotated[tuple[float, float] | None, Rows(
-        "number", positive, length=2, about="ratio of last to first cell size along x and y [-]; 1 if left out",
-        changes=SHAPE,
-    )] = None  # fmt: skip
+    grading: Annotated[
+        tuple[float, float] | None,
+        Rows(
+            "number",
+            positive,
+            length=2,
+            about="ratio of last to first cell size along x and y [-]; 1 if left out",
+            changes=SHAPE,
+        ),
+    ] = None
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[
         BasinMesh | None,
-        Nested(BasinMesh, "mesh file (any format of meshio), or square cells over a raster, instead of a rectangle"),
+        Nested(
+            BasinMesh,
+            "mesh file (any format of meshio), or square cells over a raster, instead of a rectangle",
+        ),
     ] = None
     origin: Annotated[tuple[float, float] | None, ORIGIN] = None
     crs: Annotated[
-        str | None, ReferenceSystem("coordinate reference system of `origin` and of rasters, such as EPSG:32633")
+        str | None,
+        ReferenceSystem(
+            "coordinate reference system of `origin` and of rasters, such as EPSG:32633"
+        ),
     ] = None
-    patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
-    start: Annotated[BasinStart | None, Nested(
-        BasinStart, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out",
-    )] = None  # fmt: skip
+    patches: Annotated[
+        Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")
+    ] = {}
+    start: Annotated[
+        BasinStart | None,
+        Nested(
+            BasinStart,
+            "initial level, or pressure above the pressure at rest, and velocities; at rest if left out",
+        ),
+    ] = None
 
-    attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of the basin axes relative to the body axes")] = (
-        None
-    )
+    attitude: Annotated[
+        Attitude | None, Nested(Attitude, "attitude of the basin axes relative to the body axes")
+    ] = None
     sloshing: Annotated[
-        str, Choice("sloshing", SLOSHING_MODELS, "model of the water on a body: frozen (rigid), linear modes, or cells")
+        str,
+        Choice(
+            "sloshing",
+            SLOSHING_MODELS,
+            "model of the water on a body: frozen (rigid), linear modes, or cells",
+        ),
     ] = "cells"
     scalars: Annotated[
-        dict[str, Any], ScalarValues("scalar values at the start, formulas of x and y", SpatialFieldKey("number"))
+        dict[str, Any],
+        ScalarValues("scalar values at the start, formulas of x and y", SpatialFieldKey("number")),
     ] = {}
 
     @property
@@ -514,16 +675,25 @@ class Basin(PlaceOnBody, kind="basin"):
         physics = given.get("physics", cls.model_fields["physics"].default)
         known = isinstance(physics, str) and physics in Physics.kinds
         faults = Physics.kinds[physics].own_faults(given) if known else []
-        rectangle = "mesh" not in given or (isinstance(given["mesh"], dict) and "raster" in given["mesh"])
+        rectangle = "mesh" not in given or (
+            isinstance(given["mesh"], dict) and "raster" in given["mesh"]
+        )
         if "mesh" in given:
             text = "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`"
             faults += [((key,), text) for key in RECTANGLE_KEYS if key in given]
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
-        for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
+        for name, patch in (
+            given["patches"].items() if isinstance(given.get("patches"), dict) else ()
+        ):
             side = isinstance(patch, dict) and not {"side", "at", "polygon"}.isdisjoint(patch)
             if side and "side" in patch and not rectangle:
-                faults.append((("patches", name), "takes its faces from the mesh; remove the keys `side` and `span`"))
+                faults.append(
+                    (
+                        ("patches", name),
+                        "takes its faces from the mesh; remove the keys `side` and `span`",
+                    )
+                )
             elif isinstance(patch, dict) and not side and rectangle:
                 faults.append((("patches", name), "side is missing"))
         return faults
@@ -532,7 +702,10 @@ class Basin(PlaceOnBody, kind="basin"):
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         setting.frame = (0.0, 0.0), str(given.get("crs") or "")  # for the rasters of the other keys
         with suppress(ValueError):  # a fault of the key itself
-            setting.frame = ORIGIN.read(given.get("origin") or (0.0, 0.0), setting), setting.frame[1]
+            setting.frame = (
+                ORIGIN.read(given.get("origin") or (0.0, 0.0), setting),
+                setting.frame[1],
+            )
         return given
 
     @classmethod
@@ -560,7 +733,12 @@ class Basin(PlaceOnBody, kind="basin"):
 
     def face_link(self, name: str, patch: str, length: float) -> Any:
         """Link from the junction `name`.`patch` of the links at a patch to its cells; length : of the faces [m]"""
-        ends = {"from_": f"{name}.{patch}", "to": f"{name}.{patch}.inside", "basin": name, "patch": patch}
+        ends = {
+            "from_": f"{name}.{patch}",
+            "to": f"{name}.{patch}.inside",
+            "basin": name,
+            "patch": patch,
+        }
         return self.physics_type.face_type().model_construct(**ends, length=length)
 
     @classmethod
@@ -599,7 +777,8 @@ class PatchRows(Lowering, kind="patch"):
         return f"basin {name}: {amount(flow, 'flow')} flow in"
 
     def inputs(self, model, name, part):
-        patches, schedules = model.tables.patches, {rec.STAGE: ("stage", STAGE), rec.DISCHARGE: ("discharge", FLOW)}
+        patches = model.tables.patches
+        schedules = {rec.STAGE: ("stage", STAGE), rec.DISCHARGE: ("discharge", FLOW)}
         row = patches[patches["node"] == model.node_names.index(name)][0]
         key, sort = schedules.get(int(row["closure"]), ("", None))
         return {key: Input(sort, int(row["drive"]))} if key else {}
@@ -613,23 +792,39 @@ class PatchRows(Lowering, kind="patch"):
             row["index"] = k = draft.patch_table["node"].tolist().index(draft.node_index[name])
             if draft.patch_table["closure"][k] in (rec.NO_CLOSURE, rec.INTERIOR):
                 reason = "a rigid column joins it, or no part at all"
-                reason = reason if draft.patch_table["closure"][k] == rec.NO_CLOSURE else "it lies inside the basin"
+                reason = (
+                    reason
+                    if draft.patch_table["closure"][k] == rec.NO_CLOSURE
+                    else "it lies inside the basin"
+                )
                 expected = "a patch of the boundary with a closure or another link"
-                draft.fault("output.probes", f"{name} has no Froude number: {reason}; expected {expected}")
+                draft.fault(
+                    "output.probes", f"{name} has no Froude number: {reason}; expected {expected}"
+                )
         elif probe.quantity != "flow":
             super().probe(draft, name, probe, row)
         else:
             node = draft.node_index[name]
-            row["index"], row["kind"], row["scale"] = node, rec.PATCH_FLOW, 1.0 / draft.fluid.density
+            row["index"], row["kind"], row["scale"] = (
+                node,
+                rec.PATCH_FLOW,
+                1.0 / draft.fluid.density,
+            )
             if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
-                row["index"], row["kind"] = draft.patch_table["node"].tolist().index(node), rec.GIVEN_FLOW
+                row["index"], row["kind"] = (
+                    draft.patch_table["node"].tolist().index(node),
+                    rec.GIVEN_FLOW,
+                )
 
 
 class PatchJunctionRows(Lowering, kind="patch-junction"):
     """Conversion to table rows of the places of links at patches: junctions."""
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
+        row["kind"], row["schedule"] = (
+            rec.JUNCTION,
+            draft.schedules.add(node.flow, -draft.fluid.density),
+        )
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("flow", "froude"):

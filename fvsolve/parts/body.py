@@ -28,7 +28,8 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
-MOMENT_TOLERANCE = 1e-6  # share of the largest moment: tolerance of the triangle inequality for numbers of six digits
+# share of the largest moment: tolerance of the triangle inequality for numbers of six digits
+MOMENT_TOLERANCE = 1e-6
 
 
 class NamedPoints(Value):
@@ -44,7 +45,12 @@ class NamedPoints(Value):
         points, faults = {}, []
         for name, place in given.items():
             if not re.fullmatch(r"[\w-]+", name):
-                faults.append(((name,), f"{show(name)} is not a valid name; a name has letters, digits, _ and -"))
+                faults.append(
+                    (
+                        (name,),
+                        f"{show(name)} is not a valid name; a name has letters, digits, _ and -",
+                    )
+                )
             try:
                 points[name] = Rows("position", length=3).read(place, setting)
             except ValueError as error:
@@ -83,7 +89,9 @@ class Inertia(Value):
             moments = np.sort(inertia)
         if moments[2] > moments[0] + moments[1] + MOMENT_TOLERANCE * moments[2]:
             text = ", ".join(f"{moment:.4g}" for moment in moments)
-            raise ValueError(f"moments of {text} kg m2 are not possible: the largest exceeds the sum of the other two")
+            raise ValueError(
+                f"moments of {text} kg m2 are not possible: the largest exceeds the sum of the other two"
+            )
         return inertia
 
     def below(self, key: str) -> Value:
@@ -106,7 +114,9 @@ def principal_moments(rows: tuple) -> np.ndarray:
         )
     moments = np.linalg.eigvalsh(matrix)
     if moments[0] < -MOMENT_TOLERANCE * moments[2]:
-        raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; expected principal moments of at least 0")
+        raise ValueError(
+            f"has a principal moment of {moments[0]:.4g} kg m2; expected principal moments of at least 0"
+        )
     return moments
 
 
@@ -117,14 +127,34 @@ JOINT_KEYS = {  # kind -> keys it allows besides `on`, `at` and `attitude`
     "free": ("velocity", "rate"),
     "fixed": (),
 }
-JOINT_SYNONYMS = {"hinge": "revolute", "pin": "revolute", "slider": "prismatic", "spherical": "ball", "weld": "fixed",
-         "floating": "free", "driven": "revolute or prismatic with a schedule as its angle or travel"}  # fmt: skip
+JOINT_SYNONYMS = {
+    "hinge": "revolute",
+    "pin": "revolute",
+    "slider": "prismatic",
+    "spherical": "ball",
+    "weld": "fixed",
+    "floating": "free",
+    "driven": "revolute or prismatic with a schedule as its angle or travel",
+}
 ANGULAR_DIMENSIONS = ("angular_velocity", "rotational_damping", "torque")
 LINEAR_DIMENSIONS = ("velocity", "damping", "stiffness")
-UNITS_BY_JOINT = {"angular_velocity": "rad/s, of a prismatic joint m/s", "damping": "N m s, of a prismatic joint N s/m",
-        "stiffness": "N m, of a prismatic joint N/m"}  # fmt: skip
-POSE_QUANTITIES = {"x": "position", "y": "position", "z": "position", "roll": "angle", "pitch": "angle", "yaw": "angle",
-            "eta": "number", "eps_x": "number", "eps_y": "number", "eps_z": "number"}  # fmt: skip
+UNITS_BY_JOINT = {
+    "angular_velocity": "rad/s, of a prismatic joint m/s",
+    "damping": "N m s, of a prismatic joint N s/m",
+    "stiffness": "N m, of a prismatic joint N/m",
+}
+POSE_QUANTITIES = {
+    "x": "position",
+    "y": "position",
+    "z": "position",
+    "roll": "angle",
+    "pitch": "angle",
+    "yaw": "angle",
+    "eta": "number",
+    "eps_x": "number",
+    "eps_y": "number",
+    "eps_z": "number",
+}
 
 
 def vector_quantities(name: str, dimension: str) -> dict[str, str]:
@@ -161,42 +191,69 @@ class Joint(Table):
     """
 
     kind: Annotated[
-        str, Choice("joint", tuple(JOINT_KEYS), "kind of joint (its degrees of freedom)", JOINT_SYNONYMS)
+        str,
+        Choice(
+            "joint", tuple(JOINT_KEYS), "kind of joint (its degrees of freedom)", JOINT_SYNONYMS
+        ),
     ] = "free"
-    on: Annotated[str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
+    on: Annotated[
+        str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")
+    ] = None
     at: Annotated[
         tuple[float, ...] | None,
-        Rows("position", length=3, about="position of the joint in the axes of its carrier `on` [m]; 0 if left out"),
+        Rows(
+            "position",
+            length=3,
+            about="position of the joint in the axes of its carrier `on` [m]; 0 if left out",
+        ),
     ] = None
-    attitude: Annotated[Attitude, Nested(Attitude, "attitude of the joint axes in the axes of its carrier `on`")] = (
-        Attitude()
-    )
-    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
+    attitude: Annotated[
+        Attitude, Nested(Attitude, "attitude of the joint axes in the axes of its carrier `on`")
+    ] = Attitude()
+    axis: Annotated[
+        tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")
+    ] = None
     angle: Annotated[
         Schedule | None,
         Scheduled(
-            "angle", about="angle at the start, or a schedule that drives the joint [rad]; 0 if left out", moves=True
+            "angle",
+            about="angle at the start, or a schedule that drives the joint [rad]; 0 if left out",
+            moves=True,
         ),
     ] = None
     travel: Annotated[
         Schedule | None,
         Scheduled(
-            "position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out", moves=True
+            "position",
+            about="travel at the start, or a schedule that drives the joint [m]; 0 if left out",
+            moves=True,
         ),
     ] = None
-    rate: Annotated[Any, JointQuantity(
-        "angular_velocity",
-        "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
-        "; 0 if left out",
-    )] = None  # fmt: skip
-    velocity: Annotated[tuple[float, ...] | None, Rows(
-        "velocity", length=3, about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
-    )] = None  # fmt: skip
+    rate: Annotated[
+        Any,
+        JointQuantity(
+            "angular_velocity",
+            "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
+            "; 0 if left out",
+        ),
+    ] = None
+    velocity: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "velocity",
+            length=3,
+            about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
+        ),
+    ] = None
     damping: Annotated[
-        Any, JointQuantity("damping", "damping torque or force per rate of the joint; 0 if left out")
+        Any,
+        JointQuantity("damping", "damping torque or force per rate of the joint; 0 if left out"),
     ] = None
     stiffness: Annotated[
-        Any, JointQuantity("stiffness", "stiffness of a spring towards angle or travel 0; none if left out")
+        Any,
+        JointQuantity(
+            "stiffness", "stiffness of a spring towards angle or travel 0; none if left out"
+        ),
     ] = None
 
     @classmethod
@@ -208,15 +265,23 @@ class Joint(Table):
         others = {key for keys in JOINT_KEYS.values() for key in keys} - {*own}
         allowed = f"its keys are {', '.join(('on', 'at', 'attitude', *own))}"
         faults += [
-            ((key,), f"is not a key of joints of kind {show(kind)}; {allowed}") for key in given if key in others
+            ((key,), f"is not a key of joints of kind {show(kind)}; {allowed}")
+            for key in given
+            if key in others
         ]
         if "axis" in own and "axis" not in given:
             faults.append(((), f"axis is missing: a {kind} joint needs it, for example [0, 1, 0]"))
         if kind == "free" and "on" in given:
-            faults.append((("on",), "is not valid for a free joint, which has no carrier; remove this key"))
+            faults.append(
+                (("on",), "is not valid for a free joint, which has no carrier; remove this key")
+            )
         if isinstance(given.get("axis"), (list, tuple)) and len(given["axis"]) == 3:
-            if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(given["axis"]):
-                faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
+            if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(
+                given["axis"]
+            ):
+                faults.append(
+                    (("axis",), "is all zeros; expected a direction, for example [0, 1, 0]")
+                )
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
             text = f"{given['on']} gives the position already; remove `at`, or give a body without point in `on`"
             faults.append((("at",), text))
@@ -228,11 +293,16 @@ class Joint(Table):
 
         Raises ValueFault for an invalid value.
         """
-        kind, result, faults = given.get("kind", "free"), dict(given), []
+        kind = given.get("kind", "free")
+        result = dict(given)
+        faults = []
         rate, damping, stiffness = LINEAR_DIMENSIONS if kind == "prismatic" else ANGULAR_DIMENSIONS
         triple = kind in ("ball", "free")
-        values = {"rate": Rows(rate, length=3) if triple else Quantity(rate), "damping": Quantity(damping, nonnegative),
-                  "stiffness": Quantity(stiffness, nonnegative)}  # fmt: skip
+        values = {
+            "rate": Rows(rate, length=3) if triple else Quantity(rate),
+            "damping": Quantity(damping, nonnegative),
+            "stiffness": Quantity(stiffness, nonnegative),
+        }
         for key, value in values.items():
             try:
                 if key in given:
@@ -242,7 +312,12 @@ class Joint(Table):
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
         for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:
-                faults.append(((key,), f"has no effect, because {driven[0]} is driven by a schedule; remove this key"))
+                faults.append(
+                    (
+                        (key,),
+                        f"has no effect, because {driven[0]} is driven by a schedule; remove this key",
+                    )
+                )
         if faults:
             raise ValueFault(faults)
         return result
@@ -303,11 +378,19 @@ class Body(Node, kind="body"):
         **vector_quantities("angular_momentum_", "angular_momentum"),
     }
 
-    mass: Annotated[float, Quantity("mass", positive, "mass of the body and all that is fixed to it [kg]",
-                                    UsualRange(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
+    mass: Annotated[
+        float,
+        Quantity(
+            "mass",
+            positive,
+            "mass of the body and all that is fixed to it [kg]",
+            UsualRange(1e-6, 1e9, "poppets to ships"),
+        ),
+    ]
     inertia: Annotated[Any, Inertia()]
     centre_of_mass: Annotated[
-        tuple[float, ...], Rows("position", length=3, about="centre of mass in the axes of the body [m]")
+        tuple[float, ...],
+        Rows("position", length=3, about="centre of mass in the axes of the body [m]"),
     ] = (0.0, 0.0, 0.0)
     points: Annotated[dict[str, tuple[float, ...]], NamedPoints()] = {}
     joint: Annotated[Joint, Nested(Joint, "joint to another body or the world")] = Joint()

@@ -28,12 +28,22 @@ class Pin(TwoPort, kind="pin"):
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force"}
 
-    axis: Annotated[tuple[float, ...] | None, Rows(
-        "number", length=3,
-        about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
-    )] = None  # fmt: skip
+    axis: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "number",
+            length=3,
+            about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
+        ),
+    ] = None
     stabilisation: Annotated[
-        float, Quantity("rate", positive, "rate at which a gap closes (Baumgarte stabilisation) [1/s]", changes=VALUE)
+        float,
+        Quantity(
+            "rate",
+            positive,
+            "rate at which a gap closes (Baumgarte stabilisation) [1/s]",
+            changes=VALUE,
+        ),
     ] = 10.0
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -80,21 +90,39 @@ class Bushing(TwoPort, kind="bushing"):
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force", "torque": "torque"}
 
     def faults(self, name: str, around: CaseContext) -> Faults:
-        if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
+        if not any(
+            (self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)
+        ):
             text = "is 0, like `damping`, `rotational_stiffness` and `rotational_damping`"
             yield ("stiffness",), f"{text}; expected at least one of these four keys above 0"
 
     stiffness: Annotated[
-        float, Quantity("stiffness", nonnegative, "force per displacement between the points [N/m]", changes=VALUE)
+        float,
+        Quantity(
+            "stiffness",
+            nonnegative,
+            "force per displacement between the points [N/m]",
+            changes=VALUE,
+        ),
     ] = 0.0
     damping: Annotated[
-        float, Quantity("damping", nonnegative, "force per relative velocity of the points [N s/m]", changes=VALUE)
+        float,
+        Quantity(
+            "damping",
+            nonnegative,
+            "force per relative velocity of the points [N s/m]",
+            changes=VALUE,
+        ),
     ] = 0.0
     rotational_stiffness: Annotated[
-        float, Quantity("torque", nonnegative, "torque per angle, for small angles [N m]", changes=VALUE)
+        float,
+        Quantity("torque", nonnegative, "torque per angle, for small angles [N m]", changes=VALUE),
     ] = 0.0
     rotational_damping: Annotated[
-        float, Quantity("rotational_damping", nonnegative, "torque per angular velocity [N m s]", changes=VALUE)
+        float,
+        Quantity(
+            "rotational_damping", nonnegative, "torque per angular velocity [N m s]", changes=VALUE
+        ),
     ] = 0.0
 
 
@@ -107,7 +135,10 @@ class BushingRows(Lowering, kind="bushing"):
         (row,) = rows
         draft.join(row, ("from_point", "to_point"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
-        row["turn_stiffness"], row["turn_damping"] = link.rotational_stiffness, link.rotational_damping
+        row["turn_stiffness"], row["turn_damping"] = (
+            link.rotational_stiffness,
+            link.rotational_damping,
+        )
         case = draft.case
         poses = [case.as_stated.pose_of(case.body_point(end)[0]) for end in (link.from_, link.to)]
         row["attitude"] = (poses[0].attitude.T @ poses[1].attitude).ravel()
@@ -124,13 +155,21 @@ class Torque(Link, kind="torque"):
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
     quantities: ClassVar[dict[str, str]] = {}
 
-    from_: Annotated[str | None, Text("body that takes the reaction torque; none if left out"), Field(alias="from")] = (
-        None
-    )
-    to: Annotated[str, Text("shaft (also PUMP.shaft or TURBINE.shaft) or body on which the torque acts")]
-    torque: Annotated[Schedule, Scheduled(
-        "torque", about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]",
-    )]  # fmt: skip
+    from_: Annotated[
+        str | None,
+        Text("body that takes the reaction torque; none if left out"),
+        Field(alias="from"),
+    ] = None
+    to: Annotated[
+        str, Text("shaft (also PUMP.shaft or TURBINE.shaft) or body on which the torque acts")
+    ]
+    torque: Annotated[
+        Schedule,
+        Scheduled(
+            "torque",
+            about="torque on `to`, positive as the torque of a motor on its pump, or about `axis` [N m]",
+        ),
+    ]
     axis: Annotated[
         tuple[float, ...] | None,
         Rows("number", length=3, about="axis of the torque on a body, in the axes of the body"),
@@ -146,7 +185,10 @@ class Torque(Link, kind="torque"):
             yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
         turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
-            yield (), "axis is missing; expected the axis of the torque in the axes of the body, for example [0, 1, 0]"
+            yield (
+                (),
+                "axis is missing; expected the axis of the torque in the axes of the body, for example [0, 1, 0]",
+            )
         if around.spatial(self.to):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):
@@ -159,7 +201,8 @@ class Torque(Link, kind="torque"):
             yield ("to",), f"{text}; give the {turned.kind} `inertia`"
         if turned.trip is not None:
             text = (
-                "is held at its speed until the trip; remove the key `trip`, and let the torque fall to 0 at that time"
+                "is held at its speed until the trip; remove the key `trip`, and "
+                "let the torque fall to 0 at that time"
             )
             yield ("to",), f"{self.to} {text}"
 
@@ -178,7 +221,17 @@ class TorqueRows(Lowering, kind="torque"):
         if part.to not in case.network_places:
             return [], []
         place = f"links.{name}"
-        return [Element(FLOW, place, place, (None, part.to), schedule=part.torque, key="torque", ledger="supplied")], []
+        return [
+            Element(
+                FLOW,
+                place,
+                place,
+                (None, part.to),
+                schedule=part.torque,
+                key="torque",
+                ledger="supplied",
+            )
+        ], []
 
     def inputs(self, model, name, part):
         if part.to in model.case.network_places:
@@ -186,7 +239,9 @@ class TorqueRows(Lowering, kind="torque"):
         turned = part.to.removesuffix(".shaft")
         row = lowering_of(type(model.case.links[turned])).row_of(model, turned)
         place = [torque is part for torque in torques_on(model.case, turned)].index(True)
-        return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
+        return {
+            "torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))
+        }
 
 
 class BodyTorqueRows(Lowering):
@@ -198,7 +253,9 @@ class BodyTorqueRows(Lowering):
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         axis = link.axis / np.linalg.norm(link.axis)
-        _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to), about=axis)
+        _, row["speed"] = draft.join(
+            row, ("from_mass", "to_mass"), (link.from_, link.to), about=axis
+        )
         row["schedule"] = draft.schedules.add(link.torque)
 
     def inputs(self, model, name, part):

@@ -30,11 +30,16 @@ class Composition(Value):
     about: str = "atoms in a molecule, element -> count, which balance in reactions"
     changes: str = VALUE
     takes: ClassVar[str] = "`{ ELEMENT = COUNT }`"
-    schema: ClassVar[dict[str, Any]] = {"type": "object", "additionalProperties": {"type": "number"}}
+    schema: ClassVar[dict[str, Any]] = {
+        "type": "object",
+        "additionalProperties": {"type": "number"},
+    }
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, float]:
         if not isinstance(given, dict) or not given:
-            raise ValueError(f"{show(given)} is not a table of atoms; expected for example {{ H = 2, O = 1 }}")
+            raise ValueError(
+                f"{show(given)} is not a table of atoms; expected for example {{ H = 2, O = 1 }}"
+            )
         return read_each(given.items(), lambda item: Number(positive).read(item, setting))
 
 
@@ -48,18 +53,24 @@ class PartNames(Value):
     about: str = ""
     changes: str = SHAPE
     takes: ClassVar[str] = '`["NAME", ...]`, `"all"`'
-    schema: ClassVar[dict[str, Any]] = {"anyOf": [{"const": "all"}, {"type": "array", "items": {"type": "string"}}]}
+    schema: ClassVar[dict[str, Any]] = {
+        "anyOf": [{"const": "all"}, {"type": "array", "items": {"type": "string"}}]
+    }
 
     def read(self, given: Any, setting: ReadContext) -> str | tuple[str, ...]:
         if given == "all":
             return given
         if not isinstance(given, (list, tuple)) or not all(isinstance(name, str) for name in given):
-            raise ValueError(f'{show(given)} is not a list of names; expected ["NAME", ...] or "all"')
+            raise ValueError(
+                f'{show(given)} is not a list of names; expected ["NAME", ...] or "all"'
+            )
         return tuple(given)
 
 
-ZEROS = {"K": 0.0, "degC": 273.15}  # units of a temperature that heat changes: absolute temperature of 0 [K]
-AMOUNT_UNITS = {"mol/m3": 1.0, "mmol/l": 1.0}  # unit of a scalar -> amount of substance per volume [mol/m3]
+# units of a temperature that heat changes: absolute temperature of 0 [K]
+ZEROS = {"K": 0.0, "degC": 273.15}
+# unit of a scalar -> amount of substance per volume [mol/m3]
+AMOUNT_UNITS = {"mol/m3": 1.0, "mmol/l": 1.0}
 MASS_UNIT, MASS = "mg/l", 1e-3  # mass per volume [kg/m3]
 
 
@@ -70,27 +81,46 @@ class Scalar(Table):
     heat per length that parts in `heat_from` dissipate, cp the `specific_heat`.
     """
 
-    unit: Annotated[str, Text("unit, a label in headers; with `heat` K (if left out) or degC", VALUE)] = "-"
-    initial: Annotated[float, Number(about="initial value where a part states no other value")] = 0.0
+    unit: Annotated[
+        str, Text("unit, a label in headers; with `heat` K (if left out) or degC", VALUE)
+    ] = "-"
+    initial: Annotated[float, Number(about="initial value where a part states no other value")] = (
+        0.0
+    )
     diffusivity: Annotated[
         float, Quantity("diffusivity", nonnegative, "diffusivity along pipes [m2/s]", changes=VALUE)
     ] = 0.0
-    decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay towards ambient [1/s]", changes=VALUE)] = 0.0
-    ambient: Annotated[float, Number(about="value towards which the scalar decays", changes=VALUE)] = 0.0
+    decay: Annotated[
+        float, Quantity("rate", nonnegative, "rate of decay towards ambient [1/s]", changes=VALUE)
+    ] = 0.0
+    ambient: Annotated[
+        float, Number(about="value towards which the scalar decays", changes=VALUE)
+    ] = 0.0
     molar_mass: Annotated[
         float | None,
-        Quantity("molar_mass", positive, "molar mass, for reactions of a mass per volume", MOLAR_MASSES, VALUE),
+        Quantity(
+            "molar_mass",
+            positive,
+            "molar mass, for reactions of a mass per volume",
+            MOLAR_MASSES,
+            VALUE,
+        ),
     ] = None
     composition: Annotated[dict[str, float] | None, Composition()] = None
     heat: Annotated[bool, Flag("true for the temperature of the fluid, which heat changes")] = False
-    specific_heat: Annotated[float | None, Quantity(
-        "specific_heat", positive,
-        "specific heat of the fluid, for `heat` and heat in walls of pipes [J/kg/K]; that of the fluid if left out",
-        UsualRange(500.0, 15e3, "liquid metals to liquid hydrogen"),
-    )] = None  # fmt: skip
-    heat_from: Annotated[str | tuple[str, ...] | None, PartNames(
-        'parts whose dissipated power heats the fluid, or "all"; none if left out'
-    )] = None  # fmt: skip
+    specific_heat: Annotated[
+        float | None,
+        Quantity(
+            "specific_heat",
+            positive,
+            "specific heat of the fluid, for `heat` and heat in walls of pipes [J/kg/K]; that of the fluid if left out",
+            UsualRange(500.0, 15e3, "liquid metals to liquid hydrogen"),
+        ),
+    ] = None
+    heat_from: Annotated[
+        str | tuple[str, ...] | None,
+        PartNames('parts whose dissipated power heats the fluid, or "all"; none if left out'),
+    ] = None
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
@@ -99,8 +129,17 @@ class Scalar(Table):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         faults = super().key_faults(given)
-        if given.get("heat") is True and isinstance(unit := given.get("unit", "K"), str) and unit not in ZEROS:
-            faults.append((("unit",), f"{show(unit)} is not a unit of a temperature with heat; expected K or degC"))
+        if (
+            given.get("heat") is True
+            and isinstance(unit := given.get("unit", "K"), str)
+            and unit not in ZEROS
+        ):
+            faults.append(
+                (
+                    ("unit",),
+                    f"{show(unit)} is not a unit of a temperature with heat; expected K or degC",
+                )
+            )
         if given.get("heat", False) is False:
             faults += [(("heat_from",), "needs heat = true")] if "heat_from" in given else []
         return faults
@@ -129,7 +168,9 @@ class ScalarValues(Value):
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table of scalars; expected {{ NAME = VALUE }}")
+            raise ValueError(
+                f"{show(given)} is not a table of scalars; expected {{ NAME = VALUE }}"
+            )
         return read_each(given.items(), lambda item: self.value.read(item, setting))
 
     def below(self, key: str) -> Value | None:

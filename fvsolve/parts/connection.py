@@ -21,30 +21,51 @@ class Connection(Table):
 
     area: Annotated[
         float | None,
-        Quantity("area", positive, "area of the throat [m2]", UsualRange(1e-9, 200.0, "capillaries to shafts")),
+        Quantity(
+            "area",
+            positive,
+            "area of the throat [m2]",
+            UsualRange(1e-9, 200.0, "capillaries to shafts"),
+        ),
     ] = None
     diameter: Annotated[
         float | None,
-        Quantity("length", positive, "diameter of the throat [m]", UsualRange(5e-5, 14.0, "capillaries to shafts")),
+        Quantity(
+            "length",
+            positive,
+            "diameter of the throat [m]",
+            UsualRange(5e-5, 14.0, "capillaries to shafts"),
+        ),
     ] = None
     # shape: with equal losses a pipe end has other roots
-    loss_in: Annotated[float, Number(
-        positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE,
-    )]  # fmt: skip
-    loss_out: Annotated[float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)]
+    loss_in: Annotated[
+        float,
+        Number(
+            positive,
+            "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel",
+            changes=SHAPE,
+        ),
+    ]
+    loss_out: Annotated[
+        float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)
+    ]
 
 
 class ConnectionTable(Value):
     """Value of a case file for a connection."""
 
-    about = "throat with a loss coefficient for each flow direction; joined without loss if left out"
+    about = (
+        "throat with a loss coefficient for each flow direction; joined without loss if left out"
+    )
     takes = "[connection](#connection)"
 
     def read(self, given: Any, setting: ReadContext) -> Connection:
         if isinstance(given, Connection):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a connection; expected {{ diameter, loss_in, loss_out }}")
+            raise ValueError(
+                f"{show(given)} is not a connection; expected {{ diameter, loss_in, loss_out }}"
+            )
         return Connection.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
@@ -71,7 +92,9 @@ class Throat(TwoPort):
     @property
     def throat_area(self) -> float:
         """Area of the throat [m2]."""
-        return self.size.area if self.size.area is not None else math.pi / 4.0 * self.size.diameter**2
+        return (
+            self.size.area if self.size.area is not None else math.pi / 4.0 * self.size.diameter**2
+        )
 
     @property
     def outflow_ratio(self) -> float:
@@ -87,10 +110,14 @@ def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any],
     """
     if vessel.connection is None:
         return {name: vessel}, {}
-    return behind_throat(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
+    return behind_throat(
+        name, vessel.model_copy(update={"connection": None}), place, vessel.connection
+    )
 
 
-def behind_throat(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
+def behind_throat(
+    name: str, inside: Any, place: Any, size: Connection
+) -> tuple[dict[str, Any], dict[str, Throat]]:
     """(places, links) of a vessel behind a throat, each by name: the node `place`, the vessel `inside`, and the throat.
 
     name : name of the node `place`; size : areas and losses of the throat

@@ -8,10 +8,22 @@ from fvsolve import units
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.schedule import UNKNOWN, Schedule, Scheduled, constant
 from fvsolve.parts.table_model import Table
-from fvsolve.parts.value import PROFILE, VALUE, Quantity, ReadContext, Rows, Text, Value, nonnegative, positive
+from fvsolve.parts.value import (
+    PROFILE,
+    VALUE,
+    Quantity,
+    ReadContext,
+    Rows,
+    Text,
+    Value,
+    nonnegative,
+    positive,
+)
 
 
-def read_in(dimensions: tuple[str, ...], read: Callable[[tuple[str, ...]], Any], given: Any, instead: Any) -> Any:
+def read_in(
+    dimensions: tuple[str, ...], read: Callable[[tuple[str, ...]], Any], given: Any, instead: Any
+) -> Any:
     """Value of a key in units of the input or of the output; `instead` if it has a unit that cannot be checked.
 
     dimensions : some may be `UNKNOWN`; read : function of known dimensions. Raises ValueError.
@@ -44,7 +56,9 @@ class OfInput(Value):
 
     def read(self, given: Any, setting: ReadContext) -> Schedule:
         first = setting.block_units[:1]
-        return read_in(first, lambda known: Scheduled(*known).read(given, setting), given, constant(0.0))
+        return read_in(
+            first, lambda known: Scheduled(*known).read(given, setting), given, constant(0.0)
+        )
 
 
 @dataclass(frozen=True)
@@ -64,11 +78,19 @@ class OfOutput(Value):
 
     @property
     def takes(self) -> str:
-        return "unit of the output" if self.length is None else f"list of {self.length}, unit of the output"
+        return (
+            "unit of the output"
+            if self.length is None
+            else f"list of {self.length}, unit of the output"
+        )
 
     def json(self) -> dict[str, Any]:
         item = {"type": ["number", "string"]}
-        return item if self.length is None else {"type": "array", "items": item, "minItems": self.length}
+        return (
+            item
+            if self.length is None
+            else {"type": "array", "items": item, "minItems": self.length}
+        )
 
 
 @dataclass(frozen=True)
@@ -111,7 +133,12 @@ class Gain(Value):
     schema: ClassVar[dict[str, Any]] = {"type": ["number", "string"]}
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        return read_in(setting.block_units, lambda known: units.parse_ratio(given, known[1], known[0]), given, 0.0)
+        return read_in(
+            setting.block_units,
+            lambda known: units.parse_ratio(given, known[1], known[0]),
+            given,
+            0.0,
+        )
 
 
 class Control(Table):
@@ -127,7 +154,11 @@ class Control(Table):
 
     filter: Annotated[
         float | None,
-        Quantity("time", positive, "time constant of a first-order lag of its inputs [s]; none if left out"),
+        Quantity(
+            "time",
+            positive,
+            "time constant of a first-order lag of its inputs [s]; none if left out",
+        ),
     ] = None
     limits: Annotated[
         tuple[float, float] | None,
@@ -135,9 +166,15 @@ class Control(Table):
     ] = None
     period: Annotated[
         float | None,
-        Quantity("time", positive, "time between samples; it acts then, and holds [s]; continuous if left out"),
+        Quantity(
+            "time",
+            positive,
+            "time between samples; it acts then, and holds [s]; continuous if left out",
+        ),
     ] = None
-    offset: Annotated[float, Quantity("time", nonnegative, "time of the first sample after the start [s]")] = 0.0
+    offset: Annotated[
+        float, Quantity("time", nonnegative, "time of the first sample after the start [s]")
+    ] = 0.0
     initial: Annotated[float | None, OfOutput("output at the start; balanced if left out")] = None
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:

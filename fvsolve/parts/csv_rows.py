@@ -57,7 +57,9 @@ class CsvRows:
         """
         if name is None:
             if len(self.header) <= default:
-                raise ValueError(f"{self.file} has one column; expected a column of times and a column of values")
+                raise ValueError(
+                    f"{self.file} has one column; expected a column of times and a column of values"
+                )
             return default
         for known in (self.header, self.names):
             if known.count(name) > 1:
@@ -70,7 +72,9 @@ class CsvRows:
         shown += ", ..." if len(self.header) > 20 else ""
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
-    def numbers(self, column: int, dimension: str, ambient: float = 101325.0, stated: str = "") -> np.ndarray:
+    def numbers(
+        self, column: int, dimension: str, ambient: float = 101325.0, stated: str = ""
+    ) -> np.ndarray:
         """Values of a column in SI : float64[n].
 
         The header of the column states its unit; without one it is the unit `stated`, or else SI. Pressures become
@@ -116,7 +120,9 @@ class CsvRows:
             points = points or "." in text
             if points and "," in text:
                 message = f"{show(text)} has a decimal comma, but numbers above have decimal points"
-                raise CsvError(self.file, f"{message}; expected one decimal sign in the column", line)
+                raise CsvError(
+                    self.file, f"{message}; expected one decimal sign in the column", line
+                )
             values.append(value)
         return values
 
@@ -145,14 +151,19 @@ def read_rows(path: Path) -> CsvRows:
 
     Raises ValueError for a file that cannot be read, a missing header, or rows that do not match the header.
     """
-    lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
+    lines = [
+        (n, line)
+        for n, line in enumerate(read_text(path).splitlines(), 1)
+        if line.strip() and line[0] != "#"
+    ]
     if len(lines) < 2:
         raise ValueError(f"{path.name} has no rows; expected a header and rows of numbers")
-    readings = {mark: split_lines(path, lines, mark) for mark in SEPARATORS if mark in lines[0][1]} or {
-        ",": split_lines(path, lines)
-    }
+    readings = {
+        mark: split_lines(path, lines, mark) for mark in SEPARATORS if mark in lines[0][1]
+    } or {",": split_lines(path, lines)}
     header, *rows = next(iter(readings.values()))
-    for reading in readings.values():  # the first with at least two cells in each row, as many in all rows
+    # the first with at least two cells in each row, as many in all rows
+    for reading in readings.values():
         if len(reading[0]) > 1 and {len(row) for row in reading} == {len(reading[0])}:
             header, *rows = reading
             break
@@ -164,9 +175,13 @@ def read_rows(path: Path) -> CsvRows:
         if len(row) != len(header):
             count = f"{len(row)} cell{'' if len(row) == 1 else 's'} under {len(header)} header"
             raise CsvError(
-                path.name, f"{count}{'' if len(header) == 1 else 's'}{COMMA_HINT * (len(row) > len(header))}", line
+                path.name,
+                f"{count}{'' if len(header) == 1 else 's'}{COMMA_HINT * (len(row) > len(header))}",
+                line,
             )
-        nameless = next((cell for cell, name in zip(row, header, strict=True) if cell and not name), None)
+        nameless = next(
+            (cell for cell, name in zip(row, header, strict=True) if cell and not name), None
+        )
         if nameless is not None:
             raise CsvError(path.name, f"{show(nameless)} has no header{COMMA_HINT}", line)
     return CsvRows(path.name, header, [line for line, _ in lines[1:]], rows)
@@ -177,7 +192,9 @@ def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> li
     if not any('"' in line for _, line in lines):
         return [[cell.strip() for cell in line.split(mark)] for _, line in lines]
     try:
-        return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
+        return [
+            [cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines
+        ]
     except csv.Error as error:
         raise ValueError(f"{path.name}: {error}") from None
 
@@ -234,7 +251,12 @@ def copy_name(path: Path, setting: ReadContext) -> str:
 
 
 def read_columns(
-    path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext, unit: str = ""
+    path: Path,
+    time: str | None,
+    value: str | None,
+    dimension: str,
+    setting: ReadContext,
+    unit: str = "",
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
     """(times [s], values [SI, pressures absolute], header of the times, header of the values) of a CSV file.
 
@@ -245,5 +267,6 @@ def read_columns(
     """
     rows = read_rows(path)
     time_column, value_column = rows.column(time, 0), rows.column(value, 1)
-    t, v = rows.numbers(time_column, "time"), rows.numbers(value_column, dimension, setting.ambient, unit)
+    t = rows.numbers(time_column, "time")
+    v = rows.numbers(value_column, dimension, setting.ambient, unit)
     return t, v, rows.header[time_column], rows.header[value_column]

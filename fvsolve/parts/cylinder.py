@@ -20,14 +20,22 @@ class DryFriction(Table):
     v_s is `stribeck_velocity`. It sticks, v = 0, until the force exceeds F_s.
     """
 
-    coulomb: Annotated[float, Quantity("force", nonnegative, "force F_c of dry friction in motion [N]")]
+    coulomb: Annotated[
+        float, Quantity("force", nonnegative, "force F_c of dry friction in motion [N]")
+    ]
     static: Annotated[
-        float | None, Quantity("force", nonnegative, "greatest force F_s at rest; `coulomb` if left out [N]")
+        float | None,
+        Quantity("force", nonnegative, "greatest force F_s at rest; `coulomb` if left out [N]"),
     ] = None
-    stribeck_velocity: Annotated[float | None, Quantity(
-        "velocity", positive,
-        "speed v_s at which the excess of the force at rest has fallen to 1/e; no excess in motion if left out [m/s]",
-    )] = None  # fmt: skip
+    stribeck_velocity: Annotated[
+        float | None,
+        Quantity(
+            "velocity",
+            positive,
+            "speed v_s at which the excess of the force at rest has fallen to 1/e; "
+            "no excess in motion if left out [m/s]",
+        ),
+    ] = None
 
     @property
     def greatest(self) -> float:
@@ -47,58 +55,121 @@ class Cylinder(Link, kind="cylinder"):
     viscous_friction v^2 + F v [W].
     """
 
-    no_scalars: ClassVar[str] = "its chambers carry no scalars yet; leave out this part, or `[scalars]`"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area_A", "piston_diameter"), ("area_B", "rod_diameter"))
-    joins: ClassVar[dict[str, str]] = {"rod": "translational or spatial", "case": "translational or spatial"}
+    no_scalars: ClassVar[str] = (
+        "its chambers carry no scalars yet; leave out this part, or `[scalars]`"
+    )
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("area_A", "piston_diameter"),
+        ("area_B", "rod_diameter"),
+    )
+    joins: ClassVar[dict[str, str]] = {
+        "rod": "translational or spatial",
+        "case": "translational or spatial",
+    }
     owns: ClassVar[dict[str, str]] = {"A": "hydraulic", "B": "hydraulic"}
-    quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
+    quantities: ClassVar[dict[str, str]] = {
+        "force": "force",
+        "position": "position",
+        "velocity": "velocity",
+    }
 
     ports: Annotated[dict[str, str], Ports(("rod", "case"))]
     stroke: Annotated[
-        float, Quantity("length", positive, "stroke, from x = 0 (rod in) to x = stroke [m]", SIZES, VALUE)
+        float,
+        Quantity("length", positive, "stroke, from x = 0 (rod in) to x = stroke [m]", SIZES, VALUE),
     ]
     closed_length: Annotated[
-        float, Quantity("length", nonnegative, "distance from case to rod at x = 0 (rod in) [m]", changes=PROFILE)
+        float,
+        Quantity(
+            "length",
+            nonnegative,
+            "distance from case to rod at x = 0 (rod in) [m]",
+            changes=PROFILE,
+        ),
     ] = 0.0
     area_A: Annotated[
         float | None,
-        Quantity("area", positive, "area of the piston at A [m2]; required without `piston_diameter`", AREAS),
+        Quantity(
+            "area",
+            positive,
+            "area of the piston at A [m2]; required without `piston_diameter`",
+            AREAS,
+        ),
     ] = None
     area_B: Annotated[
         float | None,
-        Quantity("area", positive, "ring area at B, without the rod [m2]; required without `rod_diameter`", AREAS),
+        Quantity(
+            "area",
+            positive,
+            "ring area at B, without the rod [m2]; required without `rod_diameter`",
+            AREAS,
+        ),
     ] = None
     piston_diameter: Annotated[
-        float | None, Quantity("length", positive, "diameter of the piston, instead of `area_A` [m]", SIZES)
+        float | None,
+        Quantity("length", positive, "diameter of the piston, instead of `area_A` [m]", SIZES),
     ] = None
     rod_diameter: Annotated[
         float | None,
-        Quantity("length", nonnegative, "diameter of the rod, with `piston_diameter`, instead of `area_B` [m]", SIZES),
+        Quantity(
+            "length",
+            nonnegative,
+            "diameter of the rod, with `piston_diameter`, instead of `area_B` [m]",
+            SIZES,
+        ),
     ] = None
     dead_volume_A: Annotated[
-        float, Quantity("volume", positive, "volume of chamber A with the rod in, lines included [m3]", changes=VALUE)
+        float,
+        Quantity(
+            "volume",
+            positive,
+            "volume of chamber A with the rod in, lines included [m3]",
+            changes=VALUE,
+        ),
     ]
     dead_volume_B: Annotated[
-        float, Quantity("volume", positive, "volume of chamber B with the rod out, lines included [m3]", changes=VALUE)
+        float,
+        Quantity(
+            "volume",
+            positive,
+            "volume of chamber B with the rod out, lines included [m3]",
+            changes=VALUE,
+        ),
     ]
-    initial_pressure_A: Annotated[float | None, Quantity(
-        "pressure",
-        about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
-        "chamber if left out",
-    )] = None  # fmt: skip
-    initial_pressure_B: Annotated[float | None, Quantity(
-        "pressure",
-        about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
-        "chamber if left out",
-    )] = None  # fmt: skip
+    initial_pressure_A: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure of chamber A at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
+        ),
+    ] = None
+    initial_pressure_B: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure of chamber B at the start [Pa]; that of its links, or the supporting pressure of a shut "
+            "chamber if left out",
+        ),
+    ] = None
     leakage: Annotated[
-        float, Quantity("leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]")
+        float,
+        Quantity(
+            "leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]"
+        ),
     ] = 0.0
     viscous_friction: Annotated[
-        float, Quantity("damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE)
+        float,
+        Quantity(
+            "damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE
+        ),
     ] = 0.0
-    friction: Annotated[DryFriction | None, Nested(DryFriction, "dry friction beside the viscous friction")] = None
-    elevation: Annotated[float | None, Quantity("length", about="elevation of both chambers [m]")] = None
+    friction: Annotated[
+        DryFriction | None, Nested(DryFriction, "dry friction beside the viscous friction")
+    ] = None
+    elevation: Annotated[
+        float | None, Quantity("length", about="elevation of both chambers [m]")
+    ] = None
 
     @property
     def has_dry_friction(self) -> bool:
@@ -117,13 +188,20 @@ class Cylinder(Link, kind="cylinder"):
         if "area_B" not in given and "rod_diameter" not in given:
             faults.append(((), "area_B or rod_diameter is missing"))
         if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
-            faults.append((("rod_diameter",), "needs the key `piston_diameter`; with `area_A` give `area_B` instead"))
+            faults.append(
+                (
+                    ("rod_diameter",),
+                    "needs the key `piston_diameter`; with `area_A` give `area_B` instead",
+                )
+            )
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
             if pressure is not None:
-                yield from around.boiling_faults("links", name, f"initial_pressure_{place}", [pressure])
+                yield from around.boiling_faults(
+                    "links", name, f"initial_pressure_{place}", [pressure]
+                )
         if self.friction is not None and any(map(around.spatial, self.ports.values())):
             text = "dry friction acts between masses on an axis only, and this cylinder joins points in space"
             yield ("friction",), f"{text}; remove this key, or use `viscous_friction`"
@@ -139,7 +217,10 @@ class Cylinder(Link, kind="cylinder"):
             text = f"the piston starts at {place}; expected 0 to {self.stroke:g} m"
             yield ("stroke",), text
         if min(self.areas()) <= 0.0:
-            yield ("rod_diameter",), "leaves no area at B; expected a diameter below `piston_diameter`"
+            yield (
+                ("rod_diameter",),
+                "leaves no area at B; expected a diameter below `piston_diameter`",
+            )
 
     def areas(self) -> tuple[float, float]:
         """(area at A [m2], area at B [m2]) of the piston."""
@@ -154,7 +235,9 @@ class Cylinder(Link, kind="cylinder"):
         volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
         given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}
         return {
-            place: Chamber.model_construct(volume=volume, initial_pressure=given[place], elevation=self.elevation)
+            place: Chamber.model_construct(
+                volume=volume, initial_pressure=given[place], elevation=self.elevation
+            )
             for place, volume in volumes.items()
         }
 
@@ -168,14 +251,24 @@ class CylinderRows(Lowering, kind="cylinder"):
         """Elements of the dry friction between rod and case."""
         if not part.has_dry_friction:
             return [], []
-        rod, housing = (None if case.nodes[place].kind == "frame" else place for place in part.network_places)
-        coulomb, static, speed = part.friction.coulomb, part.friction.greatest, part.friction.stribeck_velocity
+        rod, housing = (
+            None if case.nodes[place].kind == "frame" else place for place in part.network_places
+        )
+        coulomb = part.friction.coulomb
+        static = part.friction.greatest
+        speed = part.friction.stribeck_velocity
         return dry_friction(f"links.{name}", (rod, housing), (coulomb, static, speed or 0.0, 1.0))
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        distance, row["speed"] = draft.join(row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        distance, row["speed"] = draft.join(
+            row, ("case", "rod"), (link.ports["case"], link.ports["rod"])
+        )
         row["position"] = distance - link.closed_length
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()
-        row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction
+        row["stroke"], row["leakage"], row["damping"] = (
+            link.stroke,
+            link.leakage,
+            link.viscous_friction,
+        )

@@ -41,7 +41,8 @@ VOLTAGES = UsualRange(-1e6, 1e6, "to transmission lines")  # [V]
 RESISTANCES = UsualRange(1e-6, 1e9, "contacts to insulation")  # [ohm]
 INDUCTANCES = UsualRange(1e-9, 100.0, "conductors to iron-core chokes")  # [H]
 CAPACITANCES = UsualRange(1e-12, 10.0, "ceramic to double-layer capacitors")  # [F]
-SMALL_VOLTAGE, SMALL_CURRENT = 1.0, 1.0  # sizes of small deviations, where the network does not tell [V], [A]
+# sizes of small deviations, where the network does not tell [V], [A]
+SMALL_VOLTAGE, SMALL_CURRENT = 1.0, 1.0
 
 
 class Terminal(Node, kind="terminal"):
@@ -103,7 +104,9 @@ class VoltageSource(ElectricalLink, kind="voltage-source"):
 
     quantities: ClassVar[dict[str, str]] = {"current": "current", "power": "power"}
 
-    voltage: Annotated[Schedule, Scheduled("voltage", about="voltage of `to` above `from` [V]", usual=VOLTAGES)]
+    voltage: Annotated[
+        Schedule, Scheduled("voltage", about="voltage of `to` above `from` [V]", usual=VOLTAGES)
+    ]
 
 
 class SourceRows(NetworkRows, kind=""):
@@ -115,8 +118,17 @@ class SourceRows(NetworkRows, kind=""):
     def network_elements(self, case, name, part):
         first, second = ends_of(case, part)
         ends = (second, first) if self.kind_of_source == POTENTIAL else (first, second)
-        return [Element(self.kind_of_source, f"links.{name}", f"links.{name}", ends, schedule=getattr(part, self.key),
-                        key=self.key, ledger="supplied")], []  # fmt: skip
+        return [
+            Element(
+                self.kind_of_source,
+                f"links.{name}",
+                f"links.{name}",
+                ends,
+                schedule=getattr(part, self.key),
+                key=self.key,
+                ledger="supplied",
+            )
+        ], []
 
 
 class VoltageSourceRows(SourceRows, kind="voltage-source"):
@@ -170,8 +182,17 @@ class ResistorRows(ElectricalRows, kind="resistor"):
 
     def network_elements(self, case, name, part):
         place = f"links.{name}"
-        return [Element(RESISTANCE, place, place, ends_of(case, part), part.resistance, ledger="dissipated",
-                        heat_to=part.heat_to)], []  # fmt: skip
+        return [
+            Element(
+                RESISTANCE,
+                place,
+                place,
+                ends_of(case, part),
+                part.resistance,
+                ledger="dissipated",
+                heat_to=part.heat_to,
+            )
+        ], []
 
 
 class Inductor(ElectricalLink, kind="inductor"):
@@ -182,7 +203,8 @@ class Inductor(ElectricalLink, kind="inductor"):
 
     inductance: Annotated[float, Quantity("inductance", positive, "inductance [H]", INDUCTANCES)]
     initial_current: Annotated[
-        float | None, Quantity("current", about="current at the start; that of equilibrium if left out [A]")
+        float | None,
+        Quantity("current", about="current at the start; that of equilibrium if left out [A]"),
     ] = None
 
 
@@ -191,8 +213,19 @@ class InductorRows(ElectricalRows, kind="inductor"):
 
     def network_elements(self, case, name, part):
         place = f"links.{name}"
-        return [Element(INERTANCE, place, place, ends_of(case, part), part.inductance, f"{name}.current",
-                        SMALL_CURRENT, part.initial_current, ledger="stored")], []  # fmt: skip
+        return [
+            Element(
+                INERTANCE,
+                place,
+                place,
+                ends_of(case, part),
+                part.inductance,
+                f"{name}.current",
+                SMALL_CURRENT,
+                part.initial_current,
+                ledger="stored",
+            )
+        ], []
 
 
 class Capacitor(ElectricalLink, kind="capacitor"):
@@ -201,9 +234,12 @@ class Capacitor(ElectricalLink, kind="capacitor"):
     Ports: from, to. Stored energy: capacitance voltage^2 / 2 [J]. Dissipated: none.
     """
 
-    capacitance: Annotated[float, Quantity("capacitance", positive, "capacitance [F]", CAPACITANCES)]
+    capacitance: Annotated[
+        float, Quantity("capacitance", positive, "capacitance [F]", CAPACITANCES)
+    ]
     initial_voltage: Annotated[
-        float | None, Quantity("voltage", about="voltage at the start; that of equilibrium if left out [V]")
+        float | None,
+        Quantity("voltage", about="voltage at the start; that of equilibrium if left out [V]"),
     ] = None
 
 
@@ -216,8 +252,19 @@ class CapacitorRows(ElectricalRows, kind="capacitor"):
         sign = -1.0 if first is None else 1.0
         ends = (first, second) if sign > 0.0 else (second, first)
         initial = None if part.initial_voltage is None else sign * part.initial_voltage
-        return [Element(CAPACITY, place, place, ends, part.capacitance, f"{name}.voltage", SMALL_VOLTAGE, initial,
-                        ledger="stored")], []  # fmt: skip
+        return [
+            Element(
+                CAPACITY,
+                place,
+                place,
+                ends,
+                part.capacitance,
+                f"{name}.voltage",
+                SMALL_VOLTAGE,
+                initial,
+                ledger="stored",
+            )
+        ], []
 
     def probe(self, draft, name, probe, row) -> None:
         first, _ = ends_of(draft.case, draft.case.links[name])
@@ -232,7 +279,9 @@ class ElectricalSwitch(ElectricalLink, kind="switch"):
     """
 
     closed: Annotated[Schedule, Scheduled("number", about="closed above 0.5, open otherwise")]
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance while closed [ohm]", RESISTANCES)] = 1e-3
+    resistance: Annotated[
+        float, Quantity("resistance", positive, "resistance while closed [ohm]", RESISTANCES)
+    ] = 1e-3
 
 
 class SwitchRows(NetworkRows, kind="switch"):
@@ -242,9 +291,20 @@ class SwitchRows(NetworkRows, kind="switch"):
 
     def network_elements(self, case, name, part):
         place = f"links.{name}"
-        found = [Element(RESISTANCE, place, place, ends_of(case, part), part.resistance, switch=place,
-                         ledger="dissipated")]  # fmt: skip
-        return found, [Switch(codes.SWITCH, place, place, place, place, (0.0,), part.closed, "closed")]
+        found = [
+            Element(
+                RESISTANCE,
+                place,
+                place,
+                ends_of(case, part),
+                part.resistance,
+                switch=place,
+                ledger="dissipated",
+            )
+        ]
+        return found, [
+            Switch(codes.SWITCH, place, place, place, place, (0.0,), part.closed, "closed")
+        ]
 
     def probe(self, draft, name, probe, row) -> None:
         reads = "all flows" if probe.quantity == "current" else "drop"
@@ -258,7 +318,9 @@ class Diode(ElectricalLink, kind="diode"):
     power: voltage times current [W].
     """
 
-    forward_voltage: Annotated[float, Quantity("voltage", nonnegative, "voltage above which it conducts [V]")] = 0.0
+    forward_voltage: Annotated[
+        float, Quantity("voltage", nonnegative, "voltage above which it conducts [V]")
+    ] = 0.0
     resistance: Annotated[
         float, Quantity("resistance", positive, "resistance while it conducts [ohm]", RESISTANCES)
     ] = 1e-3
@@ -273,11 +335,25 @@ class DiodeRows(NetworkRows, kind="diode"):
         place, (first, second), inner = f"links.{name}", ends_of(case, part), f"{name}.junction"
         return [
             Element(GAUGE, place, place, (first, second)),
-            Element(RESISTANCE, f"{place}.resistance", place, (first, inner), part.resistance, switch=place,
-                    ledger="dissipated"),
-            Element(POTENTIAL, f"{place}.forward", place, (inner, second), schedule=constant(part.forward_voltage),
-                    switch=place, ledger="dissipated"),
-        ], [Switch(codes.DIODE, place, place, place, f"{place}.forward", (part.forward_voltage,))]  # fmt: skip
+            Element(
+                RESISTANCE,
+                f"{place}.resistance",
+                place,
+                (first, inner),
+                part.resistance,
+                switch=place,
+                ledger="dissipated",
+            ),
+            Element(
+                POTENTIAL,
+                f"{place}.forward",
+                place,
+                (inner, second),
+                schedule=constant(part.forward_voltage),
+                switch=place,
+                ledger="dissipated",
+            ),
+        ], [Switch(codes.DIODE, place, place, place, f"{place}.forward", (part.forward_voltage,))]
 
 
 class DcMotor(Link, kind="dc-motor"):
@@ -293,16 +369,27 @@ class DcMotor(Link, kind="dc-motor"):
     main_quantities: ClassVar[tuple[str, ...]] = ("current", "torque")
 
     ports: Annotated[dict[str, str], Ports(("p", "n", "shaft"), "terminals p and n, and the shaft")]
-    torque_constant: Annotated[float, Quantity(
-        "torque_constant", nonzero, "torque per current, and voltage per angular velocity [N m/A]",
-        UsualRange(1e-5, 1e3, "watch motors to rolling mills"),
-    )]  # fmt: skip
-    resistance: Annotated[float, Quantity("resistance", positive, "resistance of the armature [ohm]", RESISTANCES)]
+    torque_constant: Annotated[
+        float,
+        Quantity(
+            "torque_constant",
+            nonzero,
+            "torque per current, and voltage per angular velocity [N m/A]",
+            UsualRange(1e-5, 1e3, "watch motors to rolling mills"),
+        ),
+    ]
+    resistance: Annotated[
+        float, Quantity("resistance", positive, "resistance of the armature [ohm]", RESISTANCES)
+    ]
     inductance: Annotated[
-        float | None, Quantity("inductance", positive, "inductance of the armature; none if left out [H]", INDUCTANCES)
+        float | None,
+        Quantity(
+            "inductance", positive, "inductance of the armature; none if left out [H]", INDUCTANCES
+        ),
     ] = None
     initial_current: Annotated[
-        float | None, Quantity("current", about="current at the start; that of equilibrium if left out [A]")
+        float | None,
+        Quantity("current", about="current at the start; that of equilibrium if left out [A]"),
     ] = None
     heat_to: Annotated[str | None, HEAT_TO] = None
 
@@ -310,7 +397,12 @@ class DcMotor(Link, kind="dc-motor"):
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if "initial_current" in given and "inductance" not in given:
-            faults.append((("initial_current",), "needs the key `inductance`: without it no current is stored"))
+            faults.append(
+                (
+                    ("initial_current",),
+                    "needs the key `inductance`: without it no current is stored",
+                )
+            )
         return faults
 
     def faults(self, name: str, around: Any) -> Iterator:
@@ -320,21 +412,48 @@ class DcMotor(Link, kind="dc-motor"):
 class DcMotorRows(NetworkRows, kind="dc-motor"):
     """Conversion of DC motors: a resistance, an inductance and a transformer between voltage and angular velocity."""
 
-    quantities: ClassVar = {"current": (".coupling", "flow", 1.0), "torque": (".coupling", "second flow", -1.0)}
+    quantities: ClassVar = {
+        "current": (".coupling", "flow", 1.0),
+        "torque": (".coupling", "second flow", -1.0),
+    }
 
     def network_elements(self, case, name, part):
         place = f"links.{name}"
         p, n, shaft = (node_or_reference(case, part.ports[port]) for port in ("p", "n", "shaft"))
         inner = f"{name}.armature" if part.inductance is not None else f"{name}.brushes"
-        found = [Element(RESISTANCE, f"{place}.resistance", place, (p, inner), part.resistance, ledger="dissipated",
-                         heat_to=part.heat_to)]  # fmt: skip
+        found = [
+            Element(
+                RESISTANCE,
+                f"{place}.resistance",
+                place,
+                (p, inner),
+                part.resistance,
+                ledger="dissipated",
+                heat_to=part.heat_to,
+            )
+        ]
         if part.inductance is not None:
-            found.append(Element(INERTANCE, f"{place}.inductance", place, (inner, f"{name}.brushes"), part.inductance,
-                                 f"{name}.current", SMALL_CURRENT, part.initial_current, ledger="stored"))  # fmt: skip
+            found.append(
+                Element(
+                    INERTANCE,
+                    f"{place}.inductance",
+                    place,
+                    (inner, f"{name}.brushes"),
+                    part.inductance,
+                    f"{name}.current",
+                    SMALL_CURRENT,
+                    part.initial_current,
+                    ledger="stored",
+                )
+            )
         ends = (f"{name}.brushes", n, shaft, None)
-        return [*found, Element(TRANSFORMER, f"{place}.coupling", place, ends, part.torque_constant)], []
+        return [
+            *found,
+            Element(TRANSFORMER, f"{place}.coupling", place, ends, part.torque_constant),
+        ], []
 
     def probe(self, draft, name, probe, row) -> None:
         place, part = f"links.{name}.coupling", draft.case.links[name]
-        scale = 1.0 if probe.quantity == "current" else part.torque_constant  # torque = constant times current
+        # torque = constant times current
+        scale = 1.0 if probe.quantity == "current" else part.torque_constant
         fill_network_probe(draft, row, place, "flow", scale)

@@ -56,13 +56,22 @@ def read_series(given: dict[str, Any], dimension: str, setting: ReadContext) -> 
     stated, name, pixels = open_raster(given, keys, setting, series=True)
     if not (unit := keys["unit"] or pixels.unit):
         example = DIMENSIONS[dimension].example.split()[-1]
-        raise ValueError(f"{name} states no unit of its values; expected for example `unit = {show(example)}`")
+        raise ValueError(
+            f"{name} states no unit of its values; expected for example `unit = {show(example)}`"
+        )
     values = units.find(unit, dimension).si(pixels.values)
     frames, holes = values.reshape(-1, *values.shape[-2:]), keys["outside"] == "hole"
-    least, *fields = (SpatialField(stated, Raster(name, pixels._replace(values=plane), holes))
-                      for plane in (frames.min(axis=0), *frames))  # fmt: skip
-    return SpatialSeries(stated, np.zeros(1) if pixels.times is None else pixels.times, tuple(fields), least,
-                       float(np.nanmax(frames)))  # fmt: skip
+    least, *fields = (
+        SpatialField(stated, Raster(name, pixels._replace(values=plane), holes))
+        for plane in (frames.min(axis=0), *frames)
+    )
+    return SpatialSeries(
+        stated,
+        np.zeros(1) if pixels.times is None else pixels.times,
+        tuple(fields),
+        least,
+        float(np.nanmax(frames)),
+    )
 
 
 class ScheduledField(Scheduled):

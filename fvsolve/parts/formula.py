@@ -22,23 +22,52 @@ from fvsolve.units import show
 NAMES = ("x", "y", "pi")
 TIME_NAMES = ("t", "pi")
 CALL_FORMS = (  # allowed calls; "..." stands for any number of arguments
-    "sin(a)", "cos(a)", "tan(a)", "arctan2(a, b)", "exp(a)", "log(a)", "sqrt(a)", "tanh(a)", "abs(a)",
-    "min(a, b, ...)", "max(a, b, ...)", "hypot(a, b)", "where(condition, a, b)",
-)  # fmt: skip
+    "sin(a)",
+    "cos(a)",
+    "tan(a)",
+    "arctan2(a, b)",
+    "exp(a)",
+    "log(a)",
+    "sqrt(a)",
+    "tanh(a)",
+    "abs(a)",
+    "min(a, b, ...)",
+    "max(a, b, ...)",
+    "hypot(a, b)",
+    "where(condition, a, b)",
+)
 FUNCTIONS = {form[: form.index("(")]: form for form in CALL_FORMS}
 SMOOTH_FUNCTIONS = tuple(name for name in FUNCTIONS if name not in ("abs", "min", "max", "where"))
 OPERATORS = {
-    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
-    ast.UAdd: np.positive, ast.USub: np.negative, ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater,
-    ast.GtE: np.greater_equal, ast.Eq: np.equal, ast.NotEq: np.not_equal,
-}  # fmt: skip
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+    ast.UAdd: np.positive,
+    ast.USub: np.negative,
+    ast.Lt: np.less,
+    ast.LtE: np.less_equal,
+    ast.Gt: np.greater,
+    ast.GtE: np.greater_equal,
+    ast.Eq: np.equal,
+    ast.NotEq: np.not_equal,
+}
 OPERATOR_HINT = "operators are + - * / ^ < <= > >= == !="
 UNKNOWN_OPERATORS = {  # operators of other languages -> (sign, equivalent here)
-    ast.MatMult: ("@", ""), ast.Mod: ("%", ""), ast.FloorDiv: ("//", ""), ast.LShift: ("<<", ""),
-    ast.RShift: (">>", ""), ast.Invert: ("~", "where(a, 0, 1)"), ast.Not: ("not", "where(a, 0, 1)"),
-    ast.BitAnd: ("&", "(a)*(b)"), ast.And: ("and", "(a)*(b)"), ast.BitOr: ("|", "max(a, b)"),
-    ast.Or: ("or", "max(a, b)"), ast.IfExp: ("if", "where(condition, a, b)"),
-}  # fmt: skip
+    ast.MatMult: ("@", ""),
+    ast.Mod: ("%", ""),
+    ast.FloorDiv: ("//", ""),
+    ast.LShift: ("<<", ""),
+    ast.RShift: (">>", ""),
+    ast.Invert: ("~", "where(a, 0, 1)"),
+    ast.Not: ("not", "where(a, 0, 1)"),
+    ast.BitAnd: ("&", "(a)*(b)"),
+    ast.And: ("and", "(a)*(b)"),
+    ast.BitOr: ("|", "max(a, b)"),
+    ast.Or: ("or", "max(a, b)"),
+    ast.IfExp: ("if", "where(condition, a, b)"),
+}
 NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 MAX_LENGTH = 4000  # characters
 TOO_DEEP = "brackets or powers are nested too deep"
@@ -77,8 +106,17 @@ class Arithmetic:
         otherwise : error message for a text that is not a formula at all; names : its variables
         functions : names of functions that messages list
         """
-        self.text, self.source, self.names, self.functions = text, text.replace("^", "**").strip(), names, functions
-        of = " and ".join(name for name in names if name != "pi") if len(names) < 4 else listing(names, 20)
+        self.text, self.source, self.names, self.functions = (
+            text,
+            text.replace("^", "**").strip(),
+            names,
+            functions,
+        )
+        of = (
+            " and ".join(name for name in names if name != "pi")
+            if len(names) < 4
+            else listing(names, 20)
+        )
         about = f"{show(text)} is not a formula of {of}"
         if len(text) > MAX_LENGTH:
             text = f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
@@ -89,7 +127,9 @@ class Arithmetic:
             raise ValueError(f"{about}: {TOO_DEEP}") from None
         except (SyntaxError, ValueError) as error:
             if any(sign in text for sign in "*+()"):  # not a quantity
-                raise ValueError(f"{about}: {bracket_fault(text) or getattr(error, 'msg', error)}") from None
+                raise ValueError(
+                    f"{about}: {bracket_fault(text) or getattr(error, 'msg', error)}"
+                ) from None
             raise ValueError(otherwise or about) from None
         try:
             self.steps = list(self.read(tree))
@@ -107,8 +147,10 @@ class Arithmetic:
             if node.id not in self.names:
                 hint = f"; did you mean {FUNCTIONS[node.id]}?" if node.id in FUNCTIONS else ""
                 known = [*self.names, *self.functions]
-                raise ValueError(f"{node.id} is unknown{hint or did_you_mean(node.id, known)}; known are "
-                                 f"{listing(known, 20)}")  # fmt: skip
+                raise ValueError(
+                    f"{node.id} is unknown{hint or did_you_mean(node.id, known)}; known are "
+                    f"{listing(known, 20)}"
+                )
             yield Step(node.id, 0, part)
         elif isinstance(node, ast.UnaryOp):
             yield from self.read(node.operand)
@@ -146,10 +188,16 @@ class Arithmetic:
         count, endless = form.count(",") + 1 - ("..." in form), "..." in form
         if node.keywords or given < count or (given > count and not endless):
             counted = f"{given} argument{'' if given == 1 else 's'}"
-            raise ValueError(f"{name} has {counted}; expected {form}" if not node.keywords else f"expected {form}")
+            raise ValueError(
+                f"{name} has {counted}; expected {form}"
+                if not node.keywords
+                else f"expected {form}"
+            )
         for argument in node.args:
             yield from self.read(argument)
-        yield Step({"min": np.minimum, "max": np.maximum}.get(name) or getattr(np, name), given, part)
+        yield Step(
+            {"min": np.minimum, "max": np.maximum}.get(name) or getattr(np, name), given, part
+        )
 
     def source_of(self, node: ast.AST) -> str:
         """Source text of a node of the syntax tree."""
@@ -165,7 +213,9 @@ class Arithmetic:
             part = self.steps[at].part
             where = f"{ERRORS[reason]} at x = {x[k]:.6g} m, y = {y[k]:.6g} m"
             raise ValueError(
-                f"{show(self.text)} {where}" if part == self.text else f"{show(self.text)}: {part} {where}"
+                f"{show(self.text)} {where}"
+                if part == self.text
+                else f"{show(self.text)}: {part} {where}"
             )
         return np.array(result, dtype=float)
 
@@ -184,7 +234,9 @@ class Arithmetic:
         return tuple(np.broadcast_to(array, shape) for array in stack[0])
 
 
-def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
+def apply_step(
+    at: int, rule: Callable, values: tuple, wrongs: tuple
+) -> tuple[np.ndarray, np.ndarray]:
     """(values, error codes) of a function of arrays : float64[n], int64[n].
 
     at : index of the step; rule : function; values : its arguments; wrongs : error codes of the arguments
@@ -193,7 +245,9 @@ def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[n
     if rule is np.where:
         condition, a, b = wrongs
         chosen = np.where(np.not_equal(values[0], 0.0), a, b)
-        return np.where(np.not_equal(values[0], 0.0), *values[1:]), np.where(condition >= 0, condition, chosen)
+        return np.where(np.not_equal(values[0], 0.0), *values[1:]), np.where(
+            condition >= 0, condition, chosen
+        )
     result = np.asarray(reduce(rule, values) if len(values) > 2 else rule(*values), dtype=float)
     reason = np.where(np.isnan(result), 2, 3)
     for kind, zero, argument in ((0, np.divide, 1), (0, np.power, 0), (1, np.log, 0)):
@@ -208,8 +262,12 @@ def operator_function(node: ast.AST) -> Callable:
         return OPERATORS[type(node)]
     sign, instead = UNKNOWN_OPERATORS.get(type(node), ("", ""))
     if not sign:
-        raise ValueError(f"expected numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {OPERATOR_HINT}")
-    raise ValueError(f"unknown operator {sign}; " + (f"did you mean {instead}?" if instead else OPERATOR_HINT))
+        raise ValueError(
+            f"expected numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {OPERATOR_HINT}"
+        )
+    raise ValueError(
+        f"unknown operator {sign}; " + (f"did you mean {instead}?" if instead else OPERATOR_HINT)
+    )
 
 
 def decimal_number(text: str) -> float:
@@ -256,7 +314,9 @@ class SpatialField:
         if not np.isfinite(values).all():
             k = int(np.argmax(~np.isfinite(values)))
             place = f"x = {x[k]:.6g} m, y = {y[k]:.6g} m"
-            raise ValueError(f"{show(self.given)} is not finite at {place}; expected finite values in the whole basin")
+            raise ValueError(
+                f"{show(self.given)} is not finite at {place}; expected finite values in the whole basin"
+            )
         return values
 
     def table(self) -> Any:
@@ -297,7 +357,9 @@ class SpatialFieldKey(Value):
         if not isinstance(given, str):
             return uniform(Quantity(self.dimension, self.range).read(given, setting))
         try:
-            return uniform(Quantity(self.dimension, self.range).read(number_or_text(given), setting))
+            return uniform(
+                Quantity(self.dimension, self.range).read(number_or_text(given), setting)
+            )
         except ValueError as error:
             if given[:1].isdigit() and not any(sign in given for sign in "*/+-()^<>="):
                 raise
@@ -319,7 +381,9 @@ class SpatialFieldKey(Value):
         try:
             path = find_file(given["file"], setting)
             if path.suffix.lower() in RASTER_SUFFIXES:
-                raise ValueError(f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}")
+                raise ValueError(
+                    f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}"
+                )
             columns = read_points(path, self.dimension)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
@@ -343,7 +407,9 @@ class NumberOrField(Value):
     def read(self, given: Any, setting: ReadContext) -> float | SpatialField:
         if isinstance(given, float):
             return self.number.read(given, setting)
-        found = SpatialFieldKey(self.number.dimension, self.about, self.number.range).read(given, setting)
+        found = SpatialFieldKey(self.number.dimension, self.about, self.number.range).read(
+            given, setting
+        )
         return found.given if isinstance(found.given, float) else found
 
     @property
@@ -360,8 +426,12 @@ def read_points(path: Path, dimension: str) -> np.ndarray:
     if len(rows.header) != 3:
         raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
     if len(rows.lines) < 3:
-        raise ValueError(f"{path.name}: too few points ({len(rows.lines)}); expected at least three")
-    return np.column_stack([rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))])
+        raise ValueError(
+            f"{path.name}: too few points ({len(rows.lines)}); expected at least three"
+        )
+    return np.column_stack(
+        [rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,7 +453,9 @@ class Samples:
         """Function of arrays x and y, made once."""
         places, values = self.columns[:, :2], self.columns[:, 2]
         if lines := grid_lines(places):
-            return partial(bilinear, *lines, values[np.lexsort(places.T)].reshape(lines[1].size, lines[0].size))
+            return partial(
+                bilinear, *lines, values[np.lexsort(places.T)].reshape(lines[1].size, lines[0].size)
+            )
         from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
         inner, outer = LinearNDInterpolator(places, values), NearestNDInterpolator(places, values)
@@ -407,14 +479,18 @@ def grid_lines(places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     return (x, y) if np.unique(row * x.size + column).size == len(places) else None
 
 
-def bilinear(lines_x: np.ndarray, lines_y: np.ndarray, values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def bilinear(
+    lines_x: np.ndarray, lines_y: np.ndarray, values: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
     """Bilinear interpolation in a rectangular grid; points outside get the value at the nearest place of the grid.
 
     lines_x, lines_y : increasing coordinates of nx and ny lines; values : float64[ny, nx]; x, y : points
     """
-    (i, a), (j, b) = ((at, (np.clip(q, lines[0], lines[-1]) - lines[at]) / (lines[at + 1] - lines[at]))
-                      for q, lines in ((x, lines_x), (y, lines_y))
-                      for at in [np.clip(np.searchsorted(lines, q, side="right") - 1, 0, lines.size - 2)])  # fmt: skip
+    (i, a), (j, b) = (
+        (at, (np.clip(q, lines[0], lines[-1]) - lines[at]) / (lines[at + 1] - lines[at]))
+        for q, lines in ((x, lines_x), (y, lines_y))
+        for at in [np.clip(np.searchsorted(lines, q, side="right") - 1, 0, lines.size - 2)]
+    )
     below = values[j, i] * (1.0 - a) + values[j, i + 1] * a
     above = values[j + 1, i] * (1.0 - a) + values[j + 1, i + 1] * a
     return below * (1.0 - b) + above * b
@@ -449,7 +525,8 @@ def samples(shape: SpatialField | None, mesh: Any) -> np.ndarray:
     if not is_grid(mesh):
         places = np.array([x]), np.array([y])
     else:
-        wide, high = np.tile(np.diff(mesh.grid.x), mesh.grid.ny), np.repeat(np.diff(mesh.grid.y), mesh.grid.nx)
+        wide = np.tile(np.diff(mesh.grid.x), mesh.grid.ny)
+        high = np.repeat(np.diff(mesh.grid.y), mesh.grid.nx)
         to = 0.5 * math.sqrt(0.6) * np.array(GAUSS)[:, :, None]
         places = x + to[:, 0] * wide, y + to[:, 1] * high
     if shape is None:

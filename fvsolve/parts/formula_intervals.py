@@ -15,14 +15,17 @@ import numpy as np
 from fvsolve.core.kernels import formula_programs as code
 
 ROUNDS = 80  # greatest number of bisections: enough for neighbouring floating-point numbers
-RANGE_ROUNDS = 24  # the same in a search for values out of range, which a smooth maximum at the limit never ends
+# the same in a search for values out of range, which a smooth maximum at the limit never ends
+RANGE_ROUNDS = 24
 MOST = 4096  # greatest number of intervals in doubt
 POLE = 1e6  # size beside a point in doubt, relative to all samples, that counts as a pole
-PULSE = 0.05  # deviation from a straight line between two samples, relative to the range, that counts as a pulse
+# deviation from a straight line between two samples, relative to the range, that counts as a pulse
+PULSE = 0.05
 NARROW = 1e-9  # least width of a pulse, relative to the run
 MOST_PULSES = 60  # more of them are a wave, which error control follows
 PIECES = 16  # pieces of a pulse, at whose ends steps end
-TAIL = 1e-6  # value of a pulse, relative to the range, at its ends: a long step after it would multiply more
+# value of a pulse, relative to the range, at its ends: a long step after it would multiply more
+TAIL = 1e-6
 
 
 class Enclosure(NamedTuple):
@@ -33,7 +36,8 @@ class Enclosure(NamedTuple):
     doubt: np.ndarray
 
 
-Bounds = Callable[[np.ndarray, np.ndarray], Enclosure]  # of a formula of time, in intervals from `begin` to `end` [s]
+# of a formula of time, in intervals from `begin` to `end` [s]
+Bounds = Callable[[np.ndarray, np.ndarray], Enclosure]
 
 
 def bounds_of(low: np.ndarray, high: np.ndarray, doubt: np.ndarray) -> Enclosure:
@@ -42,7 +46,9 @@ def bounds_of(low: np.ndarray, high: np.ndarray, doubt: np.ndarray) -> Enclosure
     A part may be infinite, for example by overflow, where the formula is not: exp(-t**200) is 0.
     """
     doubt = doubt | np.isnan(low) | np.isnan(high)
-    return Enclosure(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high), doubt)
+    return Enclosure(
+        np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high), doubt
+    )
 
 
 def hull(values: list[np.ndarray], doubt: np.ndarray) -> Enclosure:
@@ -68,7 +74,8 @@ def wave(x: Enclosure, offset: float) -> Enclosure:
     a, b = np.sin(x.low + offset), np.sin(x.high + offset)
     top, bottom = (has_multiple(x, place - offset, 2 * np.pi) for place in (np.pi / 2, -np.pi / 2))
     point = x.low == x.high
-    low, high = np.where(bottom & ~point, -1.0, np.minimum(a, b)), np.where(top & ~point, 1.0, np.maximum(a, b))
+    low = np.where(bottom & ~point, -1.0, np.minimum(a, b))
+    high = np.where(top & ~point, 1.0, np.maximum(a, b))
     return bounds_of(low, high, x.doubt)
 
 
@@ -79,11 +86,15 @@ def power(x: Enclosure, y: Enclosure) -> Enclosure:
     whole = fixed & (exponent == np.round(exponent))
     zero = (x.low <= 0.0) & (x.high >= 0.0)
     invalid = np.where(
-        whole, zero & (exponent < 0.0), (x.low < 0.0) | zero & (y.low <= 0.0) & ~(fixed & (exponent > 0))
+        whole,
+        zero & (exponent < 0.0),
+        (x.low < 0.0) | zero & (y.low <= 0.0) & ~(fixed & (exponent > 0)),
     )
     ends = [np.power(base, to) for base in (x.low, x.high) for to in (y.low, y.high)]
     inner = np.where(zero & (y.low >= 0.0), np.power(0.0, np.maximum(y.low, 0.0)), ends[0])
-    result = hull([*(np.where(invalid, np.nan, end) for end in ends), np.where(invalid, np.nan, inner)], doubt)
+    result = hull(
+        [*(np.where(invalid, np.nan, end) for end in ends), np.where(invalid, np.nan, inner)], doubt
+    )
     return Enclosure(result.low, result.high, result.doubt | invalid)
 
 
@@ -164,8 +175,12 @@ TWO: dict[int, Callable] = {
     code.POWER_OF: power,
     code.ARCTANGENT: direction_of,
     code.HYPOTENUSE: sized,
-    code.LEAST: lambda x, y: Enclosure(np.minimum(x.low, y.low), np.minimum(x.high, y.high), x.doubt | y.doubt),
-    code.GREATEST: lambda x, y: Enclosure(np.maximum(x.low, y.low), np.maximum(x.high, y.high), x.doubt | y.doubt),
+    code.LEAST: lambda x, y: Enclosure(
+        np.minimum(x.low, y.low), np.minimum(x.high, y.high), x.doubt | y.doubt
+    ),
+    code.GREATEST: lambda x, y: Enclosure(
+        np.maximum(x.low, y.low), np.maximum(x.high, y.high), x.doubt | y.doubt
+    ),
     code.LESS: lambda x, y: compared(difference(x, y)),
     code.MORE: lambda x, y: opposite(compared(difference(x, y))),
 }
@@ -193,7 +208,9 @@ def enclose(steps: list[tuple[int, float]], begin: np.ndarray, end: np.ndarray) 
     with np.errstate(all="ignore"):
         for step, number in steps:
             if step == code.CONSTANT:
-                stack.append(Enclosure(np.full(begin.size, number), np.full(begin.size, number), sure))
+                stack.append(
+                    Enclosure(np.full(begin.size, number), np.full(begin.size, number), sure)
+                )
             elif step == code.TIME:
                 stack.append(Enclosure(begin, end, sure))
             elif step in (code.BEFORE, code.AFTER):  # no break lies within an interval
@@ -227,7 +244,9 @@ def bisected(begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Both bisected of each interval that contains a floating-point number between its ends."""
     middle = 0.5 * (begin + end)
     inner = (begin < middle) & (middle < end)
-    begin, middle, end = begin[inner], middle[inner], end[inner]
+    begin = begin[inner]
+    middle = middle[inner]
+    end = end[inner]
     return np.concatenate([begin, middle]), np.concatenate([middle, end])
 
 
@@ -236,7 +255,9 @@ def find_pole(bounds: Bounds, times: np.ndarray, values: np.ndarray) -> float | 
 
     times, values : samples of the formula, increasing
     """
-    begin, end, most = times[:-1], times[1:], POLE * (1.0 + np.abs(values).max())
+    begin = times[:-1]
+    end = times[1:]
+    most = POLE * (1.0 + np.abs(values).max())
     begin, end = begin[begin < end], end[begin < end]
     for _ in range(ROUNDS):
         doubt = bounds(begin, end).doubt
@@ -278,9 +299,13 @@ def find_pulses(bounds: Bounds, times: np.ndarray, values: np.ndarray) -> list[f
     times, values : samples of the formula; a pulse lies between two of them and is not seen at either.
     """
     spaced = np.flatnonzero(np.diff(times) > 0.0)
-    begin, end, owner = times[spaced], times[spaced + 1], spaced
+    begin = times[spaced]
+    end = times[spaced + 1]
+    owner = spaced
     seen: dict[int, list[tuple[float, float]]] = {}
-    least, greatest, narrow = values.min(), values.max(), NARROW * (times[-1] - times[0])
+    least = values.min()
+    greatest = values.max()
+    narrow = NARROW * (times[-1] - times[0])
     first, last = values[:-1], values[1:]
     for _ in range(ROUNDS):
         found = bounds(begin, end)
@@ -291,13 +316,17 @@ def find_pulses(bounds: Bounds, times: np.ndarray, values: np.ndarray) -> list[f
         keep = keep[np.argsort(-excess[keep], kind="stable")[:MOST]]
         if not keep.size:
             break
-        begin, end, owner = begin[keep], end[keep], owner[keep]
+        begin = begin[keep]
+        end = end[keep]
+        owner = owner[keep]
         middle = 0.5 * (begin + end)
         value = values_at(bounds, middle)
         for k, t, v in zip(owner.tolist(), middle.tolist(), value.tolist(), strict=True):
             seen.setdefault(k, []).append((t, v))
         least, greatest = np.fmin(least, np.nanmin(value)), np.fmax(greatest, np.nanmax(value))
-        begin, end, owner = np.concatenate([begin, middle]), np.concatenate([middle, end]), np.tile(owner, 2)
+        begin = np.concatenate([begin, middle])
+        end = np.concatenate([middle, end])
+        owner = np.tile(owner, 2)
     return pulse_breaks(seen, times, values, greatest - least)
 
 
@@ -312,7 +341,9 @@ def pulse_breaks(seen: dict, times: np.ndarray, values: np.ndarray, span: float)
             continue
         near = np.concatenate([[times[k]], t[np.abs(v - line) <= TAIL * span], [times[k + 1]]])
         rise, fall = t[far][0], t[far][-1]
-        pulses.append((near[near < rise].max(initial=times[k]), near[near > fall].min(initial=times[k + 1])))
+        pulses.append(
+            (near[near < rise].max(initial=times[k]), near[near > fall].min(initial=times[k + 1]))
+        )
     if len(pulses) > MOST_PULSES:
         return []
     return sorted({float(t) for a, b in pulses for t in np.linspace(a, b, PIECES + 1)})

@@ -18,14 +18,32 @@ from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
 CODES = {
-    np.add: code.ADD, np.subtract: code.SUBTRACT, np.multiply: code.MULTIPLY, np.divide: code.DIVIDE,
-    np.power: code.POWER_OF, np.negative: code.NEGATE, np.sin: code.SINE, np.cos: code.COSINE, np.tan: code.TANGENT,
-    np.arctan2: code.ARCTANGENT, np.exp: code.EXPONENTIAL, np.log: code.LOGARITHM, np.sqrt: code.ROOT,
-    np.tanh: code.TANH, np.hypot: code.HYPOTENUSE, np.where: code.WHERE, np.abs: code.ABSOLUTE,
-    np.minimum: code.LEAST, np.maximum: code.GREATEST, np.less: code.LESS, np.less_equal: code.LESS,
-    np.greater: code.MORE, np.greater_equal: code.MORE,
-}  # fmt: skip
-SAMPLES = 4001  # values of a formula at equal distances in a run, from which its range and its periods are found
+    np.add: code.ADD,
+    np.subtract: code.SUBTRACT,
+    np.multiply: code.MULTIPLY,
+    np.divide: code.DIVIDE,
+    np.power: code.POWER_OF,
+    np.negative: code.NEGATE,
+    np.sin: code.SINE,
+    np.cos: code.COSINE,
+    np.tan: code.TANGENT,
+    np.arctan2: code.ARCTANGENT,
+    np.exp: code.EXPONENTIAL,
+    np.log: code.LOGARITHM,
+    np.sqrt: code.ROOT,
+    np.tanh: code.TANH,
+    np.hypot: code.HYPOTENUSE,
+    np.where: code.WHERE,
+    np.abs: code.ABSOLUTE,
+    np.minimum: code.LEAST,
+    np.maximum: code.GREATEST,
+    np.less: code.LESS,
+    np.less_equal: code.LESS,
+    np.greater: code.MORE,
+    np.greater_equal: code.MORE,
+}
+# values of a formula at equal distances in a run, from which its range and its periods are found
+SAMPLES = 4001
 NO_FLAGS = np.zeros(0)
 TIME_FORMULA = re.compile(r"(?<![\w.])t(?![\w.])|" + "|".join(rf"\b{name}\(" for name in FUNCTIONS))
 
@@ -69,17 +87,25 @@ class Program:
     def apply(self, result: list, widths: list, step: Any) -> None:
         """Add the steps for a function of the last `step.count` values; functions of numbers are computed here."""
         if step.rule not in CODES:
-            raise ValueError(f"{show(self.text)}: {step.part} compares for equality; expected < or >")
+            raise ValueError(
+                f"{show(self.text)}: {step.part} compares for equality; expected < or >"
+            )
         operands = widths[len(widths) - step.count :]
         del widths[len(widths) - step.count :]
         first = operands[0][0]
         own = [result[operand[0]] for operand in operands]
-        if all(len(operand) == 1 and item[0] == code.CONSTANT for operand, item in zip(operands, own, strict=True)):
+        if all(
+            len(operand) == 1 and item[0] == code.CONSTANT
+            for operand, item in zip(operands, own, strict=True)
+        ):
             values = [item[1] for item in own]
             del result[first:]
             with np.errstate(all="ignore"):
-                value = float(step.rule(*values) if len(values) < 3 or step.rule is np.where else
-                              step.rule.reduce(values))  # fmt: skip
+                value = float(
+                    step.rule(*values)
+                    if len(values) < 3 or step.rule is np.where
+                    else step.rule.reduce(values)
+                )
             if not math.isfinite(value):
                 raise ValueError(f"{show(self.text)}: {step.part} is not a number")
             result.append((code.CONSTANT, value))
@@ -87,7 +113,9 @@ class Program:
             del result[first:]
             result.append(past)
         else:
-            result += [(CODES[step.rule], 0.0)] * (1 if step.rule is np.where else max(1, step.count - 1))
+            result += [(CODES[step.rule], 0.0)] * (
+                1 if step.rule is np.where else max(1, step.count - 1)
+            )
         widths.append(list(range(first, len(result))))
 
     def compared_time(self, operands: list, own: list, kind: int) -> tuple[int, float] | None:
@@ -106,9 +134,19 @@ class Program:
         """Number of steps whose result has a kink or a jump where two values are equal."""
         return sum(kind >= code.FIRST_KINK for kind, _ in self.steps)
 
-    def rows(self, scale: float = 1.0, offset: float = 0.0, flag: int = 0, kind: float = 0.0) -> list[list[float]]:
+    def rows(
+        self, scale: float = 1.0, offset: float = 0.0, flag: int = 0, kind: float = 0.0
+    ) -> list[list[float]]:
         """Rows of `pieces`: header and steps, for the value scale * SI value + offset; flag : first event flag."""
-        header = [-np.inf, kind, len(self.steps), scale * self.scale, scale * self.offset + offset, flag, 0.0]
+        header = [
+            -np.inf,
+            kind,
+            len(self.steps),
+            scale * self.scale,
+            scale * self.offset + offset,
+            flag,
+            0.0,
+        ]
         result, number = [header], 0
         for step, value in self.steps:
             if step >= code.FIRST_KINK:
@@ -130,7 +168,9 @@ class Program:
         """SI value at time t [s] with these inputs; from time `limit` on, its left limit there."""
         stack = np.zeros(self.stack_size)
         stack[: len(inputs)] = inputs
-        return float(code.run_program(self.table, 0, t, limit, len(inputs), stack, NO_FLAGS, NO_FLAGS))
+        return float(
+            code.run_program(self.table, 0, t, limit, len(inputs), stack, NO_FLAGS, NO_FLAGS)
+        )
 
     def breaks(self) -> list[tuple[float, bool]]:
         """Times at which a comparison with the time changes: (time [s], True if the value jumps), increasing."""
@@ -149,7 +189,8 @@ class Program:
     def samples(self, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
         """(times, values) of a formula of time in a run, with both sides of each break : float64[n] each."""
         times = np.linspace(start, end, SAMPLES)
-        places = np.arange(1, SAMPLES - 1) * 0.6180339887498949 % 1.0 - 0.5  # no period falls on all samples
+        # no period falls on all samples
+        places = np.arange(1, SAMPLES - 1) * 0.6180339887498949 % 1.0 - 0.5
         times[1:-1] += places * (times[1] - times[0])
         for t, _ in self.breaks():  # only both sides of a break, not its value once more
             times = times[np.abs(times - t) > 1e-6 * (end - start) / SAMPLES]
@@ -188,12 +229,18 @@ class Program:
             return True
         times, values = self.samples(start, end)
         k = int(np.argmax(np.abs(np.diff(values))))
-        a, b, change = times[k], times[k + 1], abs(values[k + 1] - values[k])
+        a = times[k]
+        b = times[k + 1]
+        change = abs(values[k + 1] - values[k])
         for _ in range(30 if self.kinks else 0):
             middle = 0.5 * (a + b)
-            ahead = abs(self.value(middle) - self.value(a)) > 0.5 * abs(self.value(b) - self.value(a))
+            ahead = abs(self.value(middle) - self.value(a)) > 0.5 * abs(
+                self.value(b) - self.value(a)
+            )
             a, b = (a, middle) if ahead else (middle, b)
-        return bool(self.kinks and change > 0.0 and abs(self.value(b) - self.value(a)) > 0.1 * change)
+        return bool(
+            self.kinks and change > 0.0 and abs(self.value(b) - self.value(a)) > 0.1 * change
+        )
 
     def positive_part(self, scale: float, offset: float) -> Program:
         """Formula of the positive part of scale * value + offset."""
@@ -202,7 +249,9 @@ class Program:
 
 
 @lru_cache(maxsize=256)
-def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float) -> Program:
+def program_in(
+    unit: str, dimension: str, text: str, names: tuple[str, ...], ambient: float
+) -> Program:
     """Formula whose value has a unit; "" for SI. ambient : ambient pressure [Pa]
 
     Raises ValueFault with the faults of the keys `formula` and `unit`.
@@ -218,7 +267,11 @@ def program_in(unit: str, dimension: str, text: str, names: tuple[str, ...], amb
     try:
         program.steps  # noqa: B018
     except ValueError as error:
-        hint = "; numbers in a formula are in SI, without units" if str(error).endswith("invalid syntax") else ""
+        hint = (
+            "; numbers in a formula are in SI, without units"
+            if str(error).endswith("invalid syntax")
+            else ""
+        )
         faults.append((("formula",), f"{error}{hint}"))
     if faults:
         raise ValueFault(faults)

@@ -33,13 +33,28 @@ from fvsolve.units import show
 
 # NPS of each DN below 100; from DN 100 on, DN = 25 NPS (ASME B36.10M).
 DN_NPS = {
-    6: 0.125, 8: 0.25, 10: 0.375, 15: 0.5, 20: 0.75, 25: 1.0, 32: 1.25, 40: 1.5, 50: 2.0, 65: 2.5, 80: 3.0, 90: 3.5,
-}  # fmt: skip
+    6: 0.125,
+    8: 0.25,
+    10: 0.375,
+    15: 0.5,
+    20: 0.75,
+    25: 1.0,
+    32: 1.25,
+    40: 1.5,
+    50: 2.0,
+    65: 2.5,
+    80: 3.0,
+    90: 3.5,
+}
 
 # name -> loss coefficient from fluids.fittings (f), inner diameter d [m] and f_T
 FITTINGS: dict[str, Callable[[Any, float, float], float]] = {
-    "bend-90": lambda f, d, ft: f.bend_rounded(Di=d, angle=90, fd=ft, bend_diameters=1.5, method="Crane"),
-    "bend-45": lambda f, d, ft: f.bend_rounded(Di=d, angle=45, fd=ft, bend_diameters=1.5, method="Crane"),
+    "bend-90": lambda f, d, ft: f.bend_rounded(
+        Di=d, angle=90, fd=ft, bend_diameters=1.5, method="Crane"
+    ),
+    "bend-45": lambda f, d, ft: f.bend_rounded(
+        Di=d, angle=45, fd=ft, bend_diameters=1.5, method="Crane"
+    ),
     "elbow-90": lambda f, d, ft: f.bend_rounded(Di=d, angle=90, fd=ft, method="Crane standard"),
     "elbow-45": lambda f, d, ft: f.bend_rounded(Di=d, angle=45, fd=ft, method="Crane standard"),
     "mitre-90": lambda f, d, ft: f.bend_miter(angle=90, Di=d, method="Crane"),
@@ -77,17 +92,25 @@ def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
 
     match = re.fullmatch(rf"(DN|NPS) ?({WHOLE}|{MIXED})", " ".join(nominal.split()), re.IGNORECASE)
     if match is None:
-        raise ValueError(f'{show(nominal)} is not a nominal size; expected for example "DN100", "NPS 4" or "NPS 1-1/2"')
+        raise ValueError(
+            f'{show(nominal)} is not a nominal size; expected for example "DN100", "NPS 4" or "NPS 1-1/2"'
+        )
     if schedule not in schedule_lookup:
-        near = did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
+        near = (
+            did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
+        )
         raise ValueError(f"no schedule named {show(schedule)}{near}")
     number = parse_inches(match[2])
     if match[1].upper() == "DN":
         number = DN_NPS.get(number, number / 25.0)
     sizes = schedule_lookup[schedule][0]
     if number not in sizes:
-        near = ", ".join(f"NPS {size:g}" for size in sorted(sizes, key=lambda size: abs(size - number))[:3])
-        raise ValueError(f"{nominal} is not made in schedule {schedule}; the nearest sizes are {near}")
+        near = ", ".join(
+            f"NPS {size:g}" for size in sorted(sizes, key=lambda size: abs(size - number))[:3]
+        )
+        raise ValueError(
+            f"{nominal} is not made in schedule {schedule}; the nearest sizes are {near}"
+        )
     _, inner, _, wall = nearest_pipe(NPS=number, schedule=schedule)
     return inner, wall
 
@@ -100,15 +123,29 @@ def fittings_loss(names: list[str], diameter: float) -> float:
     return sum(FITTINGS[name](fittings, diameter, ft_Crane(diameter)) for name in names)
 
 
-MODELS = ("none", "steady", "quasi-steady", "unsteady", "swamee-jain", "hazen-williams", "chezy-manning")
+MODELS = (
+    "none",
+    "steady",
+    "quasi-steady",
+    "unsteady",
+    "swamee-jain",
+    "hazen-williams",
+    "chezy-manning",
+)
 WEIGHTINGS = ("zielke", "vardy-brown")
 DARCY = ("roughness", "factor")
 DARCY_WEISBACH = '"quasi-steady" or "steady" with a roughness, whose factor is Colebrook\'s'
 SYNONYMS = dict.fromkeys(
     ("colebrook", "colebrook-white", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
     DARCY_WEISBACH,
-) | {"h-w": '"hazen-williams"', "hw": '"hazen-williams"', "manning": '"chezy-manning"', "c-m": '"chezy-manning"'}
-KEYS_OF_MODEL = {  # keys of each model; at least one of the Darcy pair, or the coefficient, is needed
+) | {
+    "h-w": '"hazen-williams"',
+    "hw": '"hazen-williams"',
+    "manning": '"chezy-manning"',
+    "c-m": '"chezy-manning"',
+}
+# keys of each model; at least one of the Darcy pair, or the coefficient, is needed
+KEYS_OF_MODEL = {
     "none": (),
     "steady": DARCY,
     "quasi-steady": DARCY,
@@ -119,7 +156,8 @@ KEYS_OF_MODEL = {  # keys of each model; at least one of the Darcy pair, or the 
 }
 
 
-FACTORS = UsualRange(0.004, 0.5, "Moody's chart and slow laminar flow")  # the chart spans 0.008 to 0.1
+# the chart spans 0.008 to 0.1
+FACTORS = UsualRange(0.004, 0.5, "Moody's chart and slow laminar flow")
 COEFFICIENTS = {  # usual coefficients by model, from textbooks and the EPANET manual
     # plastic has 155; more if an import lengthened a pipe
     "hazen-williams": UsualRange(40.0, 500.0, "C of tuberculated iron to plastic"),
@@ -152,20 +190,34 @@ class Friction(Table):
     ] = None
     factor: Annotated[
         float | None,
-        Number(nonnegative, "Darcy friction factor, four times Fanning's, instead of `roughness` [-]", FACTORS),
+        Number(
+            nonnegative,
+            "Darcy friction factor, four times Fanning's, instead of `roughness` [-]",
+            FACTORS,
+        ),
     ] = None
     coefficient: Annotated[
-        float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
+        float | None,
+        Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]"),
     ] = None
 
-    weighting: Annotated[str | None, Choice(
-        "weighting function", WEIGHTINGS, "weighting function of past flow changes, model unsteady; "
-        "chosen by the initial Reynolds number if left out",
-    )] = None  # fmt: skip
-    accuracy: Annotated[float | None, Number(
-        between(1e-6, 0.1), "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
-        changes=SHAPE,
-    )] = None  # fmt: skip
+    weighting: Annotated[
+        str | None,
+        Choice(
+            "weighting function",
+            WEIGHTINGS,
+            "weighting function of past flow changes, model unsteady; "
+            "chosen by the initial Reynolds number if left out",
+        ),
+    ] = None
+    accuracy: Annotated[
+        float | None,
+        Number(
+            between(1e-6, 0.1),
+            "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
+            changes=SHAPE,
+        ),
+    ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -175,7 +227,9 @@ class Friction(Table):
         if allowed is None:
             return faults
         stray = [key for key in given if key in cls.model_fields and key not in ("model", *allowed)]
-        faults += [((key,), f'friction model "{model}" has no key {key}; remove this key') for key in stray]
+        faults += [
+            ((key,), f'friction model "{model}" has no key {key}; remove this key') for key in stray
+        ]
         return faults + (missing_key_faults(given, allowed[:2]) if allowed else [])
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
@@ -183,7 +237,9 @@ class Friction(Table):
         if usual is None or usual.least <= c <= usual.greatest:
             return
         text = f"{c:g} is outside {usual.least:g} to {usual.greatest:g}, {usual.source}"
-        other = next((m for m, span in COEFFICIENTS.items() if span.least <= c <= span.greatest), None)
+        other = next(
+            (m for m, span in COEFFICIENTS.items() if span.least <= c <= span.greatest), None
+        )
         text += f'; did you mean model = "{other}"?' if other else ""
         yield ("coefficient",), c, usual.least if c < usual.least else usual.greatest, text
 
@@ -191,12 +247,20 @@ class Friction(Table):
 NONE = Friction(model="none")
 
 
-BORES = UsualRange(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela have 13.7 m
+# the tunnels of Tarbela have 13.7 m
+BORES = UsualRange(5e-5, 14.0, "capillaries to pressure tunnels")
 LENGTH = Quantity(
-    "length", positive, "length along its axis [m]", UsualRange(1e-4, 1e7, "fittings to pipelines"), BY_CELLS
+    "length",
+    positive,
+    "length along its axis [m]",
+    UsualRange(1e-4, 1e7, "fittings to pipelines"),
+    BY_CELLS,
 )
 DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, BY_CELLS)
-LOSS = Number(nonnegative, "loss coefficient K referred to the velocity in the pipe, distributed along its length")
+LOSS = Number(
+    nonnegative,
+    "loss coefficient K referred to the velocity in the pipe, distributed along its length",
+)
 
 
 MAX_ROUGHNESS = 0.05  # relative roughness, Moody 1944
@@ -211,11 +275,20 @@ class Fittings(Value):
 
     def read(self, given: Any, setting: ReadContext) -> list[str]:
         if not isinstance(given, (list, tuple)):
-            raise ValueFault([((), f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]')])
+            raise ValueFault(
+                [
+                    (
+                        (),
+                        f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]',
+                    )
+                ]
+            )
         faults = []
         for index, name in enumerate(given):
             if not isinstance(name, str) or name not in FITTINGS:
-                near = did_you_mean(str(name), FITTINGS) or f"; fittings are {listing(list(FITTINGS))}"
+                near = (
+                    did_you_mean(str(name), FITTINGS) or f"; fittings are {listing(list(FITTINGS))}"
+                )
                 faults.append(((index,), f"no fitting named {show(name)}{near}"))
         if faults:
             raise ValueFault(faults)
@@ -231,7 +304,10 @@ class FullPipe(TwoPort):
     `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`.
     """
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("diameter", "nominal"),
+        ("diameter", "schedule"),
+    )
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"),)
 
@@ -246,16 +322,19 @@ class FullPipe(TwoPort):
     length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
     nominal: Annotated[
-        str | None, Text('nominal size, instead of `diameter`: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
+        str | None,
+        Text('nominal size, instead of `diameter`: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS),
     ] = None
     schedule: Annotated[
-        str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', BY_CELLS)
+        str | None,
+        Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', BY_CELLS),
     ] = None
     friction: Friction = NONE
     minor_loss: Annotated[float, LOSS] = 0.0
     fittings: Annotated[list[str] | None, Fittings()] = None
     initial_flow: Annotated[
-        float | None, Quantity("flow", about="flow at the start [m3/s]; flow of the steady state if left out")
+        float | None,
+        Quantity("flow", about="flow at the start [m3/s]; flow of the steady state if left out"),
     ] = None
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
@@ -283,7 +362,9 @@ class FullPipe(TwoPort):
         result, faults = {**given}, []
         if isinstance(given.get("nominal"), str) and "diameter" not in given:
             try:
-                result["diameter"], thickness = pipe_size(result.pop("nominal"), result.pop("schedule", "40"))
+                result["diameter"], thickness = pipe_size(
+                    result.pop("nominal"), result.pop("schedule", "40")
+                )
                 if isinstance(given.get("wall"), dict):
                     result["wall"] = {"thickness": thickness, **given["wall"]}
             except ValueFault as error:
@@ -292,7 +373,9 @@ class FullPipe(TwoPort):
             try:
                 names = Fittings().read(result.pop("fittings"), setting)
                 own = LOSS.read(result.get("minor_loss", 0.0), setting)
-                result["minor_loss"] = own + fittings_loss(names, DIAMETER.read(result["diameter"], setting))
+                result["minor_loss"] = own + fittings_loss(
+                    names, DIAMETER.read(result["diameter"], setting)
+                )
             except ValueFault as error:
                 faults += [(("fittings", *keys), text) for keys, text in error.faults]
             except (KeyError, ValueError):  # a key that is missing or faulty: reported by itself

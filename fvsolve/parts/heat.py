@@ -38,12 +38,24 @@ class HeatCapacity(Node, kind="heat-capacity"):
     quantities: ClassVar[dict[str, str]] = {"temperature": "temperature"}
     main_quantities: ClassVar[tuple[str, ...]] = ("temperature",)
 
-    heat_capacity: Annotated[float, Quantity(
-        "heat_capacity", positive, "heat per temperature [J/K]", UsualRange(1e-6, 1e12, "chips to buildings"),
-    )]  # fmt: skip
-    initial_temperature: Annotated[float | None, Quantity(
-        "temperature", positive, "temperature at the start; that of equilibrium if left out [K]", TEMPERATURES,
-    )] = None  # fmt: skip
+    heat_capacity: Annotated[
+        float,
+        Quantity(
+            "heat_capacity",
+            positive,
+            "heat per temperature [J/K]",
+            UsualRange(1e-6, 1e12, "chips to buildings"),
+        ),
+    ]
+    initial_temperature: Annotated[
+        float | None,
+        Quantity(
+            "temperature",
+            positive,
+            "temperature at the start; that of equilibrium if left out [K]",
+            TEMPERATURES,
+        ),
+    ] = None
 
 
 class HeatCapacityRows(NetworkNodeRows, kind="heat-capacity"):
@@ -51,8 +63,20 @@ class HeatCapacityRows(NetworkNodeRows, kind="heat-capacity"):
 
     def network_elements(self, case, name, part):
         place = f"nodes.{name}"
-        return [Element(CAPACITY, place, place, (name, None), part.heat_capacity, f"{name}.temperature",
-                        SMALL_TEMPERATURE, part.initial_temperature, ledger="stored", thermal=True)], []  # fmt: skip
+        return [
+            Element(
+                CAPACITY,
+                place,
+                place,
+                (name, None),
+                part.heat_capacity,
+                f"{name}.temperature",
+                SMALL_TEMPERATURE,
+                part.initial_temperature,
+                ledger="stored",
+                thermal=True,
+            )
+        ], []
 
 
 class Ambient(GivenPotential, kind="ambient"):
@@ -67,7 +91,9 @@ class Ambient(GivenPotential, kind="ambient"):
     main_quantities: ClassVar[tuple[str, ...]] = ("temperature",)
     potential_key: ClassVar[str] = "temperature"
 
-    temperature: Annotated[Schedule, Scheduled("temperature", positive, "temperature [K]", TEMPERATURES)]
+    temperature: Annotated[
+        Schedule, Scheduled("temperature", positive, "temperature [K]", TEMPERATURES)
+    ]
 
 
 class AmbientRows(GivenPotentialRows, kind="ambient"):
@@ -94,7 +120,9 @@ class ThermalConductor(ThermalLink, kind="thermal-conductor"):
     Ports: from, to. Stored and dissipated energy: none; it produces entropy.
     """
 
-    conductance: Annotated[float, Quantity("thermal_conductance", positive, "heat per temperature difference [W/K]")]
+    conductance: Annotated[
+        float, Quantity("thermal_conductance", positive, "heat per temperature difference [W/K]")
+    ]
 
     @property
     def heat_conductance(self) -> float:
@@ -109,7 +137,16 @@ class ThermalConductorRows(NetworkRows, kind="thermal-conductor"):
 
     def network_elements(self, case, name, part):
         place = f"links.{name}"
-        return [Element(RESISTANCE, place, place, ends_of(case, part), 1.0 / part.heat_conductance, thermal=True)], []
+        return [
+            Element(
+                RESISTANCE,
+                place,
+                place,
+                ends_of(case, part),
+                1.0 / part.heat_conductance,
+                thermal=True,
+            )
+        ], []
 
 
 class Convection(ThermalLink, kind="convection"):
@@ -118,10 +155,15 @@ class Convection(ThermalLink, kind="convection"):
     Ports: from, to. Stored and dissipated energy: none; it produces entropy.
     """
 
-    coefficient: Annotated[float, Quantity(
-        "heat_transfer_coefficient", positive, "heat transfer coefficient [W/m2/K]",
-        UsualRange(0.5, 1e5, "still air to boiling water"),
-    )]  # fmt: skip
+    coefficient: Annotated[
+        float,
+        Quantity(
+            "heat_transfer_coefficient",
+            positive,
+            "heat transfer coefficient [W/m2/K]",
+            UsualRange(0.5, 1e5, "still air to boiling water"),
+        ),
+    ]
     area: Annotated[float, Quantity("area", positive, "area of the surface [m2]")]
 
     @property
@@ -146,7 +188,9 @@ class HeatSource(Link, kind="heat-source"):
     main_quantities: ClassVar[tuple[str, ...]] = ("heat",)
 
     to: Annotated[str, Text("thermal node that it heats"), Field()]
-    heat: Annotated[Schedule, Scheduled("power", about="heat flow into `to`; negative for cooling [W]")]
+    heat: Annotated[
+        Schedule, Scheduled("power", about="heat flow into `to`; negative for cooling [W]")
+    ]
 
     @property
     def ports(self) -> dict[str, str]:
@@ -162,8 +206,18 @@ class HeatSourceRows(NetworkRows, kind="heat-source"):
 
     def network_elements(self, case, name: str, part: Any):
         place, to = f"links.{name}", node_or_reference(case, part.to)
-        return [Element(FLOW, place, place, (None, to), schedule=part.heat, key="heat", ledger="supplied",
-                        thermal=True)], []  # fmt: skip
+        return [
+            Element(
+                FLOW,
+                place,
+                place,
+                (None, to),
+                schedule=part.heat,
+                key="heat",
+                ledger="supplied",
+                thermal=True,
+            )
+        ], []
 
 
 class HeatExchanger(ThermalLink, kind="heat-exchanger"):
@@ -178,13 +232,19 @@ class HeatExchanger(ThermalLink, kind="heat-exchanger"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("conductance", "effectiveness"),)
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("conductance", "effectiveness"),)
 
-    from_: Annotated[str, Text("tank, chamber or junction whose fluid it cools or heats"), Field(alias="from")]
-    conductance: Annotated[float | None, Quantity(
-        "thermal_conductance", positive, "heat per temperature difference [W/K]"
-    )] = None  # fmt: skip
-    effectiveness: Annotated[float | None, Number(
-        between(0, 1), "heat over the greatest heat that the flow through the place could give"
-    )] = None  # fmt: skip
+    from_: Annotated[
+        str, Text("tank, chamber or junction whose fluid it cools or heats"), Field(alias="from")
+    ]
+    conductance: Annotated[
+        float | None,
+        Quantity("thermal_conductance", positive, "heat per temperature difference [W/K]"),
+    ] = None
+    effectiveness: Annotated[
+        float | None,
+        Number(
+            between(0, 1), "heat over the greatest heat that the flow through the place could give"
+        ),
+    ] = None
 
     def faults(self, name: str, around: Any) -> Iterator:
         """Faults of a place that has no temperature of its own, and of further exchangers at a junction."""
@@ -192,8 +252,11 @@ class HeatExchanger(ThermalLink, kind="heat-exchanger"):
         if place is not None and place.kind not in EXCHANGING:
             text = f"{self.from_} is {article(place.kind)}, whose temperature no heat changes"
             yield ("from",), f"{text}; expected a tank, a chamber or a junction"
-        others = [other for other, link in around.links.items()
-                  if other != name and link.kind == self.kind and link.from_ == self.from_]  # fmt: skip
+        others = [
+            other
+            for other, link in around.links.items()
+            if other != name and link.kind == self.kind and link.from_ == self.from_
+        ]
         if others and self.effectiveness is not None and getattr(place, "kind", "") == "junction":
             text = f"{others[0]} is at {self.from_} too; expected one heat exchanger at a junction"
             yield ("effectiveness",), f"{text}, or only exchangers with a conductance"
@@ -209,8 +272,17 @@ class HeatExchangerRows(NetworkRows, kind="heat-exchanger"):
 
     def network_elements(self, case, name: str, part: Any):
         place, to = f"links.{name}", node_or_reference(case, part.to)
-        return [Element(FLOW, place, place, (None, to), reads=(codes.FLUID_HEAT, name), ledger="supplied",
-                        thermal=True)], []  # fmt: skip
+        return [
+            Element(
+                FLOW,
+                place,
+                place,
+                (None, to),
+                reads=(codes.FLUID_HEAT, name),
+                ledger="supplied",
+                thermal=True,
+            )
+        ], []
 
 
 def exchanger_names(case) -> list[str]:

@@ -26,20 +26,29 @@ class Junction(PlaceOnBody, kind="junction"):
 
     driven: ClassVar[tuple[str, float]] = "demand", -1.0
 
-    demand: Annotated[Schedule, Scheduled("flow", about="demand at reference density, positive outward [m3/s]")] = (
-        Field(default_factory=lambda: constant(0.0))
-    )
+    demand: Annotated[
+        Schedule, Scheduled("flow", about="demand at reference density, positive outward [m3/s]")
+    ] = Field(default_factory=lambda: constant(0.0))
     required_pressure: Annotated[
         float | None,
-        Quantity("pressure", about="pressure from which the full demand is supplied [Pa]; always supplied if left out"),
+        Quantity(
+            "pressure",
+            about="pressure from which the full demand is supplied [Pa]; always supplied if left out",
+        ),
     ] = None
     minimum_pressure: Annotated[
-        float | None, Quantity("pressure", about="pressure up to which no demand is supplied [Pa]; ambient if left out")
+        float | None,
+        Quantity(
+            "pressure", about="pressure up to which no demand is supplied [Pa]; ambient if left out"
+        ),
     ] = None
-    demand_exponent: Annotated[float, Number(
-        between(0, 3, open=True),
-        "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
-    )] = 0.5  # fmt: skip
+    demand_exponent: Annotated[
+        float,
+        Number(
+            between(0, 3, open=True),
+            "exponent of the supplied demand over pressure, between minimum_pressure and required_pressure",
+        ),
+    ] = 0.5
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         if self.required_pressure is None:
@@ -47,16 +56,27 @@ class Junction(PlaceOnBody, kind="junction"):
         from fvsolve.parts.outlet.part import outlet_to_ambient
 
         full = float(self.demand.value.max())
-        law = {"flow": full, "exponent": self.demand_exponent, "opening": self.demand, "full": full, "most": 1.0}
+        law = {
+            "flow": full,
+            "exponent": self.demand_exponent,
+            "opening": self.demand,
+            "full": full,
+            "most": 1.0,
+        }
         law |= {"least": self.minimum_pressure, "upper": self.required_pressure, "demand": True}
         places, links = outlet_to_ambient(f"{name}.demand", name, **law)
-        return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links
+        return {
+            name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}),
+            **places,
+        }, links
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
         if self.required_pressure is None:
             if self.minimum_pressure is not None:
-                text = "has no effect without `required_pressure`; give both keys, or remove this key"
+                text = (
+                    "has no effect without `required_pressure`; give both keys, or remove this key"
+                )
                 yield ("minimum_pressure",), text
             return
         if self.required_pressure <= least:
@@ -86,7 +106,10 @@ class JunctionRows(Lowering, kind="junction"):
     ledger_name = "demand"
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.demand, draft.fluid.density)
+        row["kind"], row["schedule"] = (
+            rec.JUNCTION,
+            draft.schedules.add(node.demand, draft.fluid.density),
+        )
 
     def inputs(self, model, name, part):
         schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
@@ -102,7 +125,10 @@ class Inflow(PlaceOnBody, kind="inflow"):
     driven: ClassVar[tuple[str, float]] = "flow", 1.0
     own_scalars: ClassVar[str] = "inflow"
 
-    flow: Annotated[Schedule, Scheduled("flow", about="flow at reference density, positive into the network [m3/s]")]
+    flow: Annotated[
+        Schedule,
+        Scheduled("flow", about="flow at reference density, positive into the network [m3/s]"),
+    ]
 
 
 class InflowRows(Lowering, kind="inflow"):
@@ -111,11 +137,17 @@ class InflowRows(Lowering, kind="inflow"):
     ledger_name = "inflow"
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
+        row["kind"], row["schedule"] = (
+            rec.JUNCTION,
+            draft.schedules.add(node.flow, -draft.fluid.density),
+        )
 
     def inputs(self, model, name, part):
         schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
-        return {"flow": Input(FLOW, schedule, -model.case.properties.density), **scalar_inputs(model, name)}
+        return {
+            "flow": Input(FLOW, schedule, -model.case.properties.density),
+            **scalar_inputs(model, name),
+        }
 
 
 class Reservoir(PlaceOnBody, kind="reservoir"):
@@ -132,23 +164,36 @@ class Reservoir(PlaceOnBody, kind="reservoir"):
     fixes_pressure: ClassVar[bool] = True
 
     pressure: Annotated[
-        Schedule | None, Scheduled("pressure", about="pressure at the elevation of the reservoir [Pa]")
+        Schedule | None,
+        Scheduled("pressure", about="pressure at the elevation of the reservoir [Pa]"),
     ] = None
-    head: Annotated[Schedule | None, Scheduled("head", about="head above datum, relative to ambient pressure [m]")] = (
-        None
-    )
+    head: Annotated[
+        Schedule | None,
+        Scheduled("head", about="head above datum, relative to ambient pressure [m]"),
+    ] = None
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.pressure is not None:
-            yield from around.boiling_faults("nodes", name, "pressure", self.pressure.value.tolist())
+            yield from around.boiling_faults(
+                "nodes", name, "pressure", self.pressure.value.tolist()
+            )
         if self.head is None or around.gravity is None or around.fluid is None:
             return
-        head, boiling, height = float(self.head.value.min()), around.fluid.vapor_pressure, self.elevation or 0.0
+        head = float(self.head.value.min())
+        boiling = around.fluid.vapor_pressure
+        height = self.elevation or 0.0
         pressure = around.ambient + around.fluid.density * around.gravity * (head - height)
         if pressure <= boiling:
             place = f"a head of {head:g} m at elevation {height:g} m"
-            low = "a vacuum" if pressure <= 0.0 else f"not above the vapour pressure of {boiling:.4g} Pa"
-            yield ("head",), f"{place} is {pressure:.4g} Pa absolute, {low}; expected a greater head"
+            low = (
+                "a vacuum"
+                if pressure <= 0.0
+                else f"not above the vapour pressure of {boiling:.4g} Pa"
+            )
+            yield (
+                ("head",),
+                f"{place} is {pressure:.4g} Pa absolute, {low}; expected a greater head",
+            )
 
 
 class ReservoirRows(Lowering, kind="reservoir"):
@@ -173,8 +218,12 @@ class ReservoirRows(Lowering, kind="reservoir"):
     def inputs(self, model, name, part):
         i, weight = model.node_names.index(name), model.case.properties.density * model.case.gravity
         row = model.tables.nodes[i]
-        index, ground = int(row["schedule"]), model.case.ambient_pressure - weight * float(row["elevation"])
-        inputs = {"pressure": Input(PRESSURE, index, node=i), "head": Input(HEAD, index, weight, ground, node=i)}
+        index = int(row["schedule"])
+        ground = model.case.ambient_pressure - weight * float(row["elevation"])
+        inputs = {
+            "pressure": Input(PRESSURE, index, node=i),
+            "head": Input(HEAD, index, weight, ground, node=i),
+        }
         return inputs | scalar_inputs(model, name)
 
 
@@ -190,15 +239,26 @@ class Chamber(PlaceOnBody, kind="chamber"):
 
     volume: Annotated[
         float,
-        Quantity("volume", positive, "volume of fluid [m3]", UsualRange(1e-10, 1e5, "cylinders to caverns"), VALUE),
+        Quantity(
+            "volume",
+            positive,
+            "volume of fluid [m3]",
+            UsualRange(1e-10, 1e5, "cylinders to caverns"),
+            VALUE,
+        ),
     ]
     initial_pressure: Annotated[
-        float | None, Quantity("pressure", about="pressure at the start [Pa]; that of the steady state if left out")
+        float | None,
+        Quantity(
+            "pressure", about="pressure at the start [Pa]; that of the steady state if left out"
+        ),
     ] = None
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.initial_pressure is not None:
-            yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
+            yield from around.boiling_faults(
+                "nodes", name, "initial_pressure", [self.initial_pressure]
+            )
 
 
 class ChamberRows(Lowering, kind="chamber"):
@@ -208,19 +268,25 @@ class ChamberRows(Lowering, kind="chamber"):
         moving, air = name in draft.owned, draft.fluid.air
         row["kind"], row["volume"] = rec.MOVING if moving else rec.CHAMBER, node.volume
         row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
-        swept = False  # by a piston whose both ends are masses or frames on one axis, not points of bodies
+        # by a piston whose both ends are masses or frames on one axis, not points of bodies
+        swept = False
         if moving:
             cylinder = draft.case.links[name.rpartition(".")[0]]
             ends = [draft.case.nodes.get(cylinder.ports[port]) for port in ("case", "rod")]
             swept = all(getattr(end, "domain", "") == "translational" for end in ends)
         row["y"] = draft.states([f"{name}.{'excess' if swept else 'mass'}"], 1e5 / row["stiffness"])
-        if moving or (air is not None and air.fraction > 0.0):  # air makes the stiffness depend on pressure
+        # air makes the stiffness depend on pressure
+        if moving or (air is not None and air.fraction > 0.0):
             row["row"] = draft.stiff()
 
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is not None:
             return node.initial_pressure
-        return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.is_joined(i) else None
+        return (
+            start.case.ambient_pressure
+            if row["kind"] == rec.MOVING and not start.is_joined(i)
+            else None
+        )
 
     def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"chamber {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"

@@ -18,7 +18,8 @@ PATTERNS = (
 # Header of a class that declares a type: `kind` of a part, `name` of a physics, `pipe_model` of a pipe. A search for
 # "\nclass" takes a seventh of the time of "^class" in lines.
 DECLARATION = re.compile(r'\nclass \w+\(.*\b(kind|name|pipe_model)=(?:"([^"]+)"|\w+)\)')
-SHARED = {"name": "basin", "pipe_model": "pipe"}  # a basin or a pipe needs the modules of all physics or pipe models
+# a basin or a pipe needs the modules of all physics or pipe models
+SHARED = {"name": "basin", "pipe_model": "pipe"}
 
 
 @cache

@@ -96,8 +96,11 @@ class NetworkRows(Lowering):
     def inputs(self, model, name, part):
         place = f"{'links' if name in model.case.links and model.case.links[name] is part else 'nodes'}.{name}"
         schedules = network_of(model).schedules
-        return {key: Input(kind, schedules[place, key])
-                for key, kind in self.input_kinds.items() if (place, key) in schedules}  # fmt: skip
+        return {
+            key: Input(kind, schedules[place, key])
+            for key, kind in self.input_kinds.items()
+            if (place, key) in schedules
+        }
 
     def probe(self, draft, name, probe, row) -> None:
         end, reads, sign = self.quantities[probe.quantity]
@@ -114,7 +117,9 @@ def fill_network_probe(draft, row, element: str, reads: str, sign: float = 1.0) 
     """Fill the row of a probe that reads an element of the network; arguments as in `NetworkRows.quantities`."""
     network = network_of(draft)
     row["kind"], row["scale"] = codes.NETWORK_VALUE, sign
-    row["side"] = {"power": codes.POWER, "entropy": codes.ENTROPY, "locked": codes.LOCKED}.get(reads, codes.ROW)
+    row["side"] = {"power": codes.POWER, "entropy": codes.ENTROPY, "locked": codes.LOCKED}.get(
+        reads, codes.ROW
+    )
     if reads == "locked":
         row["index"] = network.flags[element]
     elif reads == "all flows":
@@ -123,7 +128,9 @@ def fill_network_probe(draft, row, element: str, reads: str, sign: float = 1.0) 
         drop, flow = network.rows_of(element)
         row["index"], row["cell"] = flow if reads == "flow" else drop, flow
         if reads == "entropy":
-            row["index"] = network.node_row(next(node for node in network.ends_of(element) if node is not None))
+            row["index"] = network.node_row(
+                next(node for node in network.ends_of(element) if node is not None)
+            )
 
 
 def node_or_reference(case, place: str) -> str | None:

@@ -46,8 +46,18 @@ class GivenPotentialRows(NetworkNodeRows, kind=""):
     def network_elements(self, case, name, part):
         if node_or_reference(case, name) is None:
             return [], []
-        return [Element(POTENTIAL, f"nodes.{name}", f"nodes.{name}", (name, None), schedule=part.reference_potential,
-                        key=part.potential_key, ledger="supplied", thermal=part.domain == "thermal")], []  # fmt: skip
+        return [
+            Element(
+                POTENTIAL,
+                f"nodes.{name}",
+                f"nodes.{name}",
+                (name, None),
+                schedule=part.reference_potential,
+                key=part.potential_key,
+                ledger="supplied",
+                thermal=part.domain == "thermal",
+            )
+        ], []
 
 
 def ends_of(case, part: Any) -> tuple[str | None, str | None]:
@@ -56,23 +66,52 @@ def ends_of(case, part: Any) -> tuple[str | None, str | None]:
 
 
 def dry_friction(
-    place: str, ends: tuple, numbers: tuple[float, ...], heat_to: str | None = None, torque: Schedule | None = None
+    place: str,
+    ends: tuple,
+    numbers: tuple[float, ...],
+    heat_to: str | None = None,
+    torque: Schedule | None = None,
 ) -> tuple[list[Element], list[Switch]]:
     """(elements, switches) of dry friction: a torque or force while it slips, equal speeds while it sticks.
 
     numbers : as those of `Switch`; torque : schedule of the torque of a clutch
     """
-    switch = Switch(codes.FRICTION, place, place, f"{place}.friction", f"{place}.lock", numbers, torque, "torque")
+    switch = Switch(
+        codes.FRICTION,
+        place,
+        place,
+        f"{place}.friction",
+        f"{place}.lock",
+        numbers,
+        torque,
+        "torque",
+    )
     return [
-        Element(FLOW, f"{place}.friction", place, ends, reads=(codes.FRICTION_FLOW, place), ledger="dissipated",
-                heat_to=heat_to),
+        Element(
+            FLOW,
+            f"{place}.friction",
+            place,
+            ends,
+            reads=(codes.FRICTION_FLOW, place),
+            ledger="dissipated",
+            heat_to=heat_to,
+        ),
         Element(LOCK, f"{place}.lock", place, ends, numbers[1] or 1.0, switch=place),
-    ], [switch]  # fmt: skip
+    ], [switch]
 
 
 def heat_to_faults(part: Any, around: Any) -> Iterator:
     """Fault of a key `heat_to` that names no thermal node."""
-    if part.heat_to is not None and getattr(around.nodes.get(part.heat_to), "domain", "") != "thermal":
-        thermal = [node for node, other in around.nodes.items() if getattr(other, "domain", "") == "thermal"]
-        has = f"thermal nodes are {', '.join(thermal)}" if thermal else "the case has no thermal node"
+    if (
+        part.heat_to is not None
+        and getattr(around.nodes.get(part.heat_to), "domain", "") != "thermal"
+    ):
+        thermal = [
+            node
+            for node, other in around.nodes.items()
+            if getattr(other, "domain", "") == "thermal"
+        ]
+        has = (
+            f"thermal nodes are {', '.join(thermal)}" if thermal else "the case has no thermal node"
+        )
         yield ("heat_to",), f"no thermal node named {show(part.heat_to)}; {has}"

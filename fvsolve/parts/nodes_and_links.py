@@ -10,7 +10,8 @@ from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
 
-NETWORK_DOMAINS = ("rotational", "electrical", "thermal")  # of nodes in networks of potential and flow
+# of nodes in networks of potential and flow
+NETWORK_DOMAINS = ("rotational", "electrical", "thermal")
 USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 
 
@@ -58,27 +59,40 @@ class Node(Part):
     noun: ClassVar[str] = "node"
     kinds: ClassVar[Kinds] = Kinds()
     quantities: ClassVar[dict[str, str]] = {
-        "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head"
-    }  # fmt: skip
+        "pressure": "pressure",
+        "gauge_pressure": "gauge_pressure",
+        "head": "head",
+    }
     fixes_pressure: ClassVar[bool] = False
     # key of a prescribed flow, and its sign as flow into links; 0 for a prescribed pressure
     driven: ClassVar[tuple[str, float] | None] = None
-    domain: ClassVar[str] = "hydraulic"  # | "translational" | "spatial" | "rotational" | "electrical" | "thermal"
-    main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
+    # | "translational" | "spatial" | "rotational" | "electrical" | "thermal"
+    domain: ClassVar[str] = "hydraulic"
+    # quantities that are recorded where a case has no probes
+    main_quantities: ClassVar[tuple[str, ...]] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
         return (*super().words, f"domain {self.domain}")
 
-    elevation: Annotated[float | None, Quantity(
-        "length", about="elevation above datum, at all nodes or none [m]; "
-        "0 (reservoir with `head`: that of the other end of its first link) if left out", usual=USUAL_ELEVATIONS,
-    )] = None  # fmt: skip
+    elevation: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            about="elevation above datum, at all nodes or none [m]; "
+            "0 (reservoir with `head`: that of the other end of its first link) if left out",
+            usual=USUAL_ELEVATIONS,
+        ),
+    ] = None
     position: Annotated[
-        tuple[float, float] | None, Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE)
+        tuple[float, float] | None,
+        Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE),
     ] = None
     scalars: Annotated[
-        dict[str, Any], ScalarValues("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
+        dict[str, Any],
+        ScalarValues(
+            "scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)"
+        ),
     ] = {}
 
     @classmethod
@@ -102,11 +116,17 @@ class Node(Part):
 class PlaceOnBody(Node):
     """Node that a body may carry."""
 
-    on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
-    at: Annotated[tuple[float, ...] | None, Rows(
-        "position", length=3,
-        about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
-    )] = None  # fmt: skip
+    on: Annotated[
+        str | None, Text("body that carries the node; fixed in the world if left out")
+    ] = None
+    at: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "position",
+            length=3,
+            about="position (of a basin: of its origin) in axes of the body, instead of `elevation` [m]; 0 if left out",
+        ),
+    ] = None
 
     @classmethod
     def bodies(cls, given: dict[str, Any]) -> tuple[str, ...]:
@@ -134,22 +154,31 @@ class Link(Part):
     noun: ClassVar[str] = "link"
     kinds: ClassVar[Kinds] = Kinds()
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
-    on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
+    # quantities that are recorded only by explicit probes
+    on_request: ClassVar[tuple[str, ...]] = ()
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
-    sensed_keys: ClassVar[tuple[str, ...]] = ()  # keys of hydraulic places that it only senses, as TABLE.KEY in a table
-    in_network: ClassVar[bool] = False  # True if it is an element of a network of rotation, electricity or heat
-    network_ports: ClassVar[tuple[str, ...]] = ()  # its only ports in such a network, if it is a part of the fluid too
-    main_quantities: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded where a case has no probes
-    fixes_pressure: ClassVar[bool] = False  # True if it determines the pressures at its ends, by its free surface
+    # keys of hydraulic places that it only senses, as TABLE.KEY in a table
+    sensed_keys: ClassVar[tuple[str, ...]] = ()
+    # True if it is an element of a network of rotation, electricity or heat
+    in_network: ClassVar[bool] = False
+    # its only ports in such a network, if it is a part of the fluid too
+    network_ports: ClassVar[tuple[str, ...]] = ()
+    # quantities that are recorded where a case has no probes
+    main_quantities: ClassVar[tuple[str, ...]] = ()
+    # True if it determines the pressures at its ends, by its free surface
+    fixes_pressure: ClassVar[bool] = False
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
     owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
     @property
     def network_places(self) -> tuple[str, ...]:
         """Places of its ports that its elements in a network of potential and flow join."""
-        return tuple(place for port, place in self.ports.items() if port in self.network_ports
-                     or self.in_network and self.joins.get(port) != "hydraulic")  # fmt: skip
+        return tuple(
+            place
+            for port, place in self.ports.items()
+            if port in self.network_ports or self.in_network and self.joins.get(port) != "hydraulic"
+        )
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -184,7 +213,10 @@ class Coupling(TwoPort):
     x_to - x_from is their distance, and a positive force pushes them apart.
     """
 
-    joins: ClassVar[dict[str, str]] = {"from": "translational or spatial", "to": "translational or spatial"}
+    joins: ClassVar[dict[str, str]] = {
+        "from": "translational or spatial",
+        "to": "translational or spatial",
+    }
     quantities: ClassVar[dict[str, str]] = {"force": "force"}
 
 

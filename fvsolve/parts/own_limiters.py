@@ -30,7 +30,17 @@ RATIOS = np.concatenate([-POSITIVE[::-1], [0.0], POSITIVE])  # r at which a limi
 ROUNDING = 1e-9  # tolerance of the tests
 STEP = 1e-6  # of one-sided differences for tangents, relative to r
 # r of the tangents, each with the side of the difference: both ends, both sides of 1, and between the usual kinks
-TANGENTS = ((1e-6, 1), (0.125, 1), (0.75, 1), (1.0, -1), (1.0, 1), (1.25, 1), (1.75, 1), (3.0, 1), (1e6, -1))
+TANGENTS = (
+    (1e-6, 1),
+    (0.125, 1),
+    (0.75, 1),
+    (1.0, -1),
+    (1.0, 1),
+    (1.25, 1),
+    (1.75, 1),
+    (3.0, 1),
+    (1e6, -1),
+)
 
 
 @validated(name=TEXT, function=FUNCTION)
@@ -60,7 +70,9 @@ def add(name: str, data: str) -> None:
 
 def entries() -> list[str]:
     """Limiters of the environment variable FVSOLVE_LIMITERS, as NAME=FILE.py:FUNCTION or NAME=DATA."""
-    return [entry for entry in os.environ.get(LIMITERS_VARIABLE, "").split(SEPARATOR) if entry.strip()]
+    return [
+        entry for entry in os.environ.get(LIMITERS_VARIABLE, "").split(SEPARATOR) if entry.strip()
+    ]
 
 
 def read_entry(entry: str) -> None:
@@ -83,7 +95,11 @@ def value_at(phi: Callable, name: str, r: float) -> float:
             f"register_limiter: {name}({r:g}) fails: {error}; expected a number; a limiter may use numbers, math, "
             "numpy, and functions of these"
         ) from error
-    if not isinstance(value, Real) or isinstance(value, (bool, np.bool_)) or not math.isfinite(value):
+    if (
+        not isinstance(value, Real)
+        or isinstance(value, (bool, np.bool_))
+        or not math.isfinite(value)
+    ):
         raise FvsolveError(
             f"register_limiter: {name}({r:g}) is {value!r}; expected a finite number for every r from "
             f"-1e{LARGEST} to 1e{LARGEST}"
@@ -102,7 +118,9 @@ def limiter(phi: Callable, values: np.ndarray, data: str) -> Limiter:
         costs.append(f"phi(1) = {value:.3g} is not 1, so the order is 1 in smooth flow")
     lost = asymmetry(phi)
     costs += lost
-    own = OwnLimiter(phi, not lost, digest, tuple(departures(values)), tuple(costs), Fraction(steepest))
+    own = OwnLimiter(
+        phi, not lost, digest, tuple(departures(values)), tuple(costs), Fraction(steepest)
+    )
     return Limiter(tuple(slopes), min(steepest, 2.0), own)
 
 
@@ -120,13 +138,22 @@ def departures(values: np.ndarray) -> Iterator[str]:
     values : phi at `RATIOS`
     """
     upper = np.minimum(2.0, 2.0 * np.maximum(RATIOS, 0.0))
-    for outside, bound in ((values > upper + ROUNDING * (1.0 + upper), "above"), (values < -ROUNDING, "below")):
+    for outside, bound in (
+        (values > upper + ROUNDING * (1.0 + upper), "above"),
+        (values < -ROUNDING, "below"),
+    ):
         if outside.any():
-            at = int(np.argmax(np.where(outside, np.abs(values - (upper if bound == "above" else 0.0)), -1.0)))
+            at = int(
+                np.argmax(
+                    np.where(outside, np.abs(values - (upper if bound == "above" else 0.0)), -1.0)
+                )
+            )
             span = RATIOS[outside]
             limit = upper[at] if bound == "above" else 0.0
-            yield f"phi is {bound} it from r = {span[0]:.3g} to {span[-1]:.3g}; phi({RATIOS[at]:.3g}) = " \
-                  f"{values[at]:.3g}, bound {limit:.3g}"  # fmt: skip
+            yield (
+                f"phi is {bound} it from r = {span[0]:.3g} to {span[-1]:.3g}; phi({RATIOS[at]:.3g}) = "
+                f"{values[at]:.3g}, bound {limit:.3g}"
+            )
 
 
 def asymmetry(phi: Callable) -> list[str]:
@@ -137,14 +164,18 @@ def asymmetry(phi: Callable) -> list[str]:
     if apart[worst] <= ROUNDING:
         return []
     r = ratios[worst]
-    return [f"phi(r) / r = {phi(r) / r:.3g} is not phi(1 / r) = {phi(1.0 / r):.3g} at r = {r:.3g}, so a wave that runs "
-            "backward along a grid line has another slope"]  # fmt: skip
+    return [
+        f"phi(r) / r = {phi(r) / r:.3g} is not phi(1 / r) = {phi(1.0 / r):.3g} at r = {r:.3g}, so a wave that runs "
+        "backward along a grid line has another slope"
+    ]
 
 
 def packed(function: Callable, name: str) -> str:
     """Function with all that it uses, as text, for other processes and as the key of its compiled code."""
     if not isinstance(function, FunctionType):
-        raise FvsolveError(f"register_limiter: {name} is a {type(function).__name__}; expected a Python function")
+        raise FvsolveError(
+            f"register_limiter: {name} is a {type(function).__name__}; expected a Python function"
+        )
     return base64.urlsafe_b64encode(marshal.dumps(_content(function, ()), 2)).decode()
 
 
@@ -155,10 +186,20 @@ def unpacked(data: str, name: str) -> FunctionType:
 
 def _content(function: FunctionType, within: tuple) -> tuple:
     code = function.__code__.replace(co_filename="limiter", co_firstlineno=1)
-    cells = {n: cell.cell_contents for n, cell in zip(code.co_freevars, function.__closure__ or (), strict=True)}
-    used = {n: cells.get(n, function.__globals__.get(n)) for n in sorted({*code.co_names, *code.co_freevars})}
+    cells = {
+        n: cell.cell_contents
+        for n, cell in zip(code.co_freevars, function.__closure__ or (), strict=True)
+    }
+    used = {
+        n: cells.get(n, function.__globals__.get(n))
+        for n in sorted({*code.co_names, *code.co_freevars})
+    }
     values = {n: _plain(value, (*within, function)) for n, value in used.items()}
-    return code, tuple(item for item in values.items() if item[1] is not None), function.__defaults__
+    return (
+        code,
+        tuple(item for item in values.items() if item[1] is not None),
+        function.__defaults__,
+    )
 
 
 def _plain(value, within: tuple) -> tuple | None:
@@ -171,7 +212,14 @@ def _plain(value, within: tuple) -> tuple | None:
     if isinstance(value, FunctionType) and value not in within:
         return "function", _content(value, within)
     name = getattr(value, "__name__", "")
-    home = next((label for label, module in MODULES.items() if name and getattr(module, name, None) is value), None)
+    home = next(
+        (
+            label
+            for label, module in MODULES.items()
+            if name and getattr(module, name, None) is value
+        ),
+        None,
+    )
     return home and ("member", home, name)
 
 
@@ -184,6 +232,8 @@ def _function(content: tuple, name: str) -> FunctionType:
         elif kind == "function":
             found[label] = _function(value[0], label)
         else:
-            found[label] = MODULES[value[0]] if kind == "module" else getattr(MODULES[value[0]], value[1])
+            found[label] = (
+                MODULES[value[0]] if kind == "module" else getattr(MODULES[value[0]], value[1])
+            )
     cells = tuple(CellType(found[label]) for label in code.co_freevars if label in found)
     return FunctionType(code, found, name, defaults, cells or None)

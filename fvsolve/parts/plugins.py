@@ -18,7 +18,8 @@ from fvsolve.jit import add_sources
 from fvsolve.units import show
 
 GROUP, LIMITERS = "fvsolve.parts", "fvsolve.limiters"  # entry points
-VARIABLE = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes
+# environment variable with the folders of registered parts, for other processes
+VARIABLE = "FVSOLVE_PARTS"
 PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 
@@ -33,7 +34,9 @@ def register_part(folder: str | os.PathLike[str]) -> None:
     """
     path = Path(folder).resolve()
     if not (path / "part.py").is_file():
-        raise FvsolveError(f"register_part: {show(str(folder))} has no part.py; expected the folder of a part")
+        raise FvsolveError(
+            f"register_part: {show(str(folder))} has no part.py; expected the folder of a part"
+        )
     package = f"{PLUGIN_PACKAGE}.{path.name}"
     for name, places in ((PLUGIN_PACKAGE, []), (package, [str(path)])):
         if name not in sys.modules:
@@ -41,7 +44,9 @@ def register_part(folder: str | os.PathLike[str]) -> None:
             spec.submodule_search_locations = places
             sys.modules[name] = module_from_spec(spec)
     if sys.modules[package].__path__ != [str(path)]:
-        raise FvsolveError(f"register_part: a part in a folder {show(path.name)} exists already; expected another name")
+        raise FvsolveError(
+            f"register_part: a part in a folder {show(path.name)} exists already; expected another name"
+        )
     declare(package)
     os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*registered_folders(), str(path)]))
 
@@ -69,13 +74,18 @@ def installed_limiters() -> Iterator[tuple[str, Callable[[Any], None], Any]]:
         own_limiters.register_limiter(entry.name, entry.load())
 
     yield from ((f"entry points {LIMITERS}", register, entry) for entry in found)
-    yield from ((LIMITERS_VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries())
+    yield from (
+        (LIMITERS_VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()
+    )
 
 
 def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
     offered: list[tuple[str, Callable[[Any], None], Any]] = [
-        *((f"{entry.name} of the entry points {GROUP}", declare, entry.place) for entry in entry_points(GROUP)),
+        *(
+            (f"{entry.name} of the entry points {GROUP}", declare, entry.place)
+            for entry in entry_points(GROUP)
+        ),
         *((VARIABLE, register_part, folder) for folder in registered_folders()),
         *installed_limiters(),
     ]

@@ -6,9 +6,12 @@ from decimal import Decimal
 
 from fvsolve.errors import visible
 
-SMALL, MIDDLE = 0.01, 0.1  # [m] or degrees: pixels of most rasters in degrees are smaller, and of nearly all
-FAR, LEAST_FAR = 10.0, 5.0  # distance from both axes that suggests degrees: multiple of the extent, and [m] or degrees
-DIGITS = 5, 9  # least number of digits of a size of pixels that is a fraction of a degree, and compared digits
+# [m] or degrees: pixels of most rasters in degrees are smaller, and of nearly all
+SMALL, MIDDLE = 0.01, 0.1
+# distance from both axes that suggests degrees: multiple of the extent, and [m] or degrees
+FAR, LEAST_FAR = 10.0, 5.0
+# least number of digits of a size of pixels that is a fraction of a degree, and compared digits
+DIGITS = 5, 9
 IN_DEGREES = re.compile(  # text of a CRS: WKT, file .prj of ArcInfo, PROJ
     r"\b(?:GEOGCS|GEOGCRS|GEODCRS|GEOGRAPHICCRS)\[|^[ \t]*(?:Projection[ \t]+GEOGRAPHIC|Units[ \t]+D[DS])\b"
     r"|\+proj=(?:longlat|latlong)",
@@ -17,10 +20,14 @@ IN_DEGREES = re.compile(  # text of a CRS: WKT, file .prj of ArcInfo, PROJ
 PROJECTED = re.compile(r"\bPROJ(?:CS|CRS|ECTEDCRS)\[", re.IGNORECASE)
 WEB_MERCATOR = re.compile("web_?mercator|pseudo-mercator|mercator_auxiliary_sphere", re.IGNORECASE)
 # Name and length [m] of a unit
-LINEAR_UNIT = re.compile(r'\bUNIT\["([^"]{1,80})",[ \t]{0,9}(\d{1,9}(?:\.\d{0,20})?)', re.IGNORECASE)
-STRETCHED = (3395, 3785, 3857, 3587, 41001, 54004, 102100, 102113, 900913)  # codes of Mercator projections of the world
+LINEAR_UNIT = re.compile(
+    r'\bUNIT\["([^"]{1,80})",[ \t]{0,9}(\d{1,9}(?:\.\d{0,20})?)', re.IGNORECASE
+)
+# codes of Mercator projections of the world
+STRETCHED = (3395, 3785, 3857, 3587, 41001, 54004, 102100, 102113, 900913)
 EARTH = 6378137.0  # radius in these projections [m]
-AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d{1,9})"?\]')  # in the text of a CRS; the last is its own
+# in the text of a CRS; the last is its own
+AUTHORITY = re.compile(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d{1,9})"?\]')
 # Numbers of EPSG up to 9140 for systems in degrees, in ranges without projected and vertical systems (EPSG 12; the
 # ranges include geocentric systems and numbers without a system).
 NUMBERS_IN_DEGREES = """
@@ -75,12 +82,15 @@ def is_fraction_of_degree(size: float) -> bool:
     digits, exponent = Decimal(repr(size)).normalize().as_tuple()[1:]
     if len(digits) < DIGITS[0]:
         return False
-    last = 10.0 ** (exponent + max(len(digits) - DIGITS[1], 0))  # of the compared digits: files round, or cut off
+    # of the compared digits: files round, or cut off
+    last = 10.0 ** (exponent + max(len(digits) - DIGITS[1], 0))
     counts = [(3600.0 * parts, round(3600.0 * parts * size)) for parts in (9, 10)]
     return any(count > 0 and abs(count / per - size) <= 1.01 * last for per, count in counts)
 
 
-def are_probably_degrees(low: tuple[float, float], size: tuple[float, float], count: tuple[int, int]) -> bool:
+def are_probably_degrees(
+    low: tuple[float, float], size: tuple[float, float], count: tuple[int, int]
+) -> bool:
     """True if the coordinates of pixels look like longitudes and latitudes.
 
     low : south-west corner; size, count : of the pixels along x and y
@@ -90,13 +100,20 @@ def are_probably_degrees(low: tuple[float, float], size: tuple[float, float], co
     """
     extent = [step * number for step, number in zip(size, count, strict=True)]
     rim, high = max(size), [corner + length for corner, length in zip(low, extent, strict=True)]
-    inside = -180.0 - rim <= low[0] and high[0] <= 360.0 + rim and -90.0 - rim <= low[1] and high[1] <= 90.0 + rim
+    inside = (
+        -180.0 - rim <= low[0]
+        and high[0] <= 360.0 + rim
+        and -90.0 - rim <= low[1]
+        and high[1] <= 90.0 + rim
+    )
     if not inside or rim >= MIDDLE:
         return False
     gaps = [max(begin, -end, 0.0) for begin, end in zip(low, high, strict=True)]
     if all(map(is_fraction_of_degree, size)):
         return math.hypot(*gaps) > max(extent) or extent[0] > 360.0 - rim
-    distant = all(gap > max(FAR * length, LEAST_FAR) for gap, length in zip(gaps, extent, strict=True))
+    distant = all(
+        gap > max(FAR * length, LEAST_FAR) for gap, length in zip(gaps, extent, strict=True)
+    )
     return distant and rim <= SMALL
 
 

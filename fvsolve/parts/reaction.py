@@ -49,7 +49,9 @@ def read_equation(text: Any) -> ReactionEquation:
     sides = text.split(ARROW)
     if len(sides) != 2:
         hint = "" if "=" not in text else "; a reversible reaction has the key `reverse`"
-        raise ValueError(f"{show(text)} is not an equation; expected one {ARROW}, for example {EXAMPLE}{hint}")
+        raise ValueError(
+            f"{show(text)} is not an equation; expected one {ARROW}, for example {EXAMPLE}{hint}"
+        )
     left, right = (dict(read_side(side, text)) for side in sides)
     if not left and not right:
         raise ValueError(f"{show(text)} has no scalars; expected for example {EXAMPLE}")
@@ -90,7 +92,9 @@ def constant_in_si(given: Any, order: float) -> Any:
         return units.parse(given, "rate")
     if order not in (0.0, 2.0, 3.0):
         state = "has a unit" if units.is_number_with_unit(given) else "is text"
-        raise ValueError(f"{show(given)} {state}, and the order is {order:g}; expected a number in mol, m3 and s")
+        raise ValueError(
+            f"{show(given)} {state}, and the order is {order:g}; expected a number in mol, m3 and s"
+        )
     si = {0.0: "mol/m3/s", 2.0: "m3/mol/s", 3.0: "m6/mol2/s"}[order]
     return units.parse_in(given, si, f"expected a constant of order {order:g} in {si}")
 
@@ -103,9 +107,15 @@ class Reaction(Table):
     """
 
     equation: Annotated[str, Text(f"scalars and coefficients, for example {EXAMPLE}")]
-    rate: Annotated[str | None, Text("rate [mol/m3/s]: a formula of scalars, amounts in mol/m3")] = None
-    forward: Annotated[float | None, RateConstant("constant of mass action of the left side")] = None
-    reverse: Annotated[float | None, RateConstant("constant of mass action of the right side; none if left out")] = None
+    rate: Annotated[
+        str | None, Text("rate [mol/m3/s]: a formula of scalars, amounts in mol/m3")
+    ] = None
+    forward: Annotated[float | None, RateConstant("constant of mass action of the left side")] = (
+        None
+    )
+    reverse: Annotated[
+        float | None, RateConstant("constant of mass action of the right side; none if left out")
+    ] = None
 
     alternatives = (("rate", "forward"), ("rate", "reverse"))
     needs = (("rate", "forward"),)
@@ -125,8 +135,13 @@ class Reaction(Table):
         try:
             equation = read_equation(given["equation"])
         except ValueError as error:
-            unknown = {key: 0.0 for key in ("forward", "reverse") if isinstance(given.get(key), str)}  # of any order
-            raise ValueFault([(("equation",), str(error))], {**given, "equation": "", **unknown}) from None
+            # of any order
+            unknown = {
+                key: 0.0 for key in ("forward", "reverse") if isinstance(given.get(key), str)
+            }
+            raise ValueFault(
+                [(("equation",), str(error))], {**given, "equation": "", **unknown}
+            ) from None
         for key, side in (("forward", "left"), ("reverse", "right")):
             try:
                 result[key] = constant_in_si(given.get(key), equation.order(side))
@@ -156,7 +171,9 @@ class Reaction(Table):
         sides, terms = self.sides, []
         for constant, side in ((self.forward, sides.left), (self.reverse, sides.right)):
             if constant is not None:
-                factors = [name if order == 1.0 else f"{name}^{order:g}" for name, order in side.items()]
+                factors = [
+                    name if order == 1.0 else f"{name}^{order:g}" for name, order in side.items()
+                ]
                 terms.append(" ".join([f"{constant:g}", *factors]))
         return " - ".join(terms)
 
@@ -179,7 +196,9 @@ def unit_fault(scalar: Scalar, reaction: str) -> tuple[tuple[str, ...], str] | N
             (),
             f'molar_mass is missing: reaction {reaction} converts "mg/l" to mol/m3; give molar_mass = "NUMBER g/mol"',
         )
-    return ("unit",), f"{show(scalar.unit)} is not an amount, which reaction {reaction} needs; {UNIT_HINT}"
+    return (
+        "unit",
+    ), f"{show(scalar.unit)} is not an amount, which reaction {reaction} needs; {UNIT_HINT}"
 
 
 def atom_faults(equation: ReactionEquation, scalars: dict[str, Scalar]) -> Iterator[str]:
@@ -188,8 +207,10 @@ def atom_faults(equation: ReactionEquation, scalars: dict[str, Scalar]) -> Itera
     if not all(compositions.values()):
         return
     for element in dict.fromkeys(element for atoms in compositions.values() for element in atoms):
-        left, right = (sum(count * compositions[name].get(element, 0.0) for name, count in side.items())
-                       for side in (equation.left, equation.right))  # fmt: skip
+        left, right = (
+            sum(count * compositions[name].get(element, 0.0) for name, count in side.items())
+            for side in (equation.left, equation.right)
+        )
         if abs(left - right) > BALANCED * max(left, right):
             yield f"{element} does not balance: {left:g} on the left, {right:g} on the right; expected equal counts"
 
@@ -198,5 +219,7 @@ def name_faults_of(equation: ReactionEquation, scalars: dict[str, Any]) -> Itera
     """Yield the text of a fault for each name in an equation that is no scalar of the case."""
     for name in equation.names:
         if name not in scalars:
-            known = f"; scalars are {listing(scalars)}" if scalars else "; the case has no [scalars]"
+            known = (
+                f"; scalars are {listing(scalars)}" if scalars else "; the case has no [scalars]"
+            )
             yield f"unknown scalar {show(name)}{did_you_mean(name, scalars) or known}"

@@ -46,7 +46,9 @@ class RigidColumn(FullPipe, kind="rigid-column"):
 
     route: Annotated[
         list[tuple[float, ...]],
-        Way("points between the ends of a column on a body, in the axes of the body [m]; straight if left out"),
+        Way(
+            "points between the ends of a column on a body, in the axes of the body [m]; straight if left out"
+        ),
     ] = []
     no_scalars: ClassVar[str] = "it has no cells to carry scalars; use a pipe"
 

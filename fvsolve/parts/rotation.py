@@ -27,11 +27,22 @@ from fvsolve.parts.network_parts import (
 )
 from fvsolve.parts.nodes_and_links import Link, Node, Ports, TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import VALUE, Number, Quantity, Range, Text, UsualRange, nonnegative, nonzero, positive
+from fvsolve.parts.value import (
+    VALUE,
+    Number,
+    Quantity,
+    Range,
+    Text,
+    UsualRange,
+    nonnegative,
+    nonzero,
+    positive,
+)
 
 CLUTCH_TORQUE = InputKind("N m", "a torque of at least 0 [N m]", 0.0)
 SPEEDS = UsualRange(-1300.0, 1300.0, "to 12 000 rpm of machine tools")  # of shafts [rad/s]
-SMALL_SPEED, SMALL_TORQUE = 1.0, 1.0  # sizes of small deviations, where the network does not tell [rad/s], [N m]
+# sizes of small deviations, where the network does not tell [rad/s], [N m]
+SMALL_SPEED, SMALL_TORQUE = 1.0, 1.0
 
 
 class Shaft(Node, kind="shaft"):
@@ -46,20 +57,34 @@ class Shaft(Node, kind="shaft"):
     main_quantities: ClassVar[tuple[str, ...]] = ("speed",)
     on_request: ClassVar[tuple[str, ...]] = ("angle",)
 
-    inertia: Annotated[float | None, Quantity(
-        "inertia", positive, "moment of inertia; none if left out [kg m2]",
-        UsualRange(1e-9, 1e7, "micromotors to turbine sets"),
-    )] = None  # fmt: skip
-    initial_speed: Annotated[float | None, Quantity(
-        "angular_velocity", about="angular velocity at the start; that of equilibrium if left out [rad/s]",
-        usual=SPEEDS,
-    )] = None  # fmt: skip
+    inertia: Annotated[
+        float | None,
+        Quantity(
+            "inertia",
+            positive,
+            "moment of inertia; none if left out [kg m2]",
+            UsualRange(1e-9, 1e7, "micromotors to turbine sets"),
+        ),
+    ] = None
+    initial_speed: Annotated[
+        float | None,
+        Quantity(
+            "angular_velocity",
+            about="angular velocity at the start; that of equilibrium if left out [rad/s]",
+            usual=SPEEDS,
+        ),
+    ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if "initial_speed" in given and "inertia" not in given:
-            faults.append((("initial_speed",), "needs the key `inertia`: a shaft without inertia stores no speed"))
+            faults.append(
+                (
+                    ("initial_speed",),
+                    "needs the key `inertia`: a shaft without inertia stores no speed",
+                )
+            )
         return faults
 
 
@@ -77,8 +102,19 @@ class ShaftRows(NetworkNodeRows, kind="shaft"):
     def network_elements(self, case, name, part):
         if part.inertia is None:
             return [], []
-        return [Element(CAPACITY, f"nodes.{name}", f"nodes.{name}", (name, None), part.inertia, f"{name}.speed",
-                        SMALL_SPEED, part.initial_speed, ledger="stored")], []  # fmt: skip
+        return [
+            Element(
+                CAPACITY,
+                f"nodes.{name}",
+                f"nodes.{name}",
+                (name, None),
+                part.inertia,
+                f"{name}.speed",
+                SMALL_SPEED,
+                part.initial_speed,
+                ledger="stored",
+            )
+        ], []
 
 
 class Housing(GivenPotential, kind="housing"):
@@ -92,9 +128,9 @@ class Housing(GivenPotential, kind="housing"):
     quantities: ClassVar[dict[str, str]] = {"speed": "angular_velocity"}
     potential_key: ClassVar[str] = "speed"
 
-    speed: Annotated[Schedule, Scheduled("angular_velocity", about="angular velocity [rad/s]", usual=SPEEDS)] = Field(
-        default_factory=lambda: constant(0.0)
-    )
+    speed: Annotated[
+        Schedule, Scheduled("angular_velocity", about="angular velocity [rad/s]", usual=SPEEDS)
+    ] = Field(default_factory=lambda: constant(0.0))
 
 
 class HousingRows(GivenPotentialRows, kind="housing"):
@@ -121,7 +157,10 @@ class Gear(RotationalLink, kind="gear"):
     Ports: from, to. Stored and dissipated energy: none.
     """
 
-    ratio: Annotated[float, Number(nonzero, "speed of `from` over speed of `to`; negative if the direction reverses")]
+    ratio: Annotated[
+        float,
+        Number(nonzero, "speed of `from` over speed of `to`; negative if the direction reverses"),
+    ]
 
 
 class GearRows(NetworkRows, kind="gear"):
@@ -142,13 +181,19 @@ class TorsionSpring(RotationalLink, kind="torsion-spring"):
     damping (omega_from - omega_to)^2 [W].
     """
 
-    stiffness: Annotated[float, Quantity("torsional_stiffness", positive, "torque per angle of twist [N m/rad]")]
+    stiffness: Annotated[
+        float, Quantity("torsional_stiffness", positive, "torque per angle of twist [N m/rad]")
+    ]
     damping: Annotated[
-        float, Quantity("rotational_damping", nonnegative, "torque per difference of speed [N m s/rad]")
+        float,
+        Quantity("rotational_damping", nonnegative, "torque per difference of speed [N m s/rad]"),
     ] = 0.0
     initial_torque: Annotated[
         float | None,
-        Quantity("torque", about="torque of the spring at the start; that of equilibrium if left out [N m]"),
+        Quantity(
+            "torque",
+            about="torque of the spring at the start; that of equilibrium if left out [N m]",
+        ),
     ] = None
 
 
@@ -157,19 +202,42 @@ class TorsionSpringRows(NetworkRows, kind="torsion-spring"):
 
     def network_elements(self, case, name, part):
         place, ends = f"links.{name}", ends_of(case, part)
-        found = [Element(INERTANCE, place, place, ends, 1.0 / part.stiffness, f"{name}.torque", SMALL_TORQUE,
-                         part.initial_torque, ledger="stored")]  # fmt: skip
+        found = [
+            Element(
+                INERTANCE,
+                place,
+                place,
+                ends,
+                1.0 / part.stiffness,
+                f"{name}.torque",
+                SMALL_TORQUE,
+                part.initial_torque,
+                ledger="stored",
+            )
+        ]
         return found + resistances(place, ends, part.damping), []
 
     def probe(self, draft, name, probe, row) -> None:
         fill_network_probe(draft, row, f"links.{name}", "all flows")
 
 
-def resistances(place: str, ends: tuple, damping: float, heat_to: str | None = None) -> list[Element]:
+def resistances(
+    place: str, ends: tuple, damping: float, heat_to: str | None = None
+) -> list[Element]:
     """Resistance of a viscous damping [N m s/rad], in a list; none without damping."""
     if damping == 0.0:
         return []
-    return [Element(RESISTANCE, f"{place}.damping", place, ends, 1.0 / damping, ledger="dissipated", heat_to=heat_to)]
+    return [
+        Element(
+            RESISTANCE,
+            f"{place}.damping",
+            place,
+            ends,
+            1.0 / damping,
+            ledger="dissipated",
+            heat_to=heat_to,
+        )
+    ]
 
 
 class Bearing(RotationalLink, kind="bearing"):
@@ -181,18 +249,27 @@ class Bearing(RotationalLink, kind="bearing"):
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("damping", "friction_torque"),)
 
-    damping: Annotated[float, Quantity("rotational_damping", nonnegative, "torque per speed [N m s/rad]")] = 0.0
+    damping: Annotated[
+        float, Quantity("rotational_damping", nonnegative, "torque per speed [N m s/rad]")
+    ] = 0.0
     friction_torque: Annotated[
         float, Quantity("torque", nonnegative, "torque of dry friction while it turns [N m]")
     ] = 0.0
     static_torque: Annotated[
         float | None,
-        Quantity("torque", nonnegative, "greatest torque at rest; `friction_torque` if left out [N m]"),
+        Quantity(
+            "torque", nonnegative, "greatest torque at rest; `friction_torque` if left out [N m]"
+        ),
     ] = None
-    stribeck_speed: Annotated[float | None, Quantity(
-        "angular_velocity", positive,
-        "speed at which the excess of the torque at rest has fallen to 1/e; no excess in motion if left out [rad/s]",
-    )] = None  # fmt: skip
+    stribeck_speed: Annotated[
+        float | None,
+        Quantity(
+            "angular_velocity",
+            positive,
+            "speed at which the excess of the torque at rest has fallen to 1/e; "
+            "no excess in motion if left out [rad/s]",
+        ),
+    ] = None
     heat_to: Annotated[str | None, HEAT_TO] = None
 
     def faults(self, name: str, around: Any) -> Iterator:
@@ -226,10 +303,18 @@ class Clutch(RotationalLink, kind="clutch"):
     [W].
     """
 
-    quantities: ClassVar[dict[str, str]] = {"torque": "torque", "slip": "angular_velocity", "locked": "number"}
+    quantities: ClassVar[dict[str, str]] = {
+        "torque": "torque",
+        "slip": "angular_velocity",
+        "locked": "number",
+    }
 
-    torque: Annotated[Schedule, Scheduled("torque", nonnegative, "torque that it transmits while it slips [N m]")]
-    static_factor: Annotated[float, Number(Range(1), "greatest torque while it sticks, over `torque`")] = 1.0
+    torque: Annotated[
+        Schedule, Scheduled("torque", nonnegative, "torque that it transmits while it slips [N m]")
+    ]
+    static_factor: Annotated[
+        float, Number(Range(1), "greatest torque while it sticks, over `torque`")
+    ] = 1.0
     heat_to: Annotated[str | None, HEAT_TO] = None
 
     def faults(self, name: str, around: Any) -> Iterator:
@@ -243,7 +328,9 @@ class ClutchRows(NetworkRows, kind="clutch"):
 
     def network_elements(self, case, name, part):
         numbers = (0.0, 0.0, 0.0, part.static_factor)
-        return dry_friction(f"links.{name}", ends_of(case, part), numbers, part.heat_to, part.torque)
+        return dry_friction(
+            f"links.{name}", ends_of(case, part), numbers, part.heat_to, part.torque
+        )
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity == "torque":
@@ -266,7 +353,13 @@ class Rack(Link, kind="rack"):
 
     ports: Annotated[dict[str, str], Ports(("shaft", "mass"), "shaft and mass that it couples")]
     radius: Annotated[
-        float, Quantity("position", nonzero, "pitch radius of the pinion; negative to reverse [m]", changes=VALUE)
+        float,
+        Quantity(
+            "position",
+            nonzero,
+            "pitch radius of the pinion; negative to reverse [m]",
+            changes=VALUE,
+        ),
     ]
 
 
@@ -278,4 +371,12 @@ class RackRows(NetworkRows, kind="rack"):
     def network_elements(self, case, name, part):
         shaft, mass = node_or_reference(case, part.ports["shaft"]), part.ports["mass"]
         mass = None if case.nodes[mass].kind == "frame" else mass
-        return [Element(TRANSFORMER, f"links.{name}", f"links.{name}", (mass, None, shaft, None), part.radius)], []
+        return [
+            Element(
+                TRANSFORMER,
+                f"links.{name}",
+                f"links.{name}",
+                (mass, None, shaft, None),
+                part.radius,
+            )
+        ], []

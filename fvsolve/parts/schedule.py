@@ -11,8 +11,27 @@ import numpy as np
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
 from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.value import NEEDED, Choice, Number, Quantity, Range, ReadContext, Rows, Text, Value, ValueFault
-from fvsolve.units import DIMENSIONS, UNITS, begins_as_quantity, expected, is_number_with_unit, may_be_gauge, show
+from fvsolve.parts.value import (
+    NEEDED,
+    Choice,
+    Number,
+    Quantity,
+    Range,
+    ReadContext,
+    Rows,
+    Text,
+    Value,
+    ValueFault,
+)
+from fvsolve.units import (
+    DIMENSIONS,
+    UNITS,
+    begins_as_quantity,
+    expected,
+    is_number_with_unit,
+    may_be_gauge,
+    show,
+)
 
 if TYPE_CHECKING:
     from fvsolve.parts.formula_program import Program
@@ -25,7 +44,8 @@ AMPLITUDE_DIMENSIONS = {
 BLOCK_PREFIX = "controls."  # prefix of the name of a block, as in the key `input` of another block
 UNKNOWN = ""  # dimension of an input or output of a block, not known because of a fault elsewhere
 SIGNS = "*+()^<>="  # of a formula
-BOUNDED = ("pressure", "head", "angular_velocity")  # dimensions that a control may drive only within `limits`
+# dimensions that a control may drive only within `limits`
+BOUNDED = ("pressure", "head", "angular_velocity")
 
 
 def is_formula(given: Any) -> bool:
@@ -71,11 +91,18 @@ class Schedule:
             return NotImplemented
         if self.kind in ("formula", "control"):
             return self.kind == other.kind and self.origin == other.origin
-        mine, theirs = (self.kind, self.exponent, self.wave), (other.kind, other.exponent, other.wave)
-        return mine == theirs and np.array_equal(self.time, other.time) and np.array_equal(self.value, other.value)
+        mine = (self.kind, self.exponent, self.wave)
+        theirs = (other.kind, other.exponent, other.wave)
+        return (
+            mine == theirs
+            and np.array_equal(self.time, other.time)
+            and np.array_equal(self.value, other.value)
+        )
 
     def __hash__(self) -> int:
-        return hash((self.kind, self.exponent, self.wave, self.time.tobytes(), self.value.tobytes()))
+        return hash(
+            (self.kind, self.exponent, self.wave, self.time.tobytes(), self.value.tobytes())
+        )
 
     @property
     def first(self) -> float:
@@ -140,7 +167,9 @@ class Scheduled(Value):
             return self._read_wave(given, setting)
         if given and not given.keys() & self.forms["table"].keys():
             known = list(dict.fromkeys(key for form in self.forms.values() for key in form))
-            raise ValueFault([((key,), f"unknown key{val.key_hint(str(key), known)}") for key in given])
+            raise ValueFault(
+                [((key,), f"unknown key{val.key_hint(str(key), known)}") for key in given]
+            )
         return self._read_table(given, setting)
 
     @cached_property
@@ -150,24 +179,32 @@ class Scheduled(Value):
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
             "ramp": {
-                "start": (Quantity("time"), NEEDED), "duration": (Quantity("time", val.nonnegative), NEEDED),
-                "value": (Rows(*item, length=2), NEEDED), "exponent": (Number(val.positive), 1.0),
+                "start": (Quantity("time"), NEEDED),
+                "duration": (Quantity("time", val.nonnegative), NEEDED),
+                "value": (Rows(*item, length=2), NEEDED),
+                "exponent": (Number(val.positive), 1.0),
             },
             "wave": {
                 "mean": (Quantity(self.dimension), NEEDED),
-                "amplitude": (Quantity(AMPLITUDE_DIMENSIONS.get(self.dimension, self.dimension)), NEEDED),
+                "amplitude": (
+                    Quantity(AMPLITUDE_DIMENSIONS.get(self.dimension, self.dimension)),
+                    NEEDED,
+                ),
                 "period": (Quantity("time", val.positive), NEEDED),
                 "phase": (Quantity("angle"), 0.0),
             },
             "file": {
-                "file": (Text(), NEEDED), "time": (Text(), None), "value": (Text(), None), "unit": (Text(), ""),
+                "file": (Text(), NEEDED),
+                "time": (Text(), None),
+                "value": (Text(), None),
+                "unit": (Text(), ""),
                 "kind": kind,
             },
             "signal": {"signal": (Text(), NEEDED), "factor": (Quantity(self.dimension), None)},
             "sum": {"sum": (Summands(replace(self, range=val.anything)), NEEDED)},
             "control": {"control": (Text(), NEEDED)},
             "formula": {"formula": (Text(), NEEDED), "unit": (Text(), "")},
-        }  # fmt: skip
+        }
 
     @property
     def takes(self) -> str:
@@ -180,18 +217,30 @@ class Scheduled(Value):
         try:
             return Quantity(self.dimension, self.range).read(given, setting)
         except ValueError:
-            if not isinstance(given, str) or begins_as_quantity(given) or not any(sign in given for sign in SIGNS):
+            if (
+                not isinstance(given, str)
+                or begins_as_quantity(given)
+                or not any(sign in given for sign in SIGNS)
+            ):
                 raise
-            self._read_formula({"formula": given}, setting, given)  # raises for a text that is not a formula
+            # raises for a text that is not a formula
+            self._read_formula({"formula": given}, setting, given)
             text = f"{show(given)} is neither a number with a unit nor a formula of t"
             raise ValueError(f"{text}; {expected(self.dimension)}") from None
 
     def _read_table(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["table"], setting)
-        t, v, kind = values["time"], values["value"], values["kind"]
+        t = values["time"]
+        v = values["value"]
+        kind = values["kind"]
         if len(t) != len(v):
             raise ValueFault(
-                [(("value",), f"has length {len(v)}, but `time` has length {len(t)}; expected equal lengths")]
+                [
+                    (
+                        ("value",),
+                        f"has length {len(v)}, but `time` has length {len(t)}; expected equal lengths",
+                    )
+                ]
             )
         try:
             val.check_increasing(t, given["time"], "times")
@@ -203,7 +252,9 @@ class Scheduled(Value):
 
     def _read_ramp(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["ramp"], setting)
-        start, duration, v, exponent = (values[key] for key in ("start", "duration", "value", "exponent"))
+        start, duration, v, exponent = (
+            values[key] for key in ("start", "duration", "value", "exponent")
+        )
         origin = {**values, "value": list(v)}
         if start + duration == start:  # zero duration: a jump
             return Schedule("step", (start - 1.0 - abs(start), start), v, origin=origin)
@@ -211,14 +262,20 @@ class Scheduled(Value):
 
     def _read_wave(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["wave"], setting)
-        mean, amplitude, period, phase = (values[key] for key in ("mean", "amplitude", "period", "phase"))
+        mean, amplitude, period, phase = (
+            values[key] for key in ("mean", "amplitude", "period", "phase")
+        )
         reach = mean - abs(amplitude), mean + abs(amplitude)
         try:
             for bound in reach:
                 self.range.check(bound, bound)
         except ValueError as error:
-            raise ValueFault([(("amplitude",), f"gives values from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
-        return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase))
+            raise ValueFault(
+                [(("amplitude",), f"gives values from {reach[0]:g} to {reach[1]:g}: {error}")]
+            ) from None
+        return Schedule(
+            "harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase)
+        )
 
     def _read_file(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
@@ -228,7 +285,9 @@ class Scheduled(Value):
         try:
             path = find_file(values["file"], setting)
             unit = values["unit"]
-            t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting, unit)
+            t, v, *headers = read_columns(
+                path, values["time"], values["value"], self.dimension, setting, unit
+            )
             if self.needs_unit and not unit and not split_header(headers[1])[1]:
                 unit = DIMENSIONS[self.dimension].example.split()[-1]
                 text = f"{path.name}, column {show(headers[1])} has no unit; expected for example `unit = {show(unit)}`"
@@ -238,7 +297,12 @@ class Scheduled(Value):
                 self.range.check(x, x)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
-        origin = {"file": copy_name(path, setting), "time": headers[0], "value": headers[1], "kind": kind}
+        origin = {
+            "file": copy_name(path, setting),
+            "time": headers[0],
+            "value": headers[1],
+            "kind": kind,
+        }
         origin |= {"unit": unit} if unit else {}
         return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
 
@@ -248,13 +312,20 @@ class Scheduled(Value):
         name, factor = values["signal"], values["factor"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
-            raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; [signals] has {names}")])
+            raise ValueFault(
+                [(("signal",), f"no signal named {show(name)}{near}; [signals] has {names}")]
+            )
         shared = setting.signals[name]
         if text := signal_fault(shared):
             raise ValueFault([((val.ROOT, "signals", name), text)])
         if isinstance(shared, dict) and ("signal" in shared or "sum" in shared):
             raise ValueFault(
-                [(("signal",), f"signal {show(name)} refers to another signal; expected a signal with values")]
+                [
+                    (
+                        ("signal",),
+                        f"signal {show(name)} refers to another signal; expected a signal with values",
+                    )
+                ]
             )
         try:
             if factor is None:
@@ -313,11 +384,17 @@ class Scheduled(Value):
 
         place = ("formula",) if isinstance(origin, dict) else ()
         try:
-            program = program_in(values["unit"], self.dimension, values["formula"], (), setting.ambient)
+            program = program_in(
+                values["unit"], self.dimension, values["formula"], (), setting.ambient
+            )
         except ValueFault as error:
-            raise ValueFault([(keys if place else (), text) for keys, text in error.faults]) from None
+            raise ValueFault(
+                [(keys if place else (), text) for keys, text in error.faults]
+            ) from None
         if setting.span is None:
-            return Schedule("formula", (-np.inf, np.inf), (-np.inf, np.inf), origin=origin, program=program)
+            return Schedule(
+                "formula", (-np.inf, np.inf), (-np.inf, np.inf), origin=origin, program=program
+            )
         times, found = program.samples(*setting.span)
         bad = ~np.isfinite(found)
         bad |= (found < self.range.least) | (found > self.range.greatest)
@@ -326,7 +403,9 @@ class Scheduled(Value):
             k = int(np.argmax(bad))
             state = f"is {found[k]:.6g}, out of range; expected a value {self.range}"
             state = "is not a finite number" if not np.isfinite(found[k]) else state
-            raise ValueFault([(place, f"{show(values['formula'])} at t = {times[k]:.6g} s {state}")])
+            raise ValueFault(
+                [(place, f"{show(values['formula'])} at t = {times[k]:.6g} s {state}")]
+            )
         self._check_between(program, times, place)
         reach = float(found.min()), float(found.max())
         return Schedule("formula", (-np.inf, np.inf), reach, origin=origin, program=program)
@@ -340,27 +419,37 @@ class Scheduled(Value):
 
         if text := program.pole_fault(float(times[0]), float(times[-1])):
             raise ValueFault([(place, text)])
-        if (t := find_outside(program.bounds, times, self.range.least, self.range.greatest)) is not None:
+        if (
+            t := find_outside(program.bounds, times, self.range.least, self.range.greatest)
+        ) is not None:
             text = f"is {program.value(t):.6g}, out of range; expected a value {self.range}"
             raise ValueFault([(place, f"{show(program.text)} at t = {t:.9g} s {text}")])
 
     def _read_control(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         setting.lookups += 1
         name = given["control"]
-        if isinstance(name, str) and name in setting.controls:  # known also if the table has further, invalid keys
+        # known also if the table has further, invalid keys
+        if isinstance(name, str) and name in setting.controls:
             setting.driven.setdefault(name, []).append((self.dimension, self.range))
         read_keys(given, self.forms["control"], setting)
         if name not in setting.controls:
             bare = name.removeprefix("controls.")
-            near = f"; did you mean {show(bare)}?" if bare in setting.controls else did_you_mean(name, setting.controls)
+            near = (
+                f"; did you mean {show(bare)}?"
+                if bare in setting.controls
+                else did_you_mean(name, setting.controls)
+            )
             names = listing(setting.controls) or "none"
-            raise ValueFault([(("control",), f"no control named {show(name)}{near}; [controls] has {names}")])
+            raise ValueFault(
+                [(("control",), f"no control named {show(name)}{near}; [controls] has {names}")]
+            )
         if self.moves:
             text = "cannot follow a control, because the motion needs its slopes; expected a schedule or a formula of t"
             raise ValueFault([((), f"{text}, or a control of the force or torque that moves it")])
         block = setting.controls[name]
         limits = block.get("limits") if isinstance(block, dict) else None
-        reach, needed = (self.range.least, self.range.greatest), self.dimension in BOUNDED or self.range.open
+        reach = (self.range.least, self.range.greatest)
+        needed = self.dimension in BOUNDED or self.range.open
         if needed and limits is None and isinstance(block, dict) and not np.isfinite(reach).all():
             text = f"{DIMENSIONS[self.dimension].words} needs bounds; give `limits` in [controls.{name}]"
             raise ValueFault([(("control",), text)])
@@ -378,18 +467,24 @@ class Summands(Value):
 
     item: Scheduled
     schema: ClassVar[dict[str, Any]] = {
-        "type": "array", "items": {"type": ["number", "string", "object"]}, "minItems": 1
-    }  # fmt: skip
+        "type": "array",
+        "items": {"type": ["number", "string", "object"]},
+        "minItems": 1,
+    }
 
     def read(self, given: Any, setting: ReadContext) -> list[Schedule]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is not a list of schedules; expected for example two signals with factors")
+            raise ValueError(
+                f"{show(given)} is not a list of schedules; expected for example two signals with factors"
+            )
 
         def read(entry: Any) -> Schedule:
             schedule = self.item.read(entry, setting)
             if schedule.kind not in ("constant", "step", "linear"):
                 text = f"is a schedule of the kind {schedule.kind}, which takes no sum"
-                raise ValueError(f"{text}; expected constants, and tables of steps or of straight lines")
+                raise ValueError(
+                    f"{text}; expected constants, and tables of steps or of straight lines"
+                )
             return schedule
 
         return list(val.read_each(enumerate(given), read).values())

@@ -47,7 +47,11 @@ class CaseContext(NamedTuple):
         """True if a place is a body, or a point of a body or of the world."""
         name, _, point = (place or "").partition(".")
         node = self.nodes.get(name)
-        return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
+        return (
+            getattr(node, "domain", "") == "spatial"
+            or bool(point)
+            and point in getattr(node, "points", {})
+        )
 
     def separation(self, link: Any, first: str, second: str) -> float | None:
         """Distance [m] from the place at port `first` of a link to that at port `second` at the start; None if unknown.
@@ -58,10 +62,14 @@ class CaseContext(NamedTuple):
         return None if None in ends else self.place_distance(*ends)
 
 
-def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext) -> dict[str, Any]:
+def read_keys(
+    given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext
+) -> dict[str, Any]:
     """Read a table by its keys; keys : key -> (declaration, default). Raises ValueFault with all faults."""
     result = {key: default for key, (_, default) in keys.items()}
-    faults = [((key,), f"unknown key{key_hint(str(key), list(keys))}") for key in given if key not in keys]
+    faults = [
+        ((key,), f"unknown key{key_hint(str(key), list(keys))}") for key in given if key not in keys
+    ]
     for key, (value, default) in keys.items():
         try:
             if key in given:
@@ -82,7 +90,11 @@ def check_table(given: Any, expected: str) -> None:
 
 
 def read_lists(
-    given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext, noun: str, further=lambda *_: []
+    given: dict[str, Any],
+    keys: dict[str, tuple[Value, Any]],
+    setting: ReadContext,
+    noun: str,
+    further=lambda *_: [],
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Read a table of two lists of equal lengths, of which the first rises : (first list, second list).
 
@@ -92,7 +104,9 @@ def read_lists(
     (key, first), (other, second) = read_keys(given, keys, setting).items()
     faults = []
     if len(first) != len(second):
-        text = f"has length {len(second)}, but `{key}` has length {len(first)}; expected equal lengths"
+        text = (
+            f"has length {len(second)}, but `{key}` has length {len(first)}; expected equal lengths"
+        )
         faults.append(((other,), text))
     faults += further(first, second)
     try:
@@ -133,19 +147,28 @@ class Table(BaseModel):
     """Base of all tables of a case file: frozen, without unknown keys; a single error states all faults of a table."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", populate_by_name=False, arbitrary_types_allowed=True,
+        frozen=True,
+        extra="forbid",
+        populate_by_name=False,
+        arbitrary_types_allowed=True,
         defer_build=True,  # tables that a case does not have cost no time
-    )  # fmt: skip
+    )
 
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys, of which at most one is given
-    needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys, of which at least one is given
+    # groups of keys, of which at most one is given
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    # groups of keys, of which at least one is given
+    needs: ClassVar[tuple[tuple[str, ...], ...]] = ()
     synonyms: ClassVar[dict[str, str]] = {}  # keys of other programs -> equivalent here
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         """Faults of incompatible or missing keys : list of (key path, text)."""
-        exclusive_faults = [fault for keys in cls.alternatives for fault in exclusive_key_faults(given, keys)]
-        return exclusive_faults + [fault for keys in cls.needs for fault in missing_key_faults(given, keys)]
+        exclusive_faults = [
+            fault for keys in cls.alternatives for fault in exclusive_key_faults(given, keys)
+        ]
+        return exclusive_faults + [
+            fault for keys in cls.needs for fault in missing_key_faults(given, keys)
+        ]
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
@@ -158,7 +181,9 @@ class Table(BaseModel):
         if isinstance(given, cls):
             return given
         if not isinstance(given, dict):
-            raise ValueFault([((), f"{show(given)} is not a table; expected {cls.expected(given)}")])
+            raise ValueFault(
+                [((), f"{show(given)} is not a table; expected {cls.expected(given)}")]
+            )
         faults = cls.key_faults(given)
         try:
             given = cls.resolve_keys(given, context_of(info))
@@ -182,9 +207,14 @@ class Table(BaseModel):
     @functools.cache
     def values(cls) -> dict[str, Value]:
         """Declaration of each key: name in a case file -> declaration."""
-        declared = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}
-        return {key: next((value for value in metadata if isinstance(value, Value)), Nested(model))
-                for key, (metadata, model) in declared.items()}  # fmt: skip
+        declared = {
+            info.alias or name: (info.metadata, info.annotation)
+            for name, info in cls.model_fields.items()
+        }
+        return {
+            key: next((value for value in metadata if isinstance(value, Value)), Nested(model))
+            for key, (metadata, model) in declared.items()
+        }
 
     @classmethod
     def expected(cls, given: Any) -> str:
@@ -221,10 +251,18 @@ class Nested(Value):
         self.model, self.about = model, about
 
     def read(self, given: Any, setting: ReadContext) -> Table:
-        if isinstance(given, list) and len(given) > 1 and all(isinstance(item, dict) for item in given):
+        if (
+            isinstance(given, list)
+            and len(given) > 1
+            and all(isinstance(item, dict) for item in given)
+        ):
             text = f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
             raise ValueError(text)
-        return given if isinstance(given, self.model) else self.model.model_validate(given, context=setting)
+        return (
+            given
+            if isinstance(given, self.model)
+            else self.model.model_validate(given, context=setting)
+        )
 
     def below(self, key: str) -> Value | None:
         return self.model.values()[key]
@@ -236,7 +274,8 @@ class Nested(Value):
     def json(self) -> dict[str, Any]:
         fields = {info.alias or name: info for name, info in self.model.model_fields.items()}
         keys = {
-            key: (value, NEEDED if fields[key].is_required() else None) for key, value in self.model.values().items()
+            key: (value, NEEDED if fields[key].is_required() else None)
+            for key, value in self.model.values().items()
         }
         return keys_json(keys)
 
@@ -251,8 +290,12 @@ class NamedTables(Value):
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table of tables by name; expected {self.about}")
-        return read_each(given.items(), lambda item: self.model.model_validate(item, context=setting))
+            raise ValueError(
+                f"{show(given)} is not a table of tables by name; expected {self.about}"
+            )
+        return read_each(
+            given.items(), lambda item: self.model.model_validate(item, context=setting)
+        )
 
     def below(self, key: str) -> Value | None:
         return Nested(self.model)
@@ -284,14 +327,24 @@ def plain_value(value: Any) -> Any:
     return value
 
 
-def exclusive_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+def exclusive_key_faults(
+    given: dict[str, Any], keys: tuple[str, ...]
+) -> list[tuple[tuple[Any, ...], str]]:
     """List with a fault if two or more of the keys are given, otherwise empty."""
     present = [key for key in keys if key in given]
-    return [((present[1],), f"{' and '.join(present)} are given; keep one")] if len(present) > 1 else []
+    return (
+        [((present[1],), f"{' and '.join(present)} are given; keep one")]
+        if len(present) > 1
+        else []
+    )
 
 
-def missing_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+def missing_key_faults(
+    given: dict[str, Any], keys: tuple[str, ...]
+) -> list[tuple[tuple[Any, ...], str]]:
     """List with a fault if all of the keys are missing, otherwise empty."""
     if any(key in given for key in keys):
         return []
-    return [((), f"expected one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")]
+    return [
+        ((), f"expected one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")
+    ]

@@ -56,7 +56,9 @@ class Surface(Value):
         if not isinstance(given, dict):
             return self.number.read(given, setting)
         bottom = [(("level",), "levels are measured from the bottom; the first must be 0")]
-        lists = read_lists(given, self.keys, setting, "levels", lambda level, _: bottom * (level[0] != 0))
+        lists = read_lists(
+            given, self.keys, setting, "levels", lambda level, _: bottom * (level[0] != 0)
+        )
         return AreaTable(*map(np.array, lists))
 
     def json(self) -> dict[str, Any]:
@@ -76,18 +78,33 @@ class Tank(PlaceOnBody, kind="tank"):
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
-    level: Annotated[float, Quantity("level", nonnegative, "water level above the bottom at the start [m]", LEVELS)]
-    height: Annotated[float | None, Quantity(
-        "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE,
-    )] = None  # fmt: skip
+    level: Annotated[
+        float,
+        Quantity("level", nonnegative, "water level above the bottom at the start [m]", LEVELS),
+    ]
+    height: Annotated[
+        float | None,
+        Quantity(
+            "level",
+            positive,
+            "level above the bottom at which the tank spills [m]; never if left out",
+            LEVELS,
+            VALUE,
+        ),
+    ] = None
     connection: Annotated[Connection | None, ConnectionTable()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return with_connection(name, self, Junction.model_construct(**self.position_keys, demand=constant(0.0)))
+        return with_connection(
+            name, self, Junction.model_construct(**self.position_keys, demand=constant(0.0))
+        )
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.height is not None and self.level > self.height:
-            yield ("level",), f"{self.level:g} m is above the `height` of {self.height:g} m; expected a lower level"
+            yield (
+                ("level",),
+                f"{self.level:g} m is above the `height` of {self.height:g} m; expected a lower level",
+            )
 
 
 class TankRows(Lowering, kind="tank"):
@@ -100,7 +117,9 @@ class TankRows(Lowering, kind="tank"):
         row["kind"], row["level"], row["density"] = rec.TANK, node.level, rho
         if hasattr(node.area, "area"):
             level, area = node.area.level, node.area.area
-            volume = np.concatenate(([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1]))))
+            volume = np.concatenate(
+                ([0.0], np.cumsum(np.diff(level) * 0.5 * (area[1:] + area[:-1])))
+            )
             row["shape"], row["shapes"] = len(draft.floats), len(level)
             if len(level) == 1:
                 row["shape"] = -1
@@ -143,4 +162,6 @@ def tank_volume(level, area, volume, z: float) -> float:
         return float(volume[-1] + (z - level[-1]) * area[-1])
     k = int(np.searchsorted(level, z, side="right")) - 1
     s = z - level[k]
-    return float(volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k])))
+    return float(
+        volume[k] + s * (area[k] + 0.5 * s * (area[k + 1] - area[k]) / (level[k + 1] - level[k]))
+    )

@@ -28,12 +28,20 @@ class Mass(Node, kind="mass"):
 
     mass: Annotated[
         float,
-        Quantity("mass", positive, "total moving mass [kg]", UsualRange(1e-6, 1e9, "poppets to ships"), VALUE),
+        Quantity(
+            "mass",
+            positive,
+            "total moving mass [kg]",
+            UsualRange(1e-6, 1e9, "poppets to ships"),
+            VALUE,
+        ),
     ]
     initial_position: Annotated[
         float, Quantity("position", about="position at the start, along the common axis [m]")
     ] = 0.0
-    initial_velocity: Annotated[float, Quantity("velocity", about="velocity at the start [m/s]")] = 0.0
+    initial_velocity: Annotated[
+        float, Quantity("velocity", about="velocity at the start [m/s]")
+    ] = 0.0
 
 
 class MassRows(Lowering, kind="mass"):
@@ -46,9 +54,17 @@ class MassRows(Lowering, kind="mass"):
         place = f"nodes.{name}"
         mass = case.nodes_with_water[name].mass
         return [
-            Element(CAPACITY, place, place, (name, None), mass, f"{name}.velocity", state_of=("mass", name)),
+            Element(
+                CAPACITY,
+                place,
+                place,
+                (name, None),
+                mass,
+                f"{name}.velocity",
+                state_of=("mass", name),
+            ),
             Element(FLOW, f"{place}.force", place, (None, name), reads=(codes.FORCE_INPUT, name)),
-        ], []  # fmt: skip
+        ], []
 
 
 class Frame(Node, kind="frame"):
@@ -61,8 +77,12 @@ class Frame(Node, kind="frame"):
     domain: ClassVar[str] = "translational"
     quantities: ClassVar[dict[str, str]] = {"position": "position"}
 
-    initial_position: Annotated[float, Quantity("position", about="position on the common axis [m]")] = 0.0
-    points: Annotated[dict[str, tuple[float, ...]], NamedPoints("fixed points for links, in world axes [m]")] = {}
+    initial_position: Annotated[
+        float, Quantity("position", about="position on the common axis [m]")
+    ] = 0.0
+    points: Annotated[
+        dict[str, tuple[float, ...]], NamedPoints("fixed points for links, in world axes [m]")
+    ] = {}
 
 
 class FrameRows(Lowering, kind="frame"):
@@ -79,12 +99,21 @@ class Spring(Coupling, kind="spring"):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "spring rate, force per length [N/m]", changes=VALUE)]
-    free_length: Annotated[float | None, Quantity(
-        "length", nonnegative, "length x_to - x_from without load [m]; 0 without `preload` if left out", changes=VALUE,
-    )] = None  # fmt: skip
+    stiffness: Annotated[
+        float, Quantity("stiffness", positive, "spring rate, force per length [N/m]", changes=VALUE)
+    ]
+    free_length: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            nonnegative,
+            "length x_to - x_from without load [m]; 0 without `preload` if left out",
+            changes=VALUE,
+        ),
+    ] = None
     preload: Annotated[
-        float | None, Quantity("force", about="force at the start, positive in compression [N]", changes=VALUE)
+        float | None,
+        Quantity("force", about="force at the start, positive in compression [N]", changes=VALUE),
     ] = None
 
     def model_post_init(self, _: Any) -> None:
@@ -94,7 +123,10 @@ class Spring(Coupling, kind="spring"):
     def faults(self, name: str, around: CaseContext) -> Faults:
         distance = around.separation(self, "from", "to")
         if distance is not None and distance < 0.0 and (self.free_length or self.preload):
-            yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange the keys `from` and `to`"
+            yield (
+                ("to",),
+                f"{self.to} is behind {self.from_} at the start; exchange the keys `from` and `to`",
+            )
 
 
 class SpringRows(Lowering, kind="spring"):
@@ -107,9 +139,13 @@ class SpringRows(Lowering, kind="spring"):
         (row,) = rows
         x, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
-        row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
+        row["force"] = (
+            -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
+        )
         if link.preload is not None and draft.case.equilibrium_nodes:
-            row["force"] -= link.stiffness * (x - draft.case.as_stated.separation(link.from_, link.to))
+            row["force"] -= link.stiffness * (
+                x - draft.case.as_stated.separation(link.from_, link.to)
+            )
 
 
 class Damper(Coupling, kind="damper"):
@@ -119,7 +155,9 @@ class Damper(Coupling, kind="damper"):
     (v_to - v_from)^2 [W].
     """
 
-    damping: Annotated[float, Quantity("damping", positive, "force per relative velocity [N s/m]", changes=VALUE)]
+    damping: Annotated[
+        float, Quantity("damping", positive, "force per relative velocity [N s/m]", changes=VALUE)
+    ]
 
 
 class DamperRows(Lowering, kind="damper"):
@@ -131,7 +169,11 @@ class DamperRows(Lowering, kind="damper"):
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to))
-        row["schedule"], row["damping"], row["force"] = -1, link.damping, -link.damping * row["speed"]
+        row["schedule"], row["damping"], row["force"] = (
+            -1,
+            link.damping,
+            -link.damping * row["speed"],
+        )
 
 
 class EndStop(Coupling, kind="end-stop"):
@@ -144,13 +186,19 @@ class EndStop(Coupling, kind="end-stop"):
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("minimum", "maximum"),)
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "stiffness of the contact [N/m]", changes=VALUE)]
-    damping: Annotated[float, Quantity("damping", nonnegative, "damping of the contact [N s/m]", changes=VALUE)] = 0.0
+    stiffness: Annotated[
+        float, Quantity("stiffness", positive, "stiffness of the contact [N/m]", changes=VALUE)
+    ]
+    damping: Annotated[
+        float, Quantity("damping", nonnegative, "damping of the contact [N s/m]", changes=VALUE)
+    ] = 0.0
     minimum: Annotated[
-        float | None, Quantity("position", about="x_to - x_from below which the stop acts [m]", changes=VALUE)
+        float | None,
+        Quantity("position", about="x_to - x_from below which the stop acts [m]", changes=VALUE),
     ] = None
     maximum: Annotated[
-        float | None, Quantity("position", about="x_to - x_from above which the stop acts [m]", changes=VALUE)
+        float | None,
+        Quantity("position", about="x_to - x_from above which the stop acts [m]", changes=VALUE),
     ] = None
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -175,7 +223,9 @@ class EndStopRows(Lowering, kind="end-stop"):
         row["above"] = NO_STOP if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
-                row["force"] += sign * max(0.0, link.stiffness * -distance + link.damping * float(-sign * speed))
+                row["force"] += sign * max(
+                    0.0, link.stiffness * -distance + link.damping * float(-sign * speed)
+                )
 
 
 class Force(Coupling, kind="force"):
@@ -188,16 +238,25 @@ class Force(Coupling, kind="force"):
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
 
     from_: Annotated[
-        str | None, Text("mass or point that takes the reaction; none if left out"), Field(alias="from")
+        str | None,
+        Text("mass or point that takes the reaction; none if left out"),
+        Field(alias="from"),
     ] = None
     force: Annotated[
         Schedule,
-        Scheduled("force", about="force on `to`, positive along `direction` (of masses: along their axis) [N]"),
+        Scheduled(
+            "force",
+            about="force on `to`, positive along `direction` (of masses: along their axis) [N]",
+        ),
     ]
-    direction: Annotated[tuple[float, ...] | None, Rows(
-        "number", length=3,
-        about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
-    )] = None  # fmt: skip
+    direction: Annotated[
+        tuple[float, ...] | None,
+        Rows(
+            "number",
+            length=3,
+            about="direction of a force on a point, in world axes; the line from `from` to `to` if left out",
+        ),
+    ] = None
 
     @property
     def ports(self) -> dict[str, str]:
@@ -227,7 +286,9 @@ class ForceRows(Lowering, kind="force"):
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         toward = None if link.direction is None else link.direction / np.linalg.norm(link.direction)
-        _, row["speed"] = draft.join(row, ("from_mass", "to_mass"), (link.from_, link.to), toward=toward)
+        _, row["speed"] = draft.join(
+            row, ("from_mass", "to_mass"), (link.from_, link.to), toward=toward
+        )
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):

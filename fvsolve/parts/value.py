@@ -28,8 +28,10 @@ GREATEST_WHOLE = 10**15  # of a whole number; floats contain it exactly
 
 # Effect of a changed value on an existing model
 VALUE = "value"  # only numbers in its tables change; the initial state stays
-PROFILE = "profile"  # the initial state changes too; sizes, names and whole numbers of the tables stay
-BY_CELLS = "cells"  # as `profile`, but `shape` if a pipe states no cells: their number follows from travel times
+# the initial state changes too; sizes, names and whole numbers of the tables stay
+PROFILE = "profile"
+# as `profile`, but `shape` if a pipe states no cells: their number follows from travel times
+BY_CELLS = "cells"
 SHAPE = "shape"  # a new model: cells, parts, methods
 
 
@@ -39,7 +41,9 @@ class ValueFault(ValueError):
     instead : values with which reading continues, so that it finds further faults, or None; stored as `replacement`
     """
 
-    def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
+    def __init__(
+        self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None
+    ):
         self.faults, self.replacement = faults, instead
         super().__init__("; ".join(message for _, message in faults))
 
@@ -53,7 +57,9 @@ def faults_of(error: ValueError, *keys: Any) -> list[tuple[tuple[Any, ...], str]
     return [((*keys, *below), message) for below, message in faults]
 
 
-def pydantic_faults(error: Any, known: list[str], synonyms: Mapping[str, str]) -> list[tuple[tuple[Any, ...], str]]:
+def pydantic_faults(
+    error: Any, known: list[str], synonyms: Mapping[str, str]
+) -> list[tuple[tuple[Any, ...], str]]:
     """Faults (key path, text) in an error of pydantic.
 
     known : keys of the table; synonyms : keys of other programs -> equivalent here
@@ -67,7 +73,12 @@ def pydantic_faults(error: Any, known: list[str], synonyms: Mapping[str, str]) -
             result.append((place[:-1], f"{place[-1]} is missing"))
         elif entry["type"] == "extra_forbidden":
             hint = synonyms.get(str(place[-1]).casefold().replace("-", "_"))
-            result.append((place, f"unknown key{f'; use {hint}' if hint else key_hint(str(place[-1]), known)}"))
+            result.append(
+                (
+                    place,
+                    f"unknown key{f'; use {hint}' if hint else key_hint(str(place[-1]), known)}",
+                )
+            )
         else:
             result.append((place, str(cause) if cause else entry["msg"]))
     return result
@@ -104,14 +115,16 @@ class ReadContext:
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     used: dict[str, Any] = field(default_factory=dict)  # signals that parts refer to, in SI
-    scaled: dict[str, Any] = field(default_factory=dict)  # schedules of signals that parts scale by a factor
+    # schedules of signals that parts scale by a factor
+    scaled: dict[str, Any] = field(default_factory=dict)
     lookups: int = 0  # number of uses of files, signals and controls
     controls: dict[str, Any] = field(default_factory=dict)
     driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
     block_units: tuple[str, str] = ("number", "number")
     span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
     step: float | None = None  # given step of the run [s]; None without one
-    frame: tuple[tuple[float, float], str] = ((0.0, 0.0), "")  # easting and northing [m] of the basin, and its CRS
+    # easting and northing [m] of the basin, and its CRS
+    frame: tuple[tuple[float, float], str] = ((0.0, 0.0), "")
 
 
 def context_of(info: Any) -> ReadContext:
@@ -207,8 +220,12 @@ class Value:
         """JSON schema of the value in the case file."""
         return self.schema
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, context_of(info)))
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            lambda given, info: self.read(given, context_of(info))
+        )
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         return {**self.json(), **({"description": self.about} if self.about else {})}
@@ -232,15 +249,23 @@ class Quantity(Value):
     changes: str = PROFILE
 
     def read(self, given: Any, setting: ReadContext) -> float:
-        if isinstance(given, dict) and (form := next((key for key in CHANGING if key in given), "")):
+        if isinstance(given, dict) and (
+            form := next((key for key in CHANGING if key in given), "")
+        ):
             text = f"{show(given)} changes with time, and this value does not; {units.expected(self.dimension)}"
-            raise ValueError(text.replace("changes with time", "follows a control") if form == "control" else text)
+            raise ValueError(
+                text.replace("changes with time", "follows a control")
+                if form == "control"
+                else text
+            )
         if isinstance(given, str) and OF_TIME.search(given) and not units.begins_as_quantity(given):
             text = f"{show(given)} is a formula of t, and this value does not change with time"
             raise ValueError(f"{text}; {units.expected(self.dimension)}")
         value = units.parse(given, self.dimension)
         if isinstance(value, tuple):
-            value = value[0] + (setting.ambient if value[1] and self.dimension == "pressure" else 0.0)
+            value = value[0] + (
+                setting.ambient if value[1] and self.dimension == "pressure" else 0.0
+            )
             if self.dimension == "pressure" and value <= 0 and self.range is not nonnegative:
                 raise ValueError(units.vacuum(given, value, ambient=setting.ambient))
         try:
@@ -267,7 +292,11 @@ class Quantity(Value):
             values = np.array(given, dtype=float)
         except OverflowError:
             return None
-        return tuple(values.tolist()) if np.all(units.are_possible(values) & self.range.holds(values)) else None
+        return (
+            tuple(values.tolist())
+            if np.all(units.are_possible(values) & self.range.holds(values))
+            else None
+        )
 
     def numbers_of(self, texts: list[str] | tuple[str, ...]) -> list[float]:
         """SI values of texts that all end with the same unit; not a number for texts of another form."""
@@ -291,7 +320,10 @@ class Quantity(Value):
 
 
 def Number(
-    range: Range = anything, about: str = "", usual: UsualRange | None = None, changes: str = PROFILE
+    range: Range = anything,
+    about: str = "",
+    usual: UsualRange | None = None,
+    changes: str = PROFILE,
 ) -> Quantity:
     """Declaration of a key for a number without a unit; arguments as for `Quantity`."""
     return Quantity("number", range, about, usual, changes)
@@ -307,9 +339,13 @@ class Whole(Value):
 
     def read(self, given: Any, setting: ReadContext) -> int:
         if isinstance(given, bool) or not isinstance(given, int):
-            raise ValueError(f"{show(given)} is not a whole number; expected a whole number {self.range}")
+            raise ValueError(
+                f"{show(given)} is not a whole number; expected a whole number {self.range}"
+            )
         if abs(given) > GREATEST_WHOLE:
-            raise ValueError(f"{show(given)} is above {GREATEST_WHOLE:g}; expected a whole number {self.range}")
+            raise ValueError(
+                f"{show(given)} is above {GREATEST_WHOLE:g}; expected a whole number {self.range}"
+            )
         self.range.check(given, given)
         return given
 
@@ -331,7 +367,8 @@ class Choice(Value):
     noun: str
     words: Collection[str]
     about: str = ""
-    synonyms: Mapping[str, str] = field(default_factory=dict)  # words of other programs -> equivalent here
+    # words of other programs -> equivalent here
+    synonyms: Mapping[str, str] = field(default_factory=dict)
     changes: str = SHAPE
 
     def read(self, given: Any, setting: ReadContext) -> str:
@@ -364,7 +401,9 @@ class Flag(Value):
 
     def read(self, given: Any, setting: ReadContext) -> bool:
         if not isinstance(given, bool):
-            raise ValueError(f"{show(given)} is neither true nor false; expected true or false, without quotes")
+            raise ValueError(
+                f"{show(given)} is neither true nor false; expected true or false, without quotes"
+            )
         return given
 
 
@@ -407,7 +446,9 @@ class Rows(Value):
         item = Quantity(self.dimension, self.range)
         values = item.read_all(given)
         if values is None:
-            values = tuple(read_each(enumerate(given), lambda entry: item.read(entry, setting)).values())
+            values = tuple(
+                read_each(enumerate(given), lambda entry: item.read(entry, setting)).values()
+            )
         if self.rising:
             check_increasing(values, given)
         return values
@@ -415,11 +456,17 @@ class Rows(Value):
     @property
     def takes(self) -> str:
         unit = units.DIMENSIONS[self.dimension].si
-        entries = f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
+        entries = (
+            f"list of {unit}" if self.length is None else f"[{', '.join([unit] * self.length)}]"
+        )
         return entries + self.range.bounds
 
     def json(self) -> dict[str, Any]:
-        return {"type": "array", "items": Quantity(self.dimension).json(), "minItems": self.length or 1}
+        return {
+            "type": "array",
+            "items": Quantity(self.dimension).json(),
+            "minItems": self.length or 1,
+        }
 
 
 @dataclass(frozen=True)
@@ -449,7 +496,11 @@ def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
 
     given : values as written in the file; noun : plural name of the values for the message
     """
-    for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
+    for before, after, text_before, text_after in zip(
+        values, values[1:], given, given[1:], strict=False
+    ):
         if not after > before:
             wrong = f"{show(text_after)} comes after {show(text_before)}"
-            raise ValueError(f"{noun} out of order: {wrong}; expected rising {noun.split(': ')[-1]}")
+            raise ValueError(
+                f"{noun} out of order: {wrong}; expected rising {noun.split(': ')[-1]}"
+            )

@@ -85,31 +85,50 @@ class Sized(Table):
         ("area", "diameter"),
     )
 
-    discharge_coefficient: Annotated[float | None, Number(
-        between(0, 1, open=True),
-        f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
-    )] = None  # fmt: skip
+    discharge_coefficient: Annotated[
+        float | None,
+        Number(
+            between(0, 1, open=True),
+            f"discharge coefficient Cd, with `area` or `diameter`; {DISCHARGE_COEFFICIENT} if left out",
+        ),
+    ] = None
     loss_coefficient: Annotated[
-        float | None, Number(positive, "loss coefficient K, referred to the velocity in `area` or `diameter`")
+        float | None,
+        Number(positive, "loss coefficient K, referred to the velocity in `area` or `diameter`"),
     ] = None
     Kv: Annotated[
-        float | None, Number(positive, "flow coefficient Kv, m3/h of water of 1000 kg/m3 at 1 bar", COEFFICIENTS)
+        float | None,
+        Number(positive, "flow coefficient Kv, m3/h of water of 1000 kg/m3 at 1 bar", COEFFICIENTS),
     ] = None
     Cv: Annotated[
         float | None,
-        Number(positive, "flow coefficient Cv, US gpm of water of 999.016 kg/m3 (60 degF) at 1 psi", COEFFICIENTS),
+        Number(
+            positive,
+            "flow coefficient Cv, US gpm of water of 999.016 kg/m3 (60 degF) at 1 psi",
+            COEFFICIENTS,
+        ),
     ] = None
-    area: Annotated[float | None, Quantity(
-        "area", positive, "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
-        UsualRange(1e-12, 200.0, "leaks to sluices"),
-    )] = None  # fmt: skip
+    area: Annotated[
+        float | None,
+        Quantity(
+            "area",
+            positive,
+            "area of the opening [m2]; needed unless `diameter`, `Kv` or `Cv` is given",
+            UsualRange(1e-12, 200.0, "leaks to sluices"),
+        ),
+    ] = None
     diameter: Annotated[
         float | None,
-        Quantity("length", positive, "diameter of the opening [m]", UsualRange(1e-6, 14.0, "leaks to sluices")),
+        Quantity(
+            "length",
+            positive,
+            "diameter of the opening [m]",
+            UsualRange(1e-6, 14.0, "leaks to sluices"),
+        ),
     ] = None
-    laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which the flow is laminar")] = (
-        None
-    )
+    laminar_reynolds: Annotated[
+        float | None, Number(positive, "Reynolds number below which the flow is laminar")
+    ] = None
 
     def model_post_init(self, _: Any) -> None:
         if self.Kv is self.Cv is self.loss_coefficient is self.discharge_coefficient is None:
@@ -121,11 +140,18 @@ class Sized(Table):
         bare = next((key for key in ("Kv", "Cv") if key in given), None)
         if bare:
             stray = [key for key in ("area", "diameter") if key in given]
-            return faults + [((key,), f"{bare} already gives the size; leave the key `{key}` out") for key in stray]
+            return faults + [
+                ((key,), f"{bare} already gives the size; leave the key `{key}` out")
+                for key in stray
+            ]
         if "area" in given or "diameter" in given:
             return faults
-        alone = next((key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None)
-        text = f"{alone} needs area or diameter" if alone else f"size is missing; expected {cls.sizes}"
+        alone = next(
+            (key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None
+        )
+        text = (
+            f"{alone} needs area or diameter" if alone else f"size is missing; expected {cls.sizes}"
+        )
         return faults + [((), text)]
 
     def flow_area(self, density: float = 1000.0) -> float:
@@ -157,12 +183,21 @@ class Valve(Sized, TwoPort, kind="valve"):
     """
 
     synonyms: ClassVar[dict[str, str]] = dict.fromkeys(
-        ("closing_time", "closure_time", "close_time", "closing", "opening_time", "stroke_time", "schedule"), CLOSURE
+        (
+            "closing_time",
+            "closure_time",
+            "close_time",
+            "closing",
+            "opening_time",
+            "stroke_time",
+            "schedule",
+        ),
+        CLOSURE,
     )
 
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
-        default_factory=lambda: constant(1.0)
-    )
+    opening: Annotated[
+        Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")
+    ] = Field(default_factory=lambda: constant(1.0))
     characteristic: Annotated[Any, CharacteristicValue()] = "linear"
 
 
@@ -181,12 +216,18 @@ class ValveRows(Restriction, kind="valve"):
 
     def resize(self, draft, name, before, part, row) -> bool:
         others = part.opening != before.opening or part.characteristic != before.characteristic
-        if others or row["hooks"] >= 0 or (part.laminar_reynolds is None) != (before.laminar_reynolds is None):
+        if (
+            others
+            or row["hooks"] >= 0
+            or (part.laminar_reynolds is None) != (before.laminar_reynolds is None)
+        ):
             return False
         softened = part.laminar_reynolds is None and row["transition"] > 0.0
         draft.restriction(name, part, row)
         if softened:
-            row["transition"] = draft.hydraulics.transition_flow(name, part, LAMINAR_REYNOLDS, draft.fault)
+            row["transition"] = draft.hydraulics.transition_flow(
+                name, part, LAMINAR_REYNOLDS, draft.fault
+            )
         return True
 
     def inputs(self, model, name, part):

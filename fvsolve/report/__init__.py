@@ -14,4 +14,6 @@ def import_library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
-        raise FvsolveError(f'a report needs {name.partition(".")[0]}: pip install "fvsolve[report]"') from None
+        raise FvsolveError(
+            f'a report needs {name.partition(".")[0]}: pip install "fvsolve[report]"'
+        ) from None

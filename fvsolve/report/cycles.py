@@ -15,7 +15,8 @@ from fvsolve.report import import_library
 from fvsolve.units import span
 
 PRESSURE_QUANTITIES = ("pressure", "gauge_pressure", "head")
-COARSE = 0.98  # range of the rows, relative to that of all steps, below which rows are too coarse to be counted
+# range of the rows, relative to that of all steps, below which rows are too coarse to be counted
+COARSE = 0.98
 SMALLEST_RANGE = 1e-3  # smallest range that is counted, as a fraction of the greatest range
 
 
@@ -67,7 +68,9 @@ def check_rows(result, name: str) -> None:
         )
 
 
-def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | None = None) -> list[dict[str, Any]]:
+def cycles(
+    result, probes: list[str] | None = None, strength: FatigueStrength | None = None
+) -> list[dict[str, Any]]:
     """Cycles of pressure or head at the probes `probes` (None for all of these quantities) : a dict for each probe.
 
     Keys of a dict:
@@ -84,9 +87,13 @@ def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | 
     rows = []
     for name in probes or known:
         if not len(result[name]):
-            raise FvsolveError(f"{name} has no rows, so its cycles cannot be counted; run the case to a later time")
+            raise FvsolveError(
+                f"{name} has no rows, so its cycles cannot be counted; run the case to a later time"
+            )
         if not np.isfinite(result[name]).all():
-            raise FvsolveError(f"{name} has values that are not finite, so its cycles cannot be counted")
+            raise FvsolveError(
+                f"{name} has values that are not finite, so its cycles cannot be counted"
+            )
         check_rows(result, name)
         counts = count_cycles(np.asarray(result[name]))
         row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": counts}

@@ -24,14 +24,28 @@ GREATEST_COLOUR, LEAST_COLOUR, NOW_COLOUR, VAPOUR_COLOUR = COLOURS[:4]
 CLASS_COLOUR = COLOURS[6]
 BACKGROUND = "#ffffff"
 DASH, DOT, LONG_DASH = "9px,5px", "2px,3px", "14px,5px"
-LINE_LOOKS = {VAPOUR_LINE: {"colour": VAPOUR_COLOUR, "width": 1.4, "dash": DOT},
-         "class line": {"colour": CLASS_COLOUR, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
-LIMIT_LOOKS = {"maximum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": LONG_DASH},
-          "minimum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
+LINE_LOOKS = {
+    VAPOUR_LINE: {"colour": VAPOUR_COLOUR, "width": 1.4, "dash": DOT},
+    "class line": {"colour": CLASS_COLOUR, "width": 1.8, "dash": "9px,3px,2px,3px"},
+}
+LIMIT_LOOKS = {
+    "maximum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": LONG_DASH},
+    "minimum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"},
+}
 # Lines remain distinguishable in grey print.
 DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG_DASH, "14px,3px,2px,3px")
-DARK_COLOURS = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", BACKGROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
-    zip(COLOURS, ("#5db4ec", "#f08a4b", "#3cc3a4", "#c08ad8", "#e0b13c", "#8fd0f5", "#e8748c", "#a9bf6a"), strict=True)
+DARK_COLOURS = {
+    INK: "#dde3ea",
+    MUTED: "#9aa7b5",
+    HAIR: "#37424e",
+    BACKGROUND: "#12171d",
+    DOUBT: "#ff8b5e",
+} | dict(
+    zip(
+        COLOURS,
+        ("#5db4ec", "#f08a4b", "#3cc3a4", "#c08ad8", "#e0b13c", "#8fd0f5", "#e8748c", "#a9bf6a"),
+        strict=True,
+    )
 )  # colours for dark screens; printed pages use the light ones
 SECTION_HEIGHT, HISTORY_HEIGHT = 920, 260  # heights of sections and histories [px]
 TOOLBAR_HEIGHT = 22  # height of the tool bar above the names [px]
@@ -69,9 +83,15 @@ def history_panels(result) -> list[HistoryPanel]:
     result_panels = []
     for (kind, unit), names in _by_panel(result, chosen).items():
         seen = names if len(names) <= SHOWN_LINES else _most_varying(result, names)
-        lines = [Series(name, *thin_series(result.t, result[name], points), name in seen) for name in names]
-        lines += [Series(name, *thin_series(*measured[name], points), name in seen, True) for name in names
-                  if name in measured]  # fmt: skip
+        lines = [
+            Series(name, *thin_series(result.t, result[name], points), name in seen)
+            for name in names
+        ]
+        lines += [
+            Series(name, *thin_series(*measured[name], points), name in seen, True)
+            for name in names
+            if name in measured
+        ]
         result_panels.append(HistoryPanel(kind, unit, lines))
     return result_panels
 
@@ -96,11 +116,15 @@ def _by_panel(result, probes: list[str]) -> dict[tuple[str, str], list[str]]:
 
 def _most_varying(result, names: list[str], count: int = SHOWN_LINES) -> set[str]:
     extremes = result.extremes
-    swing = {name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names}
+    swing = {
+        name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names
+    }
     return set(sorted(names, key=lambda name: -swing[name])[:count])
 
 
-def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:
+def section_figure(
+    section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int
+) -> dict[str, Any]:
     """Figure of a long section: heads, pipe, vapour and class lines, spans of cavities, devices, animated head.
 
     moving : animated head, or None; unit, along : units of head and chainage
@@ -118,13 +142,30 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
     ]
     data += _limits(section, x, k)
     if section.cavity_spans:
-        data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
-                     "marker": {"symbol": "square", "size": 11, "color": VAPOUR_COLOUR, "opacity": 0.35}})  # fmt: skip
+        data.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "vapour pressure reached",
+                "x": [None],
+                "y": [None],
+                "marker": {"symbol": "square", "size": 11, "color": VAPOUR_COLOUR, "opacity": 0.35},
+            }
+        )
     if section.violations:
         at, heads, names = zip(*section.violations, strict=True)
-        data.append({"type": "scatter", "mode": "markers", "name": "limit passed", "x": at, "y": heads,
-                     "cliponaxis": False, "text": [escape_markup(name) for name in names],
-                     "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
+        data.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "limit passed",
+                "x": at,
+                "y": heads,
+                "cliponaxis": False,
+                "text": [escape_markup(name) for name in names],
+                "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}},
+            }
+        )
     shapes = [_band(a, b, VAPOUR_COLOUR, 0.18) for a, b in section.cavity_spans]
     if moving is not None:
         places, heads = packed_array(moving.chainage, "f4"), packed_array(moving.heads[0], "f4")
@@ -133,12 +174,17 @@ def section_figure(section: Section, moving: HeadAnimation | None, unit: str, al
     layout["shapes"] = [*shapes, *layout["shapes"]]
     figure: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
-        figure["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
-                          "heads": [[float(f"{v:.6g}") for v in row] for row in moving.heads.tolist()]}  # fmt: skip
+        figure["moving"] = {
+            "trace": len(data) - 1,
+            "times": moving.times.tolist(),
+            "heads": [[float(f"{v:.6g}") for v in row] for row in moving.heads.tolist()],
+        }
     return figure
 
 
-def study_section_figure(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
+def study_section_figure(
+    several: list[tuple[str, Section]], unit: str, along: str
+) -> dict[str, Any]:
     """Figure of a long section in several runs: pipe, vapour line and limits once, heads of each run in another colour.
 
     several : list of (name of the run, section); unit, along : units of head and chainage
@@ -170,9 +216,15 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
         dash = DASHES[place // len(COLOURS) % len(DASHES)]
         trace = _line(line.name, packed_array(line.t), packed_array(line.values), colour, dash=dash)
         if line.measured:
-            trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
+            trace |= {
+                "mode": "markers",
+                "name": f"{trace['name']}, measured",
+                "marker": {"size": 4, "color": colour},
+            }
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
-    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", HISTORY_HEIGHT)
+    layout = _layout(
+        f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", HISTORY_HEIGHT
+    )
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
     if ends:
         layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
@@ -193,37 +245,78 @@ def packed_array(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict
     return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
 
 
-def _line(name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "lines", "name": escape_markup(name), "x": x, "y": y,
-            "line": {"color": colour, "width": width, "dash": dash}, **more}  # fmt: skip
+def _line(
+    name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any
+) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": escape_markup(name),
+        "x": x,
+        "y": y,
+        "line": {"color": colour, "width": width, "dash": dash},
+        **more,
+    }
 
 
 def _layout(y: str, x: str, height: int) -> dict[str, Any]:
-    axis = {"showline": True, "linecolor": MUTED, "gridcolor": HAIR, "zeroline": False, "ticks": "outside",
-            "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
-            "separatethousands": True}  # fmt: skip
+    axis = {
+        "showline": True,
+        "linecolor": MUTED,
+        "gridcolor": HAIR,
+        "zeroline": False,
+        "ticks": "outside",
+        "tickcolor": MUTED,
+        "ticklen": 4,
+        "automargin": True,
+        "exponentformat": "power",
+        "minexponent": 6,
+        "separatethousands": True,
+    }
     background = {"bgcolor": BACKGROUND, "bordercolor": HAIR}
     return {
-        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
-        "paper_bgcolor": BACKGROUND, "plot_bgcolor": BACKGROUND,
+        "height": height,
+        "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
+        "paper_bgcolor": BACKGROUND,
+        "plot_bgcolor": BACKGROUND,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
-        "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
+        "font": {"family": FONT, "size": 12, "color": INK},
+        "separators": ".\u202f",
+        "hovermode": "x unified",
         "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}} | background,
-        "dragmode": "zoom", "showlegend": False,
+        "dragmode": "zoom",
+        "showlegend": False,
         "xaxis": axis | {"title": {"text": escape_markup(x), "standoff": 8}},
         "yaxis": axis | {"title": {"text": escape_markup(y), "standoff": 8}},
-    }  # fmt: skip
+    }
 
 
 def _band(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
-    return {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "fillcolor": colour,
-            "opacity": opacity, "line": {"width": 0}, "layer": "below"}  # fmt: skip
+    return {
+        "type": "rect",
+        "xref": "x",
+        "yref": "paper",
+        "x0": a,
+        "x1": b,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": colour,
+        "opacity": opacity,
+        "line": {"width": 0},
+        "layer": "below",
+    }
 
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
     """Curves of the vapour line and of limits for plotly.js; x : drawn chainages, k : their indices in the section."""
-    looks = {name: LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]] for name in section.lines}
-    return [_line(name, x, packed_array(line[k], "f4"), **looks[name]) for name, line in section.lines.items()]
+    looks = {
+        name: LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]
+        for name in section.lines
+    }
+    return [
+        _line(name, x, packed_array(line[k], "f4"), **looks[name])
+        for name, line in section.lines.items()
+    ]
 
 
 def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
@@ -232,12 +325,15 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
     unit, along : units of head and chainage
     """
     first, seen = sections[0], head_window(sections, unit)
-    layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
+    layout = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT)
+    names = _place_names(first)
     letters = max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
     layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters
     look = {"line": {"color": HAIR, "width": 1}, "layer": "below"}
     upright = {"type": "line", "xref": "x", "yref": "paper", "y0": 0, "y1": 1.015, **look}
-    layout["shapes"] = [{**upright, "x0": device.chainage, "x1": device.chainage} for device in first.devices]
+    layout["shapes"] = [
+        {**upright, "x0": device.chainage, "x1": device.chainage} for device in first.devices
+    ]
     layout["annotations"] = [*names, *_limit_arrow(seen.above, 1), *_limit_arrow(seen.below, 0)]
     layout["xaxis"]["range"] = list(first.ends)
     layout["yaxis"]["range"] = [seen.low, seen.high]
@@ -249,22 +345,48 @@ def _limit_arrow(limits: list[str], edge: int) -> list[dict[str, Any]]:
 
     limits : these texts; the result is [] without texts
     """
-    text, away = "<br>".join(map(escape_markup, limits)), 7 * len(limits) + 6  # pixels from the edge
-    arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
-             "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS_COLOUR, "xanchor": "right",
-             "yanchor": "middle", "borderpad": 4, "bgcolor": BACKGROUND, "text": text,
-             "font": {"size": 11, "color": CLASS_COLOUR}}  # fmt: skip
+    # pixels from the edge
+    text, away = "<br>".join(map(escape_markup, limits)), 7 * len(limits) + 6
+    arrow = {
+        "xref": "paper",
+        "yref": "paper",
+        "x": 0.97,
+        "y": edge,
+        "ax": 0,
+        "ay": away if edge else -away,
+        "showarrow": True,
+        "arrowhead": 2,
+        "arrowwidth": 1.2,
+        "arrowcolor": CLASS_COLOUR,
+        "xanchor": "right",
+        "yanchor": "middle",
+        "borderpad": 4,
+        "bgcolor": BACKGROUND,
+        "text": text,
+        "font": {"size": 11, "color": CLASS_COLOUR},
+    }
     return [arrow] if limits else []
 
 
 def _place_names(section: Section) -> list[dict[str, Any]]:
     """Plotly annotations with the names of devices and nodes, above a section at their chainages."""
     late = section.ends[0] + 0.9 * (section.ends[1] - section.ends[0])
-    return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
-             "xanchor": "right" if x > late else "left", "yanchor": "bottom",
-             "text": escape_markup(short_name(names)), "hovertext": escape_markup(names),
-             "font": {"size": 11, "color": INK if stands else MUTED}}
-            for x, names, stands in section.labels()]  # fmt: skip
+    return [
+        {
+            "x": x,
+            "y": 1.02,
+            "xref": "x",
+            "yref": "paper",
+            "showarrow": False,
+            "textangle": -45,
+            "xanchor": "right" if x > late else "left",
+            "yanchor": "bottom",
+            "text": escape_markup(short_name(names)),
+            "hovertext": escape_markup(names),
+            "font": {"size": 11, "color": INK if stands else MUTED},
+        }
+        for x, names, stands in section.labels()
+    ]
 
 
 def _range_at_rest(panel: HistoryPanel) -> dict[str, Any]:

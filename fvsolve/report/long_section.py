@@ -60,16 +60,29 @@ def section_paths(result) -> list[SectionPath]:
     if not_valid(result.summary):
         return []
     links = result.case.links
-    paths = [_section_path(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
-    paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[::-1]  # no duplicates
+    paths = [
+        _section_path(name, legs_of(route, links), links)
+        for name, route in result.case.routes.items()
+    ]
+    # no duplicates
+    paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[
+        ::-1
+    ]
     paths = [way for way in paths if not _is_covered(way, paths)]
     strung = {leg.pipe for way in paths for leg in way.legs}
     # a section may continue through a link between junctions
     junctions = {name for name, node in result.case.nodes.items() if node.kind == "junction"}
-    merged = joined_places({name: link for name, link in links.items() if {*link.ports.values()} <= junctions})
+    merged = joined_places(
+        {name: link for name, link in links.items() if {*link.ports.values()} <= junctions}
+    )
     free = [name for name in result.envelope if name in links and name not in strung]
-    pipes = {name: (*(merged.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
-             for name in free}  # fmt: skip
+    pipes = {
+        name: (
+            *(merged.get(end, end) for end in (links[name].from_, links[name].to)),
+            links[name].length,
+        )
+        for name in free
+    }
     others = []
     while pipes and len(paths) + len(others) < MAX_SECTIONS:
         chain = _longest_chain(pipes)
@@ -82,7 +95,9 @@ def section_paths(result) -> list[SectionPath]:
 def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
     """True if a path consists of the pieces of one cut pipe, and all these pieces are on another path."""
     pipes, others = [leg.pipe for leg in way.legs], [other for other in ways if other is not way]
-    return is_cut(way.name, pipes) and any(set(pipes) <= {leg.pipe for leg in other.legs} for other in others)
+    return is_cut(way.name, pipes) and any(
+        set(pipes) <= {leg.pipe for leg in other.legs} for other in others
+    )
 
 
 def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
@@ -105,7 +120,9 @@ def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
         at += length
     way = _section_path("", legs, result.case.links)
     names = [leg.pipe for leg in legs]
-    name = " \u2013 ".join(names) if len(names) < 4 else f"{way.places[0][0]} to {way.places[-1][0]}"
+    name = (
+        " \u2013 ".join(names) if len(names) < 4 else f"{way.places[0][0]} to {way.places[-1][0]}"
+    )
     return way._replace(name=name)
 
 
@@ -113,7 +130,10 @@ def _section_path(name: str, legs: list[Leg], links: dict) -> SectionPath:
     """Section path from legs. Its places are both end nodes of each pipe, so both nodes of a device are included."""
     places = []
     for leg in legs:
-        ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
+        ends = (
+            (links[leg.pipe].from_, leg.chainage(0.0)),
+            (links[leg.pipe].to, leg.chainage(links[leg.pipe].length)),
+        )
         places += ends[::-1] if leg.backwards else ends
     return SectionPath(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
 
@@ -151,7 +171,10 @@ def _farthest(around: dict, start: str) -> tuple[str, dict]:
     around : node -> list of (other node, pipe, backwards, length)
     The way is a dict: node -> (previous node, pipe, backwards, length).
     """
-    distance, came, queue, end = {start: 0.0}, {}, [(0.0, start)], start
+    distance = {start: 0.0}
+    came = {}
+    queue = [(0.0, start)]
+    end = start
     done = set()
     while queue:
         so_far, place = heapq.heappop(queue)
@@ -167,18 +190,29 @@ def _farthest(around: dict, start: str) -> tuple[str, dict]:
 
 
 MAX_LIMIT_LINES = 6  # greatest number of limit lines in a section
-SECTION_QUANTITIES = ("elevation", "initial_head", "min_head", "max_head", "min_pressure", "max_pressure",
-         "t_min", "t_max")  # fmt: skip
+SECTION_QUANTITIES = (
+    "elevation",
+    "initial_head",
+    "min_head",
+    "max_head",
+    "min_pressure",
+    "max_pressure",
+    "t_min",
+    "t_max",
+)
 HEAD_QUANTITIES = ("initial_head", "min_head", "max_head")
 VAPOUR_LINE = "vapour line"
-LABEL_DISTANCE = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
+# least distance of names, as a fraction of the length; closer names would overlap
+LABEL_DISTANCE = 0.035
 # Limits farther away than this fraction of the range of heads are only named at the edge of the picture.
 LIMIT_REACH = 0.5
 # Fractions of the head axis: free at each end, and for each limit that is named there.
 EDGE_MARGIN, NAME_MARGIN = 0.05, 0.07
-MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
+# greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
+MAX_BINS = 150
 MAX_POINTS = 240  # greatest number of points of an animated line
-MAX_NUMBERS = 45_000  # greatest number of values of all animated lines of a report; frames are skipped above it
+# greatest number of values of all animated lines of a report; frames are skipped above it
+MAX_NUMBERS = 45_000
 
 
 def envelope_column(result, name: str) -> UnitColumn:
@@ -201,23 +235,32 @@ def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np
     pipe : str[n]  pipe of each point; elevation : float64[n]; heads and elevations are in the units of the envelope
     """
     case, lines = result.case, {}
-    classes = {name: getattr(case.links[name], "allowable_pressure", None) for name in np.unique(pipe).tolist()}
+    classes = {
+        name: getattr(case.links[name], "allowable_pressure", None)
+        for name in np.unique(pipe).tolist()
+    }
     if any(allowable is not None for allowable in classes.values()):
-        gauge = np.array([np.nan if classes[name] is None else classes[name] for name in pipe.tolist()])
+        gauge = np.array(
+            [np.nan if classes[name] is None else classes[name] for name in pipe.tolist()]
+        )
         lines["class line"] = _as_head(result, "gauge_pressure", gauge, elevation)
     for limit in case.limits.values():
-        quantity, parts = limit.extent.quantity, [name for group, name in limit.extent.parts if group == "links"]
+        quantity = limit.extent.quantity
+        parts = [name for group, name in limit.extent.parts if group == "links"]
         applies = np.isin(pipe, parts)
         if quantity not in OF_PRESSURE or not applies.any():
             continue
         for bound in ("minimum", "maximum"):
             value = getattr(limit, bound)
             if value is None or isinstance(value, str):
-                continue  # "vacuum" is the line of the pipe itself, and the vapour line is drawn anyway
+                # "vacuum" is the line of the pipe itself, and the vapour line is drawn anyway
+                continue
             line = _as_head(result, quantity, value, elevation)
             lines[f"{limit.name}, {bound}"] = np.where(applies, line, np.nan)
         if limit.class_fraction is not None and limit.class_fraction != 1.0:
-            gauge = np.array([limit.class_fraction * (classes[name] or np.nan) for name in pipe.tolist()])
+            gauge = np.array(
+                [limit.class_fraction * (classes[name] or np.nan) for name in pipe.tolist()]
+            )
             line = _as_head(result, "gauge_pressure", gauge, elevation)
             lines[f"{limit.name}, maximum"] = np.where(applies, line, np.nan)
     return dict(list(lines.items())[:MAX_LIMIT_LINES])
@@ -280,9 +323,18 @@ class Section:
         if n <= 4 * bins:
             return np.arange(n)
         edges = np.linspace(0, n, bins + 1).astype(int)
-        most = [("max_head", np.argmax), ("min_head", np.argmin), ("elevation", np.argmax), ("elevation", np.argmin)]
+        most = [
+            ("max_head", np.argmax),
+            ("min_head", np.argmin),
+            ("elevation", np.argmax),
+            ("elevation", np.argmin),
+        ]
         lines = [(self.along[name], end) for name, end in most]
-        rows = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        rows = [
+            a + end(line[a:b])
+            for line, end in lines
+            for a, b in zip(edges[:-1], edges[1:], strict=True)
+        ]
         return np.unique([0, *rows, n - 1])
 
     def labels(self) -> list[tuple[float, str, bool]]:
@@ -291,11 +343,17 @@ class Section:
         Devices and ends have priority over plain junctions; devices close to each other share a label.
         """
         length = self.ends[1] - self.ends[0]
-        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in self.ends))
+        order = sorted(
+            self.devices, key=lambda device: (not device.parts, device.chainage not in self.ends)
+        )
         shown: list[tuple[float, list[str], bool]] = []
         for device in order:
             names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
-            near = [label for label in shown if abs(device.chainage - label[0]) < LABEL_DISTANCE * length]
+            near = [
+                label
+                for label in shown
+                if abs(device.chainage - label[0]) < LABEL_DISTANCE * length
+            ]
             if not near:
                 shown.append((device.chainage, names, bool(device.parts)))
             elif device.parts:
@@ -320,12 +378,21 @@ def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
 
     Limits far away are only named, so that they do not compress the heads. unit : unit of heads, for their texts
     """
-    heads = value_range([section.along[name] for section in sections for name in HEAD_QUANTITIES]) or (0.0, 1.0)
+    heads = value_range(
+        [section.along[name] for section in sections for name in HEAD_QUANTITIES]
+    ) or (0.0, 1.0)
     shown = [section.along["elevation"] for section in sections]
-    shown += [limit for section in sections for name, limit in section.lines.items() if name == VAPOUR_LINE]
+    shown += [
+        limit
+        for section in sections
+        for name, limit in section.lines.items()
+        if name == VAPOUR_LINE
+    ]
     followed = value_range([*map(np.array, heads), *shown]) or heads
     reach, (low, high), above, below = LIMIT_REACH * (heads[1] - heads[0]), followed, [], []
-    for name in dict.fromkeys(name for section in sections for name in section.lines if name != VAPOUR_LINE):
+    for name in dict.fromkeys(
+        name for section in sections for name in section.lines if name != VAPOUR_LINE
+    ):
         limit = value_range([section.lines[name] for section in sections if name in section.lines])
         if limit and limit[0] > followed[1] + reach:
             above.append(f"{name}: from {limit[0]:.4g} {unit}")
@@ -354,7 +421,8 @@ def section_of(result, way: SectionPath) -> Section:
     chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
     along = {name: strung_up[name] for name in SECTION_QUANTITIES}
     lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
-    if boils is not None:  # a law with cavities has no head at the vapour pressure itself, where vapour fills all
+    # a law with cavities has no head at the vapour pressure itself, where vapour fills all
+    if boils is not None:
         left = 1.0 + NEAR * result.case.law.cavitates
         lines[VAPOUR_LINE] = head_of(result, boils * left, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
@@ -362,11 +430,19 @@ def section_of(result, way: SectionPath) -> Section:
     beyond = _violations(result, way, chainage, along)
     to_unit = distances.from_si
     return Section(
-        way, strung_up["chainage"], pipe, along, lines, (float(to_unit(way.begin)), float(to_unit(way.end))),
+        way,
+        strung_up["chainage"],
+        pipe,
+        along,
+        lines,
+        (float(to_unit(way.begin)), float(to_unit(way.end))),
         [(float(to_unit(a)), float(to_unit(b))) for a, b in parted],
         [(float(to_unit(at)), head, name) for at, head, name in beyond],
-        [device._replace(chainage=float(to_unit(device.chainage))) for device in _devices(result, way)],
-    )  # fmt: skip
+        [
+            device._replace(chainage=float(to_unit(device.chainage)))
+            for device in _devices(result, way)
+        ],
+    )
 
 
 def cavity_pressure(result) -> float | None:
@@ -375,10 +451,16 @@ def cavity_pressure(result) -> float | None:
     It is twice the vapour pressure under a density law that computes cavities. The result is None if the summary of
     the run has no vapour pressure.
     """
-    return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
+    return (
+        None
+        if result.summary["fluid"]["vapor_pressure"] is None
+        else result.case.law.cavity_pressure
+    )
 
 
-def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionPath) -> list[tuple[float, float]]:
+def _cavity_spans(
+    result, least: np.ndarray, chainage: np.ndarray, way: SectionPath
+) -> list[tuple[float, float]]:
     """Spans (begin, end) of chainage [m] around points whose least pressure is at most `cavity_pressure`.
 
     least : float64[n]  least pressures in the unit of the envelope; chainage : float64[n] [m]
@@ -390,10 +472,14 @@ def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionP
     low = envelope_column(result, "min_pressure").to_si(least) <= limit * (1.0 + 1e-9)
     middles = np.concatenate([[way.begin], 0.5 * (chainage[1:] + chainage[:-1]), [way.end]])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
-    return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [
+        (float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
 
 
-def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
+def _violations(
+    result, way: SectionPath, chainage: np.ndarray, along: dict
+) -> list[tuple[float, float, str]]:
     """Worst places on a path that violate limits on pressure or head : list of (chainage [m], head, name of the limit).
 
     chainage : float64[n]  chainages of the section [m]; along : quantity -> float64[n]  results of the section
@@ -409,7 +495,9 @@ def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> 
             at = float(leg.chainage(chainages.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:
                 line = along["min_head" if worst["bound"] == "minimum" else "max_head"]
-                violations.append((at, float(line[np.argmin(np.abs(chainage - at))]), verdict["name"]))
+                violations.append(
+                    (at, float(line[np.argmin(np.abs(chainage - at))]), verdict["name"])
+                )
     return violations
 
 
@@ -418,10 +506,19 @@ def _devices(result, way: SectionPath) -> list[SectionDevice]:
     case, devices = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]
-        kind = case.nodes[place].kind if place in case.nodes else case.nodes[owner].kind if owner in case.nodes else ""
+        kind = (
+            case.nodes[place].kind
+            if place in case.nodes
+            else case.nodes[owner].kind
+            if owner in case.nodes
+            else ""
+        )
         parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
-        parts += [f"{name} ({link.kind})" for name, link in case.links.items()
-                  if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
+        parts += [
+            f"{name} ({link.kind})"
+            for name, link in case.links.items()
+            if link.kind != "pipe" and place in link.ports.values()
+        ]
         devices.append(SectionDevice(chainage, place, tuple(parts)))
     return devices
 
@@ -448,8 +545,11 @@ def head_animations(result, ways: Iterable[SectionPath]) -> list[HeadAnimation]:
     frames = [(t, path) for t, path in read_series(index) if path.stem.isdecimal()]  # of pipes
     if not frames:
         return []
-    counts = default_cells({name: result.case.links[name] for name in result.envelope}, result.case.properties,
-                           result.case.numerics.cell_time)  # fmt: skip
+    counts = default_cells(
+        {name: result.case.links[name] for name in result.envelope},
+        result.case.properties,
+        result.case.numerics.cell_time,
+    )
     spots = [_cells_along(result, way, counts) for way in ways]
     n = sum(len(indices) for _, indices in spots)
     step = -(-len(frames) * n // MAX_NUMBERS)
@@ -478,5 +578,7 @@ def _cells_along(result, way: SectionPath, counts: dict[str, int]) -> tuple[np.n
         chainage.append(leg.chainage(x)[order])
         indices.append(first[leg.pipe] + np.arange(n)[order])
     chainage, indices = np.concatenate(chainage), np.concatenate(indices)
-    picked = np.unique(np.linspace(0, len(indices) - 1, min(MAX_POINTS, len(indices))).round().astype(int))
+    picked = np.unique(
+        np.linspace(0, len(indices) - 1, min(MAX_POINTS, len(indices))).round().astype(int)
+    )
     return envelope_column(result, "distance").from_si(chainage[picked]), indices[picked]

@@ -34,7 +34,8 @@ MAX_SHARED_BINS = 900  # greatest number of bins of all sections together
 MAX_PAPER_TITLE = 100  # greatest number of letters of the title on each printed page
 MAX_WARNINGS = 40  # greatest number on the page; summary.json has all
 SERIES_POINTS = 400  # greatest number of points of a series
-MAX_PROBES, MAX_SECTIONS = 6, 2  # greatest numbers of probes and sections of an event, from its first run
+# greatest numbers of probes and sections of an event, from its first run
+MAX_PROBES, MAX_SECTIONS = 6, 2
 MAX_FAILED_ROWS = 200  # greatest number of rows of limits that fail or are open
 CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
 
@@ -49,12 +50,17 @@ def page(result, ways: list[SectionPath]) -> str:
         told[MAX_WARNINGS:] = [f"{len(told) - MAX_WARNINGS} more in summary.json"]
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
     filled = {
-        "invalid": not_valid(result.summary), "title": visible(result.summary["title"] or result.summary["case"]),
-        "run": result.summary, "description": visible(result.case.description),
-        "source": visible(result.case.source), "ended": result.summary.get("ended", ""),
-        "words": tables.top_sentences(result), "limits": tables.verdict_table(result),
+        "invalid": not_valid(result.summary),
+        "title": visible(result.summary["title"] or result.summary["case"]),
+        "run": result.summary,
+        "description": visible(result.case.description),
+        "source": visible(result.case.source),
+        "ended": result.summary.get("ended", ""),
+        "words": tables.top_sentences(result),
+        "limits": tables.verdict_table(result),
         "worst": tables.extremes_of_pipes(result, ways) or probes,
-        "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
+        "sections": _sections(result, sections, figures),
+        "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
         "places": [*places, *[probes] * bool(probes and result.envelope)],
         "model": [*filter(None, tables.model_tables(result))],
@@ -62,7 +68,7 @@ def page(result, ways: list[SectionPath]) -> str:
         "told": told,
         "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
         "versions": tables.versions(result),
-    }  # fmt: skip
+    }
     return render_page("page", filled, figures)
 
 
@@ -71,23 +77,35 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
 
     name : "page" or "study"; filled : values of the template; figures : id -> data for plotly.js
     """
-    files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
-    texts = {key: (TEMPLATE_FOLDER / file).read_text(encoding="utf-8") for key, file in files.items()}
+    files = {
+        "table": "table.html.j2",
+        "page": f"{name}.html.j2",
+        "css": "page.css",
+        "js": "page.js",
+    }
+    texts = {
+        key: (TEMPLATE_FOLDER / file).read_text(encoding="utf-8") for key, file in files.items()
+    }
     jinja = import_library("jinja2")
     options = {"trim_blocks": True, "lstrip_blocks": True, "undefined": jinja.StrictUndefined}
-    environment = jinja.Environment(autoescape=True, **options)  # escapes all values, so that none becomes markup
+    # escapes all values, so that none becomes markup
+    environment = jinja.Environment(autoescape=True, **options)
     for function in (tables.page_rows, tables.numeric_columns, tables.left_out):
         environment.filters[function.__name__] = function
     title = filled["title"]
     if len(title) > MAX_PAPER_TITLE:
         title = f"{title[: MAX_PAPER_TITLE - 1]}\u2026"
     # in the CSS string all but ASCII letters and digits are escaped, so that the title cannot end the string
-    letters = [letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in title]
+    letters = [
+        letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} "
+        for letter in title
+    ]
     return environment.from_string(texts["table"] + texts["page"]).render(
         filled,
         css=texts["css"],
         script=texts["js"],
-        library=import_library("plotly.offline").get_plotlyjs(),  # so that the page needs no network
+        # so that the page needs no network
+        library=import_library("plotly.offline").get_plotlyjs(),
         figures=script_json(figures),
         dark=json.dumps(plots.DARK_COLOURS),
         paper=f'"{"".join(letters)}"',
@@ -109,15 +127,22 @@ def script_json(data: Any) -> str:
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Values for the template on each section, such as name and length; its figure is added to `figures`."""
     moving = head_animations(result, [item.way for item in sections])
-    height, along = envelope_column(result, "max_head").unit, envelope_column(result, "distance").unit
+    height = envelope_column(result, "max_head").unit
+    along = envelope_column(result, "distance").unit
     entries, bins = [], min(MAX_BINS, MAX_SHARED_BINS // max(len(sections), 1))
     for k, item in enumerate(sections):
         line = moving[k] if moving else None
         figures[f"section-{k}"] = plots.section_figure(item, line, height, along, bins)
-        entries.append({"id": f"section-{k}", "name": visible(item.way.name),
-                     "length": f"{value_text(envelope_column(result, 'distance').from_si(item.way.length))} {along}",
-                     "frames": 0 if line is None else len(line.times), "pipes": len(item.way.legs),
-                     "parted": bool(item.cavity_spans)})  # fmt: skip
+        entries.append(
+            {
+                "id": f"section-{k}",
+                "name": visible(item.way.name),
+                "length": f"{value_text(envelope_column(result, 'distance').from_si(item.way.length))} {along}",
+                "frames": 0 if line is None else len(line.times),
+                "pipes": len(item.way.legs),
+                "parted": bool(item.cavity_spans),
+            }
+        )
     return entries
 
 
@@ -129,7 +154,9 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     for k, panel in enumerate(plots.history_panels(result)):
         figures[f"history-{k}"] = plots.history_figure(panel, drawn["time_unit"], doubt)
         hidden = sum(not line.seen for line in panel.lines)
-        entries.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
+        entries.append(
+            {"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden}
+        )
     return entries
 
 
@@ -138,32 +165,53 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
     figures: dict[str, Any] = {}
     first = runs[0][1]
     events = [
-        {"id": f"event-{k}", "name": visible(name or "All runs"), "figures": event_figures(name, k, runs, figures)}
+        {
+            "id": f"event-{k}",
+            "name": visible(name or "All runs"),
+            "figures": event_figures(name, k, runs, figures),
+        }
         for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))
     ]
     filled = {
-        "title": visible(study["title"] or study["study"]), "said": study, "case": visible(first.summary["case"]),
+        "title": visible(study["title"] or study["study"]),
+        "said": study,
+        "case": visible(first.summary["case"]),
         "ended": max(result.summary.get("ended", "") for _, result in runs),
-        "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
-        "words": study_sentences(study, runs), "matrix": [run_matrix(runs)], "events": events,
-        "failing": failing_limits(runs), "changes": change_tables(study), "first": run_name(runs[0][0]),
+        "version": first.summary["versions"]["fvsolve"],
+        "description": visible(first.case.description),
+        "words": study_sentences(study, runs),
+        "matrix": [run_matrix(runs)],
+        "events": events,
+        "failing": failing_limits(runs),
+        "changes": change_tables(study),
+        "first": run_name(runs[0][0]),
         "model": [table for table in tables.model_tables(first) if table is not None],
-        "told": warning_texts(runs), "versions": tables.versions(first),
-    }  # fmt: skip
+        "told": warning_texts(runs),
+        "versions": tables.versions(first),
+    }
     return render_page("study", filled, figures)
 
 
 def run_name(row: dict[str, Any]) -> str:
     """Name of a run from its event and protection, such as `trip with vessel`; row : row of study.json."""
-    return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
+    return visible(
+        " with ".join(name for name in (row["event"], row["protection"]) if name) or "the case"
+    )
 
 
 def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
     """Sentences at the top of the report of a study, on runs that stopped early or are not valid, and on limits."""
-    sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
-             for row, result in runs if result.reason != "finished"]  # fmt: skip
-    sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
-              for row, result in runs for item in result.warnings if not item.ok]  # fmt: skip
+    sentences = [
+        Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
+        for row, result in runs
+        if result.reason != "finished"
+    ]
+    sentences += [
+        Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
+        for row, result in runs
+        for item in result.warnings
+        if not item.ok
+    ]
     if doubted := [item for item in runs if item[1].marks]:
         marks = [mark for _, result in doubted for mark in result.marks]
         reasons = {mark.what: mark.text.partition(": ")[2].partition(";")[0] for mark in marks}
@@ -175,7 +223,9 @@ def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
     names = [visible(name) or "the unchanged case" for name in study["holds"]]
     without = "" if all("resolution" in row for row, _ in runs) else tables.WITHOUT_ERROR
     if names:
-        sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", without))
+        sentences.append(
+            Sentence("good", f"All limits hold in all events with {', '.join(names)}.", without)
+        )
     else:
         sentences.append(Sentence("bad", "No protection holds all limits in all events.", ""))
     if failed := [item for item in runs if run_state(item[1]) == FAILS]:
@@ -208,12 +258,17 @@ def run_matrix(runs: list) -> ResultTable:
     for row, result in runs:
         verdicts = {verdict.name: verdict for verdict in result.verdicts}
         no_margin = not_valid(result.summary) or None
-        margins = [no_margin if key == "margin" and value is None and name in verdicts else value
-                   for name in names for key in ("margin", *["error"] * with_error)
-                   for value in [getattr(verdicts.get(name), key, None)]]  # fmt: skip
+        margins = [
+            no_margin if key == "margin" and value is None and name in verdicts else value
+            for name in names
+            for key in ("margin", *["error"] * with_error)
+            for value in [getattr(verdicts.get(name), key, None)]
+        ]
         rows.append([run_name(row), IN_WORDS.get(run_state(result), ""), *margins])
     heads = ["run", "verdict"]
-    heads += [word for name in names for word in (f"margin of {name}", *[ERROR_HEADER] * with_error)]
+    heads += [
+        word for name in names for word in (f"margin of {name}", *[ERROR_HEADER] * with_error)
+    ]
     units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + with_error)]
     bad = frozenset(k for k, (_, result) in enumerate(runs) if run_state(result) == FAILS)
     return ResultTable.of("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
@@ -223,25 +278,61 @@ def failing_limits(runs: list) -> ResultTable:
     """Table of the limits that fail or are open in each run, with position and time."""
     length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
     pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
-    rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
-             span(item.unit), item.place, in_unit(length, item.chainage), in_unit(time, item.time)]
-            for row, result in runs for item in result.verdicts if not item.ok]  # fmt: skip
-    heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst place", "chainage", "time")
+    rows = [
+        [
+            run_name(row),
+            item.name,
+            IN_WORDS[item.state],
+            item.value,
+            item.limit,
+            item.unit,
+            item.margin,
+            span(item.unit),
+            item.place,
+            in_unit(length, item.chainage),
+            in_unit(time, item.time),
+        ]
+        for row, result in runs
+        for item in result.verdicts
+        if not item.ok
+    ]
+    heads = (
+        "run",
+        "limit",
+        "verdict",
+        "value",
+        "allowed",
+        "unit",
+        "margin",
+        "unit",
+        "worst place",
+        "chainage",
+        "time",
+    )
     units = ("",) * 9 + (length.unit, time.unit)
-    return ResultTable.of("", heads, rows, units, mixed=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
+    return ResultTable.of(
+        "", heads, rows, units, mixed=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages
+    )
 
 
 def change_tables(study: dict[str, Any]) -> list[ResultTable]:
     """Tables of the keys that events and protections set, with their values in TOML."""
     tables = []
     for group in ("events", "protections"):
-        rows = [[name, key, inline(value)]
-                for name, keys in study["changes"][group].items() for key, value in keys.items()]  # fmt: skip
-        tables += [ResultTable.of(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
+        rows = [
+            [name, key, inline(value)]
+            for name, keys in study["changes"][group].items()
+            for key, value in keys.items()
+        ]
+        tables += (
+            [ResultTable.of(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
+        )
     return tables
 
 
-def event_figures(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
+def event_figures(
+    event: str | None, number: int, runs: list, figures: dict[str, Any]
+) -> list[dict[str, Any]]:
     """Values for the template on the figures of an event, each of which shows the runs of all protections.
 
     event : name of the event; number : its number, for the keys under which the figures are added to `figures`
@@ -249,18 +340,33 @@ def event_figures(event: str | None, number: int, runs: list, figures: dict[str,
     own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
     runs_drawn = [(name, result, section_paths(result)) for name, result in own]
     entries = []
-    for k, first in enumerate(next((paths for *_, paths in runs_drawn if paths), [])[:MAX_SECTIONS]):
-        several = [(name, section_of(result, path)) for name, result, paths in runs_drawn
-                   for path in paths if path.name == first.name]  # fmt: skip
-        height, along = envelope_column(own[0][1], "max_head").unit, envelope_column(own[0][1], "distance").unit
+    for k, first in enumerate(
+        next((paths for *_, paths in runs_drawn if paths), [])[:MAX_SECTIONS]
+    ):
+        several = [
+            (name, section_of(result, path))
+            for name, result, paths in runs_drawn
+            for path in paths
+            if path.name == first.name
+        ]
+        height = envelope_column(own[0][1], "max_head").unit
+        along = envelope_column(own[0][1], "distance").unit
         figures[f"section-{number}-{k}"] = plots.study_section_figure(several, height, along)
-        entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
+        entries.append(
+            {"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION}
+        )
     shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
     for k, probe in enumerate(shared[:MAX_PROBES]):
-        lines = [plots.Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
-                 for name, result in own]  # fmt: skip
+        lines = [
+            plots.Series(
+                name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True
+            )
+            for name, result in own
+        ]
         panel = plots.HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
-        figures[f"history-{number}-{k}"] = plots.history_figure(panel, own[0][1].summary["time_unit"], None)
+        figures[f"history-{number}-{k}"] = plots.history_figure(
+            panel, own[0][1].summary["time_unit"], None
+        )
         entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})
     return entries
 
@@ -272,6 +378,7 @@ def warning_texts(runs: list) -> list[str]:
         for item in result.warnings:
             by_text.setdefault(item.text, []).append(run_name(row))
     texts = [
-        f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})" for text, names in by_text.items()
+        f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})"
+        for text, names in by_text.items()
     ]
     return [visible(item) for item in texts[:MAX_WARNINGS]]

@@ -21,22 +21,38 @@ from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visibl
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.report import import_library, page, tables
 from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
-from fvsolve.report.long_section import Section, SectionPath, envelope_column, head_window, section_of, section_paths
+from fvsolve.report.long_section import (
+    Section,
+    SectionPath,
+    envelope_column,
+    head_window,
+    section_of,
+    section_paths,
+)
 from fvsolve.report.tables import is_number
 from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
 
 PAGE_FILE = "report.html"
 MAX_COLUMN_WIDTH = 60  # greatest initial width of a column [letters]
-MAX_SHEET_NAME = 31  # greatest length of the name of a sheet [letters]; it must not contain these signs:
+# greatest length of the name of a sheet [letters]; it must not contain these signs:
+MAX_SHEET_NAME = 31
 FORBIDDEN_SIGNS = "[]:*?/\\'"
-SECTION_HEADERS = {"elevation": "elevation", "initial_head": "initial head", "min_head": "minimum head",
-         "max_head": "maximum head", "min_pressure": "minimum pressure",
-         "max_pressure": "maximum pressure", "t_min": "time of the minimum",
-         "t_max": "time of the maximum"}  # fmt: skip
+SECTION_HEADERS = {
+    "elevation": "elevation",
+    "initial_head": "initial head",
+    "min_head": "minimum head",
+    "max_head": "maximum head",
+    "min_pressure": "minimum pressure",
+    "max_pressure": "maximum pressure",
+    "t_min": "time of the minimum",
+    "t_max": "time of the maximum",
+}
 
 
-def write_report(directory: str | Path, out: str | Path | None = None, xlsx: bool = False) -> list[Path]:
+def write_report(
+    directory: str | Path, out: str | Path | None = None, xlsx: bool = False
+) -> list[Path]:
     """Write the HTML report of the directory of a run or a study; returns the paths of the page and of the workbook.
 
     The report of a study also writes report.html into the directory of each of its runs; these paths are not returned.
@@ -52,7 +68,11 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
     result = open_checked_run(Path(directory))
     sections = section_paths(result)
     write_page(path, page.page(result, sections))
-    return [path, write_tables(workbook_tables(result, sections), path.with_suffix(".xlsx"))] if xlsx else [path]
+    return (
+        [path, write_tables(workbook_tables(result, sections), path.with_suffix(".xlsx"))]
+        if xlsx
+        else [path]
+    )
 
 
 def write_page(path: Path, text: str) -> None:
@@ -74,7 +94,9 @@ def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
     for row in study["runs"]:
         own, result = Path(row["directory"]) / PAGE_FILE, open_checked_run(Path(row["directory"]))
         write_page(own, page.page(result, section_paths(result)))
-        runs.append((row | {"page": quote(os.path.relpath(own, path.parent).replace(os.sep, "/"))}, result))
+        runs.append(
+            (row | {"page": quote(os.path.relpath(own, path.parent).replace(os.sep, "/"))}, result)
+        )
     write_page(path, page.study_page(study, runs))
     return [path, write_tables(study_tables(runs), path.with_suffix(".xlsx"))] if xlsx else [path]
 
@@ -83,11 +105,16 @@ def open_checked_run(directory: Path):
     """Open the run in a directory and check that its tables are complete; raises RunError otherwise."""
     if not directory.is_dir():
         problem = "is a file" if directory.exists() else "does not exist"
-        raise RunError(f"{directory} {problem}; expected a run directory, as written by fvsolve run CASE --out DIR")
+        raise RunError(
+            f"{directory} {problem}; expected a run directory, as written by fvsolve run CASE --out DIR"
+        )
     if not (directory / "summary.json").is_file() and (directory / "restart.npz").is_file():
         resume = f"fvsolve run CASE --out {directory} --resume"
-        raise RunError(f"{directory} holds an unfinished run: continue it with {resume}, then report it")
-    result, again = open_run(directory), f"run the case again with fvsolve run CASE --out {directory} --force"
+        raise RunError(
+            f"{directory} holds an unfinished run: continue it with {resume}, then report it"
+        )
+    result = open_run(directory)
+    again = f"run the case again with fvsolve run CASE --out {directory} --force"
     pipes = {name: link.length for name, link in result.case.links.items() if link.kind == "pipe"}
     for pipe, length in pipes.items():
         arrays = result.envelope.get(pipe, {})
@@ -107,7 +134,9 @@ def write_tables(report_tables: list[ResultTable], path: Path) -> Path:
     plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
     taken: set[str] = set()
     with replacing(path) as fresh:
-        book = import_library("xlsxwriter").Workbook(str(fresh), {**plain, "nan_inf_to_errors": True})
+        book = import_library("xlsxwriter").Workbook(
+            str(fresh), {**plain, "nan_inf_to_errors": True}
+        )
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
         for table in report_tables:
             _write_sheet(book, table, _sheet_name(table.title, taken), bold)
@@ -115,13 +144,17 @@ def write_tables(report_tables: list[ResultTable], path: Path) -> Path:
             book.close()
         except Exception as error:  # XlsxWriter wraps errors of the operating system
             reason = getattr(error.args[0] if error.args else error, "strerror", None) or error
-            raise FvsolveError(f"{path}: cannot be written: {reason}; choose another file with --out") from None
+            raise FvsolveError(
+                f"{path}: cannot be written: {reason}; choose another file with --out"
+            ) from None
     return path
 
 
 def workbook_tables(result, sections: list[SectionPath]) -> list[ResultTable]:
     """All tables of a run for a workbook; a table of a section has a row for each point."""
-    words = ResultTable.of("Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)])
+    words = ResultTable.of(
+        "Summary", ("", ""), [[item.head, item.text] for item in tables.top_sentences(result)]
+    )
     warnings = [[item.kind, item.place, item.text] for item in result.warnings]
     notes = ResultTable.of("Warnings", ("kind", "place", "text"), warnings)
     contents = [
@@ -151,19 +184,30 @@ def study_tables(runs: list) -> list[ResultTable]:
             along = _section_table(result, section_of(result, way))
             title = f"{Path(row['directory']).name} {way.name}"
             rows = [[page.run_name(row), *cells] for cells in along.rows]
-            contents.append(replace(along, title=title, rows=rows, columns=[Column(header="run"), *along.columns]))
+            contents.append(
+                replace(
+                    along, title=title, rows=rows, columns=[Column(header="run"), *along.columns]
+                )
+            )
     return contents
 
 
 def _section_table(result, sec: Section) -> ResultTable:
     """Table of a long section, with a row for each point."""
     head = envelope_column(result, "min_head").unit
-    columns = [sec.chainage, sec.pipe, *(sec.along[name] for name in SECTION_HEADERS), *sec.lines.values()]
+    columns = [
+        sec.chainage,
+        sec.pipe,
+        *(sec.along[name] for name in SECTION_HEADERS),
+        *sec.lines.values(),
+    ]
     heads = ["chainage", "pipe", *SECTION_HEADERS.values(), *sec.lines]
     units = [envelope_column(result, "distance").unit, ""]
     units += [envelope_column(result, name).unit for name in SECTION_HEADERS]
     rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
-    return ResultTable.of(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
+    return ResultTable.of(
+        f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)]
+    )
 
 
 def _write_sheet(book, table: ResultTable, name: str, bold) -> None:
@@ -186,7 +230,10 @@ def _write_sheet(book, table: ResultTable, name: str, bold) -> None:
 
 def _sheet_name(title: str, taken: set[str]) -> str:
     """Valid name for a sheet, from a title; it differs from all names in `taken`, to which it is added."""
-    plain = "".join("-" if sign in FORBIDDEN_SIGNS else sign for sign in visible(title)).strip() or "table"
+    plain = (
+        "".join("-" if sign in FORBIDDEN_SIGNS else sign for sign in visible(title)).strip()
+        or "table"
+    )
     name, k = plain[:MAX_SHEET_NAME], 1
     while name.casefold() in taken:
         k += 1
@@ -196,7 +243,11 @@ def _sheet_name(title: str, taken: set[str]) -> str:
 
 
 def write_pictures(
-    directory: str | Path, probes: str = "", route: str = "", phases: Sequence[str] = (), out: str | Path | None = None
+    directory: str | Path,
+    probes: str = "",
+    route: str = "",
+    phases: Sequence[str] = (),
+    out: str | Path | None = None,
 ) -> list[Path]:
     """Write pictures of a run into the folder `out` (default: the run directory); returns their paths.
 
@@ -206,7 +257,8 @@ def write_pictures(
     Raises RunError if the directory holds no finished run, FvsolveError with all unknown names, or if there is nothing
     to draw.
     """
-    result, folder = open_checked_run(Path(directory)), Path(out) if out is not None else Path(directory)
+    result = open_checked_run(Path(directory))
+    folder = Path(out) if out is not None else Path(directory)
     faults: list[str] = []
     picked = parse_probes(result, probes, faults)
     pairs = []
@@ -231,13 +283,23 @@ def write_pictures(
         data = result.history_drawn()
         columns = [result.probes.index(name) for name in picked]
         measured = {name: series for name, series in data["measured"].items() if name in picked}
-        drawn["probes.png"] = history_figure(**{**data, "values": data["values"][:, columns], "measured": measured,
-                                                "probes": [data["probes"][k] for k in columns]})  # fmt: skip
+        drawn["probes.png"] = history_figure(
+            **{
+                **data,
+                "values": data["values"][:, columns],
+                "measured": measured,
+                "probes": [data["probes"][k] for k in columns],
+            }
+        )
     if pairs:
-        drawn["phase.png"] = phase_figure([[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title)
+        drawn["phase.png"] = phase_figure(
+            [[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title
+        )
     if not drawn:
         reason = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
-        raise FvsolveError(f"{directory}: the {reason}, so it has no long section; choose --probes or --phase X:Y")
+        raise FvsolveError(
+            f"{directory}: the {reason}, so it has no long section; choose --probes or --phase X:Y"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
         save_if_path(figure, folder / name)
@@ -266,7 +328,9 @@ def _unknown_probe(result, name: str) -> str:
     return f"{show(name)}: unknown probe{hint}"
 
 
-def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faults: list[str]) -> list[SectionPath]:
+def _chosen_sections(
+    sections: list[SectionPath], route: str, others: bool, faults: list[str]
+) -> list[SectionPath]:
     """Sections to draw: the section `route`, or all sections unless `others` (probes or phase planes) are drawn.
 
     Adds an unknown route to `faults`.

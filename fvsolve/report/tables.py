@@ -24,7 +24,8 @@ from fvsolve.units import DIMENSIONS, span
 
 DIGITS = 5  # significant digits of the greatest number of a column
 DECIMALS = 6  # greatest number of decimals, unless the least number of the column needs more
-MAX_SHARED_DIGITS = 7  # greatest number of digits after the first if all numbers of a column have the same decimals
+# greatest number of digits after the first if all numbers of a column have the same decimals
+MAX_SHARED_DIGITS = 7
 ERROR_HEADER = "\u00b1"  # header of columns of errors, shown with two digits
 # Spaces: between thousands, as wide as a digit, as wide as a point.
 NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = "\u202f", "\u2007", "\u2008"
@@ -50,13 +51,18 @@ def page_rows(table: ResultTable) -> list[list[str]]:
 def numeric_columns(table: ResultTable) -> list[bool]:
     """List with True for each column that contains numbers and no words; it is then aligned to the right."""
     columns = [*zip(*table.values, strict=True)] or [()] * len(table.columns)
-    return [any(map(is_number, cells)) and not any(isinstance(value, str) for value in cells) for cells in columns]
+    return [
+        any(map(is_number, cells)) and not any(isinstance(value, str) for value in cells)
+        for cells in columns
+    ]
 
 
 def left_out(table: ResultTable) -> str:
     """Note below a table that has more rows than the page shows; "" if all rows are shown."""
     hidden = len(table.rows) - table.most
-    text = f"{hidden} more row{'' if hidden == 1 else 's'}: {table.more or 'in the workbook (--xlsx)'}"
+    text = (
+        f"{hidden} more row{'' if hidden == 1 else 's'}: {table.more or 'in the workbook (--xlsx)'}"
+    )
     return text if hidden > 0 else ""
 
 
@@ -71,7 +77,11 @@ def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
     """
     places = None if loose else decimal_places([value for value in values if is_number(value)])
     words = [value_text(value, places) for value in values]
-    behind = [text.partition(".")[1:] for text, value in zip(words, values, strict=True) if is_number(value)]
+    behind = [
+        text.partition(".")[1:]
+        for text, value in zip(words, values, strict=True)
+        if is_number(value)
+    ]
     widest = max((len(rest) for point, rest in behind if point), default=-1)
     if widest < 0:
         return words
@@ -89,7 +99,11 @@ def decimal_places(numbers: Sequence[float]) -> int | None:
         return 0
     top = math.floor(math.log10(max(sizes)))
     places = min(max(DIGITS - 1 - top, 0), DECIMALS)
-    least = 0 if all(float(size).is_integer() for size in sizes) else 1 - math.floor(math.log10(min(sizes)))
+    least = (
+        0
+        if all(float(size).is_integer() for size in sizes)
+        else 1 - math.floor(math.log10(min(sizes)))
+    )
     places = max(places, least)
     if top > 9 or top + places > MAX_SHARED_DIGITS:
         return None
@@ -129,10 +143,12 @@ def _digits(value: float) -> str:
 FULL_VALUES_NOTE = "in case.toml and in the workbook (--xlsx)"
 MAX_VALUE_LENGTH = 120  # greatest number of letters of a value
 FLUID_ROWS = (
-    ("density", "density", "density"), ("bulk_modulus", "bulk modulus", "modulus"),
-    ("sound_speed", "speed of sound", "velocity"), ("viscosity", "viscosity", "viscosity"),
+    ("density", "density", "density"),
+    ("bulk_modulus", "bulk modulus", "modulus"),
+    ("sound_speed", "speed of sound", "velocity"),
+    ("viscosity", "viscosity", "viscosity"),
     ("vapor_pressure", "vapour pressure", "pressure"),
-)  # fmt: skip
+)
 # Keys in other columns, or only for pictures.
 HIDDEN_KEYS = ("position", "elevation", "type", "from", "to", "ports", "scalars")
 
@@ -151,7 +167,13 @@ def fluid(result) -> ResultTable:
         value = "unknown" if liquid[key] is None else value_text(float(shown.from_si(liquid[key])))
         rows.append([words, value, shown.unit])
     ambient = column("", "pressure", case)
-    rows.append(["ambient pressure", value_text(float(ambient.from_si(case.ambient_pressure))), ambient.unit])
+    rows.append(
+        [
+            "ambient pressure",
+            value_text(float(ambient.from_si(case.ambient_pressure))),
+            ambient.unit,
+        ]
+    )
     gravity = column("", "acceleration", case)
     rows.append(["gravity", value_text(float(gravity.from_si(case.gravity))), gravity.unit])
     rows += [["density law", case.fluid.law, ""], ["source", liquid["source"], ""]]
@@ -172,7 +194,11 @@ def pipes(result) -> ResultTable | None:
     for name, link in links.items():
         ends = [link.ports["from"], link.ports["to"]]
         sizes = [float(length.from_si(link.length)), float(length.from_si(link.diameter))]
-        heights = [case.elevation(end) for end in ends] if link.profile is None else link.profile.elevation[[0, -1]]
+        heights = (
+            [case.elevation(end) for end in ends]
+            if link.profile is None
+            else link.profile.elevation[[0, -1]]
+        )
         heights = [float(height.from_si(item)) for item in heights] if stated else []
         points = [None if link.profile is None else len(link.profile.chainage)] if profiled else []
         friction = _value_text(type(link).values()["friction"], plain_value(link.friction), case)
@@ -198,9 +224,18 @@ def walls(result) -> ResultTable | None:
         wall = None if wall == "rigid" else wall
         if wall is None and allowed is None:
             continue
-        row = [name, None if allowed is None else float(allowable.span_from_si(allowed)), None, None, link.source or ""]
+        row = [
+            name,
+            None if allowed is None else float(allowable.span_from_si(allowed)),
+            None,
+            None,
+            link.source or "",
+        ]
         if wall is not None:
-            row[2:4] = float(thick.from_si(wall.thickness)), float(modulus.from_si(wall.youngs_modulus))
+            row[2:4] = (
+                float(thick.from_si(wall.thickness)),
+                float(modulus.from_si(wall.youngs_modulus)),
+            )
         rows.append(row)
     heads = ("pipe", "allowable", "wall", "modulus", "source")
     units = ("", allowable.span_unit, thick.unit, modulus.unit)
@@ -223,23 +258,31 @@ def parts(result) -> ResultTable:
                 texts.append(f"{key.replace('_', ' ')} {_value_text(values.get(key), value, case)}")
         rows.append([name, part.kind, joins, *lies, " \u00b7 ".join(texts)])
     heads = ("part", "kind", "connects", *["elevation"] * stated, "keys")
-    return ResultTable.of("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE)
+    return ResultTable.of(
+        "Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE
+    )
 
 
 def _value_text(value: Any, given: Any, case) -> str:
     """Text of the value of a key in the units of [output]; value : declaration of the key, given : its value in SI."""
     dimension = getattr(value, "dimension", None)
     if isinstance(given, dict):
-        texts = [f"{key.replace('_', ' ')} {_value_text(_value_of_key(value, key), item, case)}"
-                 for key, item in given.items()]  # fmt: skip
+        texts = [
+            f"{key.replace('_', ' ')} {_value_text(_value_of_key(value, key), item, case)}"
+            for key, item in given.items()
+        ]
         text = f"({', '.join(texts)})"
     elif isinstance(given, bool) or isinstance(given, str):
         text = inline(given).strip('"')
-    elif dimension is None or not all(map(is_number, given if isinstance(given, list) else [given])):
+    elif dimension is None or not all(
+        map(is_number, given if isinstance(given, list) else [given])
+    ):
         text = inline(given)
     else:
         shown = _pressure_column(column("", dimension, case), case)
-        numbers = [float(shown.from_si(item)) for item in (given if isinstance(given, list) else [given])]
+        numbers = [
+            float(shown.from_si(item)) for item in (given if isinstance(given, list) else [given])
+        ]
         joined = ", ".join(value_text(item) for item in numbers)
         unit = "" if dimension == "number" else f" {shown.unit}"
         text = f"[{joined}]{unit}" if isinstance(given, list) else f"{joined}{unit}"
@@ -258,7 +301,8 @@ def _value_of_key(value: Any, key: str) -> Any:
         result = value.below(key)
     except (AttributeError, KeyError):
         result = None
-    return Quantity(key) if result is None and key in DIMENSIONS else result  # columns of a curve, such as `flow`
+    # columns of a curve, such as `flow`
+    return Quantity(key) if result is None and key in DIMENSIONS else result
 
 
 def _pressure_column(shown, case):
@@ -280,7 +324,8 @@ EXTREMES = (  # quantity, its text, function of the index of the extreme, quanti
     ("max_head", "maximum head", np.argmax, "t_max"),
     ("min_head", "minimum head", np.argmin, "t_min"),
 )
-LEDGER_UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars, in kg times their unit, show none
+# units of ledgers; ledgers of scalars, in kg times their unit, show none
+LEDGER_UNITS = {"mass": "kg", "energy": "J"}
 LEDGER_TERMS = ("initial", "inflow", "outflow", "heated", "spilled", "made_up", "final")
 
 
@@ -301,13 +346,19 @@ def top_sentences(result) -> list[Sentence]:
     summary = result.summary
     rows = []
     if result.reason != "finished":
-        reached, end = (result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end))
+        reached, end = (
+            result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end)
+        )
         text = f"{result.reason}. The run reached t = {reached} of {end}; later values are unknown."
         rows.append(Sentence("bad", "This run stopped early.", text))
-    rows += [Sentence("bad", "Not to be trusted.", item.text) for item in result.warnings if not item.ok]
+    rows += [
+        Sentence("bad", "Not to be trusted.", item.text) for item in result.warnings if not item.ok
+    ]
     rows += [*_mark_sentences(result), verdict_sentence(result)]
-    for state, level, head in ((FAILS, "bad", "The run does not meet an expected value of the case."),
-                               (OPEN, "doubt", "The verdict of an expected value is open.")):  # fmt: skip
+    for state, level, head in (
+        (FAILS, "bad", "The run does not meet an expected value of the case."),
+        (OPEN, "doubt", "The verdict of an expected value is open."),
+    ):
         if claims := [item for item in result.expectations if item.state == state]:
             first = claims[0]
             text = f"{first.text}: expected {first.claimed:.6g}, computed {value_text(first.found)} {first.unit}"
@@ -327,7 +378,11 @@ def _mark_sentences(result) -> list[Sentence]:
     when = [result.case.amount(mark.time, "time", 6) for mark in marks]
     places = [f"{mark.place.partition('.')[2]} at {t}" for mark, t in zip(marks, when, strict=True)]
     later = ", ".join(places[1 : 1 + MAX_LATER_MARKS])
-    more = f", and {len(marks) - 1 - MAX_LATER_MARKS} more places" if len(marks) > 1 + MAX_LATER_MARKS else ""
+    more = (
+        f", and {len(marks) - 1 - MAX_LATER_MARKS} more places"
+        if len(marks) > 1 + MAX_LATER_MARKS
+        else ""
+    )
     text = marks[0].text + (f". Later also {later}{more}" if later else "")
     return [Sentence("doubt", f"Results from {when[0]} on are not to be trusted.", text)]
 
@@ -345,14 +400,21 @@ def verdict_sentence(result) -> Sentence:
     failed = [item.name for item, state in zip(verdicts, states, strict=True) if state == FAILS]
     if failed:
         text = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
-        return Sentence("bad", f"{text} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
+        return Sentence(
+            "bad", f"{text} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed)
+        )
     unsure = [item.name for item, state in zip(verdicts, states, strict=True) if state == OPEN]
     if unsure:
-        return Sentence("doubt", f"The verdict of {'limits' if len(unsure) > 1 else 'a limit'} is open.",
-                    f"{', '.join(unsure)}: {open_reason(result)}.")  # fmt: skip
+        return Sentence(
+            "doubt",
+            f"The verdict of {'limits' if len(unsure) > 1 else 'a limit'} is open.",
+            f"{', '.join(unsure)}: {open_reason(result)}.",
+        )
     summary = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
     if result.reason == "finished" and result.ok and not result.marks:
-        return Sentence("good", f"{summary}.", "" if "resolution" in result.summary else WITHOUT_ERROR)
+        return Sentence(
+            "good", f"{summary}.", "" if "resolution" in result.summary else WITHOUT_ERROR
+        )
     return Sentence("doubt", f"{summary}, as far as results are reliable.", "")
 
 
@@ -373,19 +435,47 @@ def verdict_table(result) -> ResultTable:
     """Table of the verdicts on limits, violated limits first."""
     order = (FAILS, OPEN, HOLDS)
     ordered = sorted(result.verdicts, key=lambda check: order.index(check.state))
-    length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
+    length, height, time = (
+        column("", dimension, result.case) for dimension in ("length", "head", "time")
+    )
     errors = any(check.error is not None for check in ordered)
     rows = []
     for check in ordered:
         limit = f"{value_text(check.limit)} {check.unit}"
         requirement = f"{check.quantity.replace('_', ' ')} {BOUND_WORDS[check.bound]} {limit}"
         margin_unit = span(check.unit)
-        unit_text = check.unit if margin_unit == check.unit else f"{check.unit}, margin {margin_unit}"
-        place = in_unit(length, check.chainage), in_unit(height, check.elevation), in_unit(time, check.time)
+        unit_text = (
+            check.unit if margin_unit == check.unit else f"{check.unit}, margin {margin_unit}"
+        )
+        place = (
+            in_unit(length, check.chainage),
+            in_unit(height, check.elevation),
+            in_unit(time, check.time),
+        )
         margin = not_valid(result.summary) or None if check.margin is None else check.margin
-        rows.append([check.name, requirement, IN_WORDS[check.state], check.value, *[check.error] * errors, margin,
-                     unit_text, check.place, *place])  # fmt: skip
-    heads = ("limit", "requirement", "verdict", "value", *[ERROR_HEADER] * errors, "margin", "unit", "worst place")
+        rows.append(
+            [
+                check.name,
+                requirement,
+                IN_WORDS[check.state],
+                check.value,
+                *[check.error] * errors,
+                margin,
+                unit_text,
+                check.place,
+                *place,
+            ]
+        )
+    heads = (
+        "limit",
+        "requirement",
+        "verdict",
+        "value",
+        *[ERROR_HEADER] * errors,
+        "margin",
+        "unit",
+        "worst place",
+    )
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, check in enumerate(ordered) if check.state == FAILS)
     units = ("",) * (7 + errors) + (length.unit, height.unit, time.unit)
@@ -394,32 +484,67 @@ def verdict_table(result) -> ResultTable:
 
 def worst_tables(result) -> list[ResultTable]:
     """Tables of the positions with the least margins, for each limit with more than one part or bound."""
-    length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
+    length, height, time = (
+        column("", dimension, result.case) for dimension in ("length", "head", "time")
+    )
     tables = []
     for check in result.verdicts:
         keys = ((length, "chainage"), (height, "elevation"), (time, "time"))
         errors = any(row["error"] is not None for row in check.worst)
-        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in keys), row["value"],
-                 *[row["error"]] * errors, BOUND_WORDS[row["bound"]], row["limit"], row["margin"],
-                 IN_WORDS[row["state"]]] for row in check.worst]  # fmt: skip
+        rows = [
+            [
+                row["place"],
+                *(in_unit(shown, row[key]) for shown, key in keys),
+                row["value"],
+                *[row["error"]] * errors,
+                BOUND_WORDS[row["bound"]],
+                row["limit"],
+                row["margin"],
+                IN_WORDS[row["state"]],
+            ]
+            for row in check.worst
+        ]
         bad = frozenset(k for k, row in enumerate(check.worst) if row["state"] == FAILS)
         margin_unit = span(check.unit)
-        units = ("", length.unit, height.unit, time.unit, check.unit, *[margin_unit] * errors, "", check.unit,
-                 margin_unit, "")  # fmt: skip
-        heads = ("place", "chainage", "elevation", "time", check.quantity.replace("_", " "), *[ERROR_HEADER] * errors)
+        units = (
+            "",
+            length.unit,
+            height.unit,
+            time.unit,
+            check.unit,
+            *[margin_unit] * errors,
+            "",
+            check.unit,
+            margin_unit,
+            "",
+        )
+        heads = (
+            "place",
+            "chainage",
+            "elevation",
+            "time",
+            check.quantity.replace("_", " "),
+            *[ERROR_HEADER] * errors,
+        )
         heads += ("", "limit", "margin", "verdict")
         if len(rows) > 1:
-            tables.append(ResultTable.of(f"Limit {check.name}: worst places", heads, rows, units, bad))
+            tables.append(
+                ResultTable.of(f"Limit {check.name}: worst places", heads, rows, units, bad)
+            )
     return tables
 
 
 def claim_table(result) -> ResultTable:
     """Table of the expected values of the case and of the computed values."""
-    rows = [[item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
-            for item in result.expectations]  # fmt: skip
+    rows = [
+        [item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
+        for item in result.expectations
+    ]
     bad = frozenset(k for k, item in enumerate(result.expectations) if item.state == FAILS)
     heads = ("expectation", "expected", "computed", "tolerance", "unit", "verdict")
-    return ResultTable.of("Expected values of the case", heads, rows, bad=bad, mixed=frozenset({1, 2, 3}))
+    return ResultTable.of(
+        "Expected values of the case", heads, rows, bad=bad, mixed=frozenset({1, 2, 3})
+    )
 
 
 def extremes_of_pipes(result, ways: list[SectionPath]) -> ResultTable | None:
@@ -440,15 +565,42 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ResultTable | None:
         pipes = list(ends)
         pipe = pipes[int(most([envelope[key][name][ends[key]] for key in pipes]))]
         arrays, k = envelope[pipe], ends[pipe]
-        value, distance, height, time = (float(arrays[key][k]) for key in (name, "distance", "elevation", when))
+        value, distance, height, time = (
+            float(arrays[key][k]) for key in (name, "distance", "elevation", when)
+        )
         leg = legs.get(pipe)
-        chainage = None if leg is None else float(along.from_si(leg.chainage(along.to_si(arrays["distance"][k]))))
-        rows.append([words, value, envelope_column(result, name).unit, pipe, distance, *[chainage] * bool(legs),
-                     height, time])  # fmt: skip
+        chainage = (
+            None
+            if leg is None
+            else float(along.from_si(leg.chainage(along.to_si(arrays["distance"][k]))))
+        )
+        rows.append(
+            [
+                words,
+                value,
+                envelope_column(result, name).unit,
+                pipe,
+                distance,
+                *[chainage] * bool(legs),
+                height,
+                time,
+            ]
+        )
     keys = ("distance", *["distance"] * bool(legs), "elevation", "t_max")
     units = [envelope_column(result, key).unit for key in keys]
-    heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
-    return ResultTable.of("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), mixed=frozenset({1}))
+    heads = (
+        "",
+        "value",
+        "unit",
+        "pipe",
+        "from its start",
+        *["chainage"] * bool(legs),
+        "elevation",
+        "time",
+    )
+    return ResultTable.of(
+        "Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), mixed=frozenset({1})
+    )
 
 
 def ranked_pipes(result) -> list[ResultTable]:
@@ -462,33 +614,77 @@ def _ranking(result, name: str, words: str, most, when: str) -> ResultTable:
     rows = []
     for pipe, arrays in result.envelope.items():
         k = int(most(arrays[name]))
-        rows.append([pipe, *(float(arrays[key][k]) for key in (name, "distance", "elevation", when))])
+        rows.append(
+            [pipe, *(float(arrays[key][k]) for key in (name, "distance", "elevation", when))]
+        )
     rows.sort(key=lambda row: row[1], reverse=most is np.argmax)
-    units = ["", *(envelope_column(result, key).unit for key in (name, "distance", "elevation", when))]
+    units = [
+        "",
+        *(envelope_column(result, key).unit for key in (name, "distance", "elevation", when)),
+    ]
     heads = ("pipe", words, "from its start", "elevation", "time")
-    return ResultTable.of(f"{words.capitalize()} by pipe", heads, rows, units, most=MAX_RANKED,
-                 more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
+    return ResultTable.of(
+        f"{words.capitalize()} by pipe",
+        heads,
+        rows,
+        units,
+        most=MAX_RANKED,
+        more="in envelope.csv and in the workbook (--xlsx)",
+    )
 
 
 def extremes_of_probes(result) -> ResultTable:
     """Table of the extremes of each probe over all accepted steps, with times and errors."""
-    peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
+    peaks = result.summary.get("peaks", {})
+    rows = []
+    invalid = not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, extremes in result.extremes.items():
-        errors = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("minimum", "maximum")}
+        errors = {
+            side: [peaks[name][side]["error"]] if peaks else [] for side in ("minimum", "maximum")
+        }
         first, last = (in_unit(clock, t) for t in (extremes.t_min, extremes.t_max))
-        low, high = (invalid if value is None else value for value in (extremes.minimum, extremes.maximum))
-        rows.append([name, result.units[name], low, *errors["minimum"], first, high, *errors["maximum"], last])
-    heads = [column for side in ("minimum", "maximum") for column in (side, *[ERROR_HEADER] * bool(peaks), "time")]
+        low, high = (
+            invalid if value is None else value for value in (extremes.minimum, extremes.maximum)
+        )
+        rows.append(
+            [
+                name,
+                result.units[name],
+                low,
+                *errors["minimum"],
+                first,
+                high,
+                *errors["maximum"],
+                last,
+            ]
+        )
+    heads = [
+        column
+        for side in ("minimum", "maximum")
+        for column in (side, *[ERROR_HEADER] * bool(peaks), "time")
+    ]
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
-    return ResultTable.of("Probes", ("probe", "unit", *heads), rows, ("", "", *units), mixed=loose,
-                 more="in summary.json and in the workbook (--xlsx)")  # fmt: skip
+    return ResultTable.of(
+        "Probes",
+        ("probe", "unit", *heads),
+        rows,
+        ("", "", *units),
+        mixed=loose,
+        more="in summary.json and in the workbook (--xlsx)",
+    )
 
 
 def numerics_tables(result) -> list[ResultTable | None]:
     """Tables of electric energy, settings, ledgers, expected values and measured series; None for absent tables."""
-    return [energy_use(result), settings(result), ledgers(result), claim_table(result), comparisons(result)]
+    return [
+        energy_use(result),
+        settings(result),
+        ledgers(result),
+        claim_table(result),
+        comparisons(result),
+    ]
 
 
 def settings(result) -> ResultTable:
@@ -502,12 +698,20 @@ def settings(result) -> ResultTable:
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
     if summary["cells"]:
         limiter = getattr(numerics, "limiter", None)
-        scheme = f"muscl, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
+        scheme = (
+            f"muscl, limiter {limiter}"
+            if limiter and numerics.scheme == "muscl"
+            else numerics.scheme
+        )
         rows += [["scheme", scheme], ["cells", summary["cells"]]]
-    rows += [["method", "; ".join(_method_text(item, result.case) for item in summary["methods"])],
-             ["step", "; ".join(given) or "by default"],
-             ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
-             ["evaluations of rates", summary["rhs"]], ["computing time [s]", summary["seconds"]]]  # fmt: skip
+    rows += [
+        ["method", "; ".join(_method_text(item, result.case) for item in summary["methods"])],
+        ["step", "; ".join(given) or "by default"],
+        ["steps", summary["steps"]],
+        ["repeated steps", summary["rejections"]],
+        ["evaluations of rates", summary["rhs"]],
+        ["computing time [s]", summary["seconds"]],
+    ]
     if "resolution" in summary:
         words, reasons = summary["resolution"]["words"], summary["resolution"]["reasons"]
         rows.append(["errors of peaks (\u00b1)", "; ".join([words, *reasons])])
@@ -519,10 +723,28 @@ def ledgers(result) -> ResultTable | None:
     balances = {name: row for name, row in result.summary["ledgers"].items() if "remainder" in row}
     if not balances:
         return None
-    terms = [term for term in LEDGER_TERMS if any(isinstance(row.get(term), float) for row in balances.values())]
-    rows = [[name, LEDGER_UNITS.get(name, ""), *(row.get(term) for term in terms), _shortened(row["remainder"], ".2e"),
-             _shortened(row.get("relative"), ".1e")] for name, row in balances.items()]  # fmt: skip
-    heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
+    terms = [
+        term
+        for term in LEDGER_TERMS
+        if any(isinstance(row.get(term), float) for row in balances.values())
+    ]
+    rows = [
+        [
+            name,
+            LEDGER_UNITS.get(name, ""),
+            *(row.get(term) for term in terms),
+            _shortened(row["remainder"], ".2e"),
+            _shortened(row.get("relative"), ".1e"),
+        ]
+        for name, row in balances.items()
+    ]
+    heads = (
+        "ledger",
+        "unit",
+        *(term.replace("_", " ") for term in terms),
+        "remainder",
+        "of the largest term",
+    )
     return ResultTable.of("Ledgers", heads, rows)
 
 
@@ -546,8 +768,12 @@ def energy_use(result) -> ResultTable | None:
 def versions(result) -> ResultTable:
     """Table of versions of programs and data, hash of the case, and date of the run."""
     rows = [["run ended", result.summary.get("ended", "not recorded")]]
-    words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
-             "target": "machine"}  # fmt: skip
+    words = {
+        "case": "hash of the case",
+        "sources": "hash of compiled sources",
+        "fluid": "fluid properties",
+        "target": "machine",
+    }
     rows += [[words.get(key, key), version] for key, version in result.summary["versions"].items()]
     return ResultTable.of("", ("", ""), rows)
 
@@ -560,19 +786,41 @@ def events(result) -> ResultTable:
 
 def cavities(result) -> ResultTable:
     """Table of cavities in pipes: first position and time, greatest volume and its time."""
-    rows = [[row["place"].removeprefix("links."), row["distance"], row["time"], row["volume"], row["t_volume"]]
-            for row in result.summary["cavities"]]  # fmt: skip
+    rows = [
+        [
+            row["place"].removeprefix("links."),
+            row["distance"],
+            row["time"],
+            row["volume"],
+            row["t_volume"],
+        ]
+        for row in result.summary["cavities"]
+    ]
     heads = ("pipe", "first at", "time", "greatest volume", "time")
     return ResultTable.of("Cavities", heads, rows, ("", "m", "s", "m3", "s"))
 
 
 def comparisons(result) -> ResultTable:
     """Table that compares probes with measured series."""
-    rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
-            for row in result.comparisons]  # fmt: skip
+    rows = [
+        [
+            row.probe,
+            row.file,
+            row.unit,
+            row.rms,
+            row.greatest_difference,
+            row.measured_peak,
+            row.computed_peak,
+        ]
+        for row in result.comparisons
+    ]
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
     return ResultTable.of("Against measurements", heads, rows, mixed=frozenset({3, 4, 5, 6}))
 
 
 def _method_text(row: dict, case) -> str:
-    return row["method"] if not row["time"] else f"{row['method']} from {case.amount(row['time'], 'time', 6)} on"
+    return (
+        row["method"]
+        if not row["time"]
+        else f"{row['method']} from {case.amount(row['time'], 'time', 6)} on"
+    )

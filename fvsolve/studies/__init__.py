@@ -7,6 +7,8 @@ first use. Studies of other packages are found by their entry points.
 from fvsolve.declarations import Declarations
 from fvsolve.lazy_exports import lazy_attributes
 
-STUDIES = Declarations("study", "studies", ("studies/**/*.py", "core/step_limits/advection_limit.py"))
+STUDIES = Declarations(
+    "study", "studies", ("studies/**/*.py", "core/step_limits/advection_limit.py")
+)
 
 lazy_attributes(__name__, STUDIES, STUDIES.load)

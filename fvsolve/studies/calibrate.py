@@ -22,10 +22,12 @@ SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the bes
 DESCENTS = 3  # number of minimisations
 SLOPE_STEP = 1e-4  # difference step of slopes, as a fraction of the range
 CORRELATED = 0.999  # correlation of errors above which two keys cannot be distinguished
-AT_BOUND = 1e-3  # distance from an end of the range, as a fraction of it, below which a value counts as at the end
+# distance from an end of the range, as a fraction of it, below which a value counts as at the end
+AT_BOUND = 1e-3
 MAX_ROUNDS = 6  # greatest number of rounds of weights
 WEIGHT_TOLERANCE = 0.01  # relative change of weights below which the rounds end
-LEAST_SCATTER = 1e-6  # least scatter as a fraction of the range of a series, from digits of files and time steps
+# least scatter as a fraction of the range of a series, from digits of files and time steps
+LEAST_SCATTER = 1e-6
 FAILED_RESIDUAL = 1e6  # residual of a run that failed
 
 
@@ -51,8 +53,13 @@ class Calibration(PlainData):
     @property
     def sheet(self) -> ResultTable:
         """Table with a row for each fitted key: key, value and sigma [SI]."""
-        rows = [{"key": key, "value": value, "sigma": self.sigma[key]} for key, value in self.values.items()]
-        return ResultTable([Column("key"), Column("value", words=".8g"), Column("sigma", words=".3g")], rows)
+        rows = [
+            {"key": key, "value": value, "sigma": self.sigma[key]}
+            for key, value in self.values.items()
+        ]
+        return ResultTable(
+            [Column("key"), Column("value", words=".8g"), Column("sigma", words=".3g")], rows
+        )
 
 
 class Residuals(RowMaker):
@@ -95,9 +102,14 @@ def series_range(measured: np.ndarray) -> float:
 @declared("study")
 @validated(vary=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
-    case, vary: Mapping[str, Sequence[Any]], set: Mapping[str, Any] | None = None, seed: int = 0, jobs: int = 1,
-    dask: str | None = None, progress: Callable[[int, int, str], None] | None = None,
-) -> Calibration:  # fmt: skip
+    case,
+    vary: Mapping[str, Sequence[Any]],
+    set: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    dask: str | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Calibration:
     """Fit values in a case to its measured series, by least squares (`scipy.optimize.least_squares`).
 
     case : as for `run`, with measured series under `[compare]`; vary : key -> (least, greatest value)
@@ -112,12 +124,18 @@ def calibrate(
     """
     loaded = load(case, set)
     if not vary:
-        raise FvsolveError("no key to fit; give at least one key and its range: links.main.wave_speed=900,1300")
+        raise FvsolveError(
+            "no key to fit; give at least one key and its range: links.main.wave_speed=900,1300"
+        )
     if not loaded.compare:
-        raise FvsolveError("no measured series to fit to; expected a series under [compare] in the case")
+        raise FvsolveError(
+            "no measured series to fit to; expected a series under [compare] in the case"
+        )
     bounds = key_ranges(loaded, vary)
     points = sample_points(loaded, vary, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
-    return LeastSquaresFit(loaded, bounds, points, progress or (lambda done, total, text: None)).solve(jobs, dask)
+    return LeastSquaresFit(
+        loaded, bounds, points, progress or (lambda done, total, text: None)
+    ).solve(jobs, dask)
 
 
 class LeastSquaresFit:
@@ -145,7 +163,9 @@ class LeastSquaresFit:
         best = min(answers, key=lambda answer: answer.cost)
         for _ in range(MAX_ROUNDS if self.weights.size > 1 else 0):
             before, self.weights = self.weights, 1.0 / self.scatter(best)
-            if np.allclose(self.weights / self.weights[0], before / before[0], rtol=WEIGHT_TOLERANCE):
+            if np.allclose(
+                self.weights / self.weights[0], before / before[0], rtol=WEIGHT_TOLERANCE
+            ):
                 break
             best = self.minimise(least_squares, best.x)
         return self.result(best)
@@ -163,15 +183,21 @@ class LeastSquaresFit:
         differences = self.differences(answer.x)
         parts = np.split(answer.jac, np.cumsum([series.size for series in differences])[:-1])
         inverse = np.linalg.pinv(answer.jac.T @ answer.jac)
-        degrees = np.array([len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts])
+        degrees = np.array(
+            [len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts]
+        )
         squares = np.array([float(series @ series) for series in differences])
-        pooled = squares.sum() / max(1.0, sum(series.size for series in differences) - answer.x.size)
+        pooled = squares.sum() / max(
+            1.0, sum(series.size for series in differences) - answer.x.size
+        )
         variances = np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled)
         return np.sqrt(np.maximum(variances, LEAST_SCATTER**2))
 
     def weighted(self, differences: list[np.ndarray]) -> np.ndarray:
         """Differences of all series, multiplied by the weight of their series and joined to one array."""
-        return np.concatenate([weight * series for weight, series in zip(self.weights, differences, strict=True)])
+        return np.concatenate(
+            [weight * series for weight, series in zip(self.weights, differences, strict=True)]
+        )
 
     def start_points(self, jobs: int, dask: str | None) -> list[np.ndarray]:
         """Run the sample; returns its best points, at most `DESCENTS`, as starts x of minimisations.
@@ -207,7 +233,9 @@ class LeastSquaresFit:
         def slopes(x: np.ndarray) -> np.ndarray:
             return np.column_stack([self.slope(x, k, size) for k in range(x.size)])
 
-        return least_squares(residual, x, slopes, bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-10, ftol=1e-10)
+        return least_squares(
+            residual, x, slopes, bounds=(0.0, 1.0), x_scale=1.0, xtol=1e-10, ftol=1e-10
+        )
 
     def slope(self, x: np.ndarray, k: int, size: int) -> np.ndarray:
         """Derivatives of all weighted differences with respect to x[k] : float64[size], column k of the Jacobian.
@@ -241,17 +269,30 @@ class LeastSquaresFit:
         scatter = 2.0 * answer.cost / degrees
         covariance, doubts = identifiability(answer.jac, keys)
         sigma = np.sqrt(scatter * np.diag(covariance)) * self.width
-        sigma[[any(doubt.startswith(f"{key} changes nothing") for doubt in doubts) for key in keys]] = np.inf
+        sigma[
+            [any(doubt.startswith(f"{key} changes nothing") for doubt in doubts) for key in keys]
+        ] = np.inf
         root = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(root, root)
         np.fill_diagonal(correlation, 1.0)
-        doubts += [f"{key} lies at an end of its range; try a wider range"
-                   for key, x in zip(keys, answer.x, strict=True) if min(x, 1.0 - x) <= AT_BOUND]  # fmt: skip
+        doubts += [
+            f"{key} lies at an end of its range; try a wider range"
+            for key, x in zip(keys, answer.x, strict=True)
+            if min(x, 1.0 - x) <= AT_BOUND
+        ]
         series = self.case.compare.values()
-        rms = {entry.probe.text: series_range(entry.v) * float(np.sqrt(np.mean(series_difference**2)))
-               for entry, series_difference in zip(series, differences, strict=True)}  # fmt: skip
-        return Calibration(self.values(answer.x), dict(zip(keys, sigma.tolist(), strict=True)),
-                           correlation.tolist(), rms, doubts, self.runs)  # fmt: skip
+        rms = {
+            entry.probe.text: series_range(entry.v) * float(np.sqrt(np.mean(series_difference**2)))
+            for entry, series_difference in zip(series, differences, strict=True)
+        }
+        return Calibration(
+            self.values(answer.x),
+            dict(zip(keys, sigma.tolist(), strict=True)),
+            correlation.tolist(),
+            rms,
+            doubts,
+            self.runs,
+        )
 
 
 def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[str]]:
@@ -265,12 +306,18 @@ def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, li
     floor = max(float(s[0]), 1e-300) * 1e-9 if s.size else 0.0
     inverse = (v.T / np.maximum(s, floor) ** 2) @ v
     root = np.sqrt(np.diag(inverse))
-    without_effect = [key for key, size in zip(keys, np.linalg.norm(slopes, axis=0), strict=True) if size <= floor]
+    without_effect = [
+        key for key, size in zip(keys, np.linalg.norm(slopes, axis=0), strict=True) if size <= floor
+    ]
     doubts = [f"{key} changes nothing that was measured" for key in without_effect]
     for j, last in enumerate(keys):
         for k, other_key in enumerate(keys[:j]):
             correlation = float(inverse[j, k] / (root[j] * root[k]))
-            if abs(correlation) > CORRELATED and last not in without_effect and other_key not in without_effect:
+            if (
+                abs(correlation) > CORRELATED
+                and last not in without_effect
+                and other_key not in without_effect
+            ):
                 reason = f"the correlation of their errors is {correlation:.5f}"
                 doubts.append(f"{other_key} and {last} cannot be distinguished: {reason}")
     return inverse, doubts

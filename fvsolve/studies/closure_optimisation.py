@@ -16,7 +16,8 @@ from fvsolve.parts.schedule import Schedule
 from fvsolve.studies.outcome import NO_FIELDS, checked_case, end_if_interrupted
 from fvsolve.units import show
 
-START_SHAPES = 0.0, 1.0, -1.0  # half the log ratio of the first slope to the last, of schedules at the start
+# half the log ratio of the first slope to the last, of schedules at the start
+START_SHAPES = 0.0, 1.0, -1.0
 MAX_KNOTS = 12
 SIMPLEX_SIZE = 1.0  # edge length of the first simplex
 
@@ -54,7 +55,9 @@ class Optimum(PlainData):
     @property
     def schedule(self) -> str:
         """Best schedule as a line of TOML for the case file."""
-        times, values = ([float(f"{x:.6g}") for x in row] for row in (self.best.time, self.best.value))
+        times, values = (
+            [float(f"{x:.6g}") for x in row] for row in (self.best.time, self.best.value)
+        )
         return f"{self.key.rpartition('.')[2]} = {{ time = {times}, value = {values} }}"
 
 
@@ -66,8 +69,22 @@ class ClosureSearch:
     span : as returned by `span_of`; other arguments as for `optimise`
     """
 
-    def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
-        self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
+    def __init__(
+        self,
+        case: Case,
+        key: str,
+        minimise: str,
+        span: tuple,
+        knots: int,
+        progress: Callable | None,
+    ) -> None:
+        self.case, self.key, self.minimise, self.knots, self.progress = (
+            case,
+            key,
+            minimise,
+            knots,
+            progress,
+        )
         self.begin, self.end, self.first, self.last = span
         self.laws: list[ValveSchedule] = []
         self.unit = self.failure_reason = ""
@@ -92,15 +109,22 @@ class ClosureSearch:
         self.laws.append(ValveSchedule(time, value, peak))
         self.failure_reason = self.failure_reason or ("" if result.ok else result.reason)
         if self.progress is not None:
-            self.progress(len(self.laws), "run failed" if peak is None else f"{peak:.6g} {expectation.unit}")
+            self.progress(
+                len(self.laws), "run failed" if peak is None else f"{peak:.6g} {expectation.unit}"
+            )
         return np.inf if peak is None else peak
 
 
 @declared("study")
 def optimise(
-    case, key: str, minimise: str, knots: int = 3, runs: int = 60, set: Mapping[str, Any] | None = None,
+    case,
+    key: str,
+    minimise: str,
+    knots: int = 3,
+    runs: int = 60,
+    set: Mapping[str, Any] | None = None,
     progress: Callable | None = None,
-) -> Optimum:  # fmt: skip
+) -> Optimum:
     """Find the piecewise-linear schedule that gives the least peak.
 
     key : key of a schedule between two values, such as a ramp; minimise : peak to minimise, a quantity as in
@@ -121,8 +145,17 @@ def optimise(
         z = start * np.linspace(2.0, 0.0, knots + 1)[:-1]
         simplex = np.vstack([z, z + SIMPLEX_SIZE * np.eye(knots)])
         evaluations = (runs - len(search.laws)) // (len(START_SHAPES) - k)
-        minimize(search, z, method="Nelder-Mead",
-                 options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
+        minimize(
+            search,
+            z,
+            method="Nelder-Mead",
+            options={
+                "maxfev": evaluations,
+                "initial_simplex": simplex,
+                "xatol": 1e-2,
+                "fatol": 0.0,
+            },
+        )
     if all(law.peak is None for law in search.laws):
         reason = search.failure_reason or "it is not a number"
         raise FvsolveError(f"no schedule gives {minimise} a finite value: {reason}")
@@ -165,14 +198,31 @@ def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
     if schedule is None:
         suggestion = did_you_mean(key, laws)
         moving = [name for name, law in laws.items() if not law.constant]
-        known = f"Schedules that change: {listing(moving)}" if moving else "No schedule of this case changes"
+        known = (
+            f"Schedules that change: {listing(moving)}"
+            if moving
+            else "No schedule of this case changes"
+        )
         raise FvsolveError(f"is not a schedule of this case{suggestion or f'. {known}'}")
-    if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
+    if (
+        schedule.constant
+        or schedule.kind not in ("linear", "smooth", "ramp")
+        or len(schedule.time) < 2
+    ):
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
-        raise FvsolveError(f"does not change from one value to another; expected a ramp or a table, such as {example}")
-    ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
+        raise FvsolveError(
+            f"does not change from one value to another; expected a ramp or a table, such as {example}"
+        )
+    ends = (
+        float(schedule.time[0]),
+        float(schedule.time[-1]),
+        float(schedule.value[0]),
+        float(schedule.value[-1]),
+    )
     if ends[2] == ends[3]:
-        raise FvsolveError(f"begins and ends at {show(ends[2])}; expected different values at start and end")
+        raise FvsolveError(
+            f"begins and ends at {show(ends[2])}; expected different values at start and end"
+        )
     return ends
 
 
@@ -180,6 +230,9 @@ def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
     """Yield (dotted key, schedule) for all scheduled values of the nodes and links of a case."""
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
-            values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}
+            values = {
+                info.alias or field: getattr(part, field)
+                for field, info in type(part).model_fields.items()
+            }
             laws = {key: value for key, value in values.items() if isinstance(value, Schedule)}
             yield from ((path((group, name, key)), law) for key, law in laws.items())

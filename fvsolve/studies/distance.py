@@ -16,7 +16,8 @@ from fvsolve.studies.resolution import basin_fields, pipes, variable_name
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")
-CONSTANT = 1e-9  # ranges below this fraction of the size of a component count as 0; in basins, below this value [SI]
+# ranges below this fraction of the size of a component count as 0; in basins, below this value [SI]
+CONSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,11 @@ class Deviation:
     def norms(self) -> dict[str, float]:
         """Norms of the error [SI]: weighted mean of its magnitude "L1", weighted rms "L2", and maximum "max"."""
         size, share = np.abs(self.error), self.weights / self.weights.sum()
-        return {"L1": float(share @ size), "L2": math.sqrt(float(share @ size**2)), "max": float(size.max(initial=0.0))}
+        return {
+            "L1": float(share @ size),
+            "L2": math.sqrt(float(share @ size**2)),
+            "max": float(size.max(initial=0.0)),
+        }
 
     def ranges(self) -> dict[str, float]:
         """The three norms of `norms`, divided by the range `span` [-]."""
@@ -65,7 +70,11 @@ class Distance:
 def recording_keys(case, keys: Mapping | None = None) -> dict:
     """Overrides `keys`, with two more: a run also records the probes of `end_probes`, and writes no values of cells."""
     own = [probe.text for probe in case.probes]
-    return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), **NO_FIELDS}
+    return {
+        **(keys or {}),
+        "output.probes": list(dict.fromkeys([*own, *end_probes(case)])),
+        **NO_FIELDS,
+    }
 
 
 def end_probes(case) -> list[str]:
@@ -75,7 +84,9 @@ def end_probes(case) -> list[str]:
     """
     probes = []
     for name, node in case.nodes.items():
-        quantities = [key for key in ("pressure", "level", "position", "velocity") if key in node.quantities]
+        quantities = [
+            key for key in ("pressure", "level", "position", "velocity") if key in node.quantities
+        ]
         if node.kind not in ("reservoir", "frame"):
             probes += [f"nodes.{name}.{key}" for key in quantities]
     for name, link in case.links.items():
@@ -87,7 +98,9 @@ def end_probes(case) -> list[str]:
 # measures -----------------------------------------------------------------------------------------------------------
 
 
-def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
+def error_norms(
+    run: Outcome, truth, own: tuple[str, ...] | None = None
+) -> dict[str, dict[str, float]]:
     """Errors of a run against the `Reference` truth : {variable: {"L1" | "L2" | "max": error [SI]}}.
 
     Variables are pressure and flow in the cells of all pipes at the end, quantities of basins at the end, probes over
@@ -100,15 +113,25 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
         errors, weights = [gap.error for gap in gaps], [gap.weights for gap in gaps]
         deviations[quantity] = Deviation(np.concatenate(errors), np.concatenate(weights))
     for basin in run.model.meshed:
-        by_content = {content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)}
-        deviations |= {variable_name(basin, content): gap for content, gap in by_content.items() if gap is not None}
+        by_content = {
+            content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)
+        }
+        deviations |= {
+            variable_name(basin, content): gap
+            for content, gap in by_content.items()
+            if gap is not None
+        }
     ends, at_end = set(end_probes(run.model.case)), {}
     for name, gap in probe_deviations(run, truth).items():
         if name in ends:
-            at_end.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(gap.error[-1])
+            at_end.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(
+                gap.error[-1]
+            )
         if own is None or name in own:
             deviations[name] = gap
-    deviations |= {name: Deviation(np.array(off), np.ones(len(off))) for name, off in at_end.items()}
+    deviations |= {
+        name: Deviation(np.array(off), np.ones(len(off))) for name, off in at_end.items()
+    }
     return {name: gap.norms() for name, gap in deviations.items()}
 
 
@@ -120,7 +143,9 @@ def distance(run: Outcome, truth) -> Distance:
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
-        ends = [gap.ranges()["L1"] for gap in field_deviations(run, truth).values() if gap.span > 0.0]
+        ends = [
+            gap.ranges()["L1"] for gap in field_deviations(run, truth).values() if gap.span > 0.0
+        ]
         gaps = moving_probes(run, truth)
         if not gaps:
             return Distance(end=max(ends, default=math.nan))
@@ -137,7 +162,10 @@ def extremes_distance(run: Outcome, truth) -> float:
 
     The result is nan if all probes are constant. truth : the `Reference`
     """
-    return max((max(abs(low), abs(high)) for low, high in extreme_differences(run, truth)), default=math.nan)
+    return max(
+        (max(abs(low), abs(high)) for low, high in extreme_differences(run, truth)),
+        default=math.nan,
+    )
 
 
 def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
@@ -147,7 +175,9 @@ def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
     """
     values, reference_values = run.rows[:, 1:], truth.rows(run)
     span = column_ranges(reference_values)
-    low, high = ((pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max))
+    low, high = (
+        (pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max)
+    )
     return [(float(low[k]), float(high[k])) for k in np.flatnonzero(span > 0.0)]
 
 
@@ -179,11 +209,18 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
     reference_fields = truth.fields(model) if model.pipes or model.meshed else {}
     own_fields = fields(model, wave_sums(run)) if model.pipes else {}
     for k, pipe in enumerate(model.pipes):
-        lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
-        flow_per_pressure = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
+        lengths = np.full(pipe.cells, pipe.length / pipe.cells)
+        span = truth.spans.get(pipe.name, math.nan)
+        flow_per_pressure = (
+            float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
+        )
         widths = {"pressure": span, "flow": span * flow_per_pressure}
-        for quantity, values, expected in zip(widths, own_fields[pipe.name], reference_fields[pipe.name], strict=True):
-            deviations[pipe.name, quantity] = Deviation(values - expected, lengths, widths[quantity])
+        for quantity, values, expected in zip(
+            widths, own_fields[pipe.name], reference_fields[pipe.name], strict=True
+        ):
+            deviations[pipe.name, quantity] = Deviation(
+                values - expected, lengths, widths[quantity]
+            )
     for basin in model.meshed:
         reference_basin = reference_fields.get(("basin", basin.name))
         if reference_basin is None:
@@ -214,7 +251,10 @@ def column_ranges(values: np.ndarray) -> np.ndarray:
 
 def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
     """Range of the pressure in each pipe over cells and run [Pa], nan if constant; envelope : as in `Outcome`."""
-    pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
+    pressures = {
+        name: np.append(entry["min_pressure"], entry["max_pressure"])
+        for name, entry in envelope.items()
+    }
     return {name: float(column_ranges(entry)) for name, entry in pressures.items()}
 
 
@@ -230,7 +270,10 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
     for k, pipe in enumerate(model.pipes):
         total, mass_flow = waves[pipe.name]
         pressure = model.cell_pressure(k, total)
-        by_pipe[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / model.case.law.density(pressure)
+        by_pipe[pipe.name] = (
+            pressure,
+            (model.tables.pipes[k]["flow"] + mass_flow) / model.case.law.density(pressure),
+        )
     return by_pipe
 
 
@@ -265,11 +308,15 @@ def variable_size(run: Outcome, name: str) -> float:
     """Greatest absolute value of a variable over its cells or times [SI]; name : variable as in `error_norms`."""
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
-        return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, wave_sums(run)).values())
+        return max(
+            float(np.max(np.abs(pair[k]))) for pair in fields(run.model, wave_sums(run)).values()
+        )
     for basin in run.model.meshed:
         for quantity, values in basin_fields(basin, run.y).items():
             if name == variable_name(basin, quantity):
                 return float(np.max(np.abs(values)))
-    named = [(text, END.get(text.split(".")[0], "") + text.rsplit(".", 1)[-1]) for text in run.probes]
+    named = [
+        (text, END.get(text.split(".")[0], "") + text.rsplit(".", 1)[-1]) for text in run.probes
+    ]
     columns = [k for k, texts in enumerate(named, 1) if name in texts]
     return float(np.max(np.abs(run.rows[:, columns]), initial=0.0))

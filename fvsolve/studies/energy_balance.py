@@ -26,12 +26,17 @@ from fvsolve.studies.passivity import AUTO, check_names, method_names
 from fvsolve.studies.result_cache import ResultCache
 
 TABLE_ROWS = 1000  # approximate number of rows of the table
-QUADRATURE_TOLERANCE = 1e-3  # allowed quadrature error of the dissipated energy in a step, relative to its total
+# allowed quadrature error of the dissipated energy in a step, relative to its total
+QUADRATURE_TOLERANCE = 1e-3
 LEAST, MOST = 0.1, 8.0  # limits of the factor on the step for that tolerance
 LEAST_LIMIT = 1e-12  # least limit of the step, relative to the time
 ACCEPTED_CODES = (  # status codes of the loop after an accepted step
-    loop_records.BUDGET_SPENT, loop_records.DONE, loop_records.ROWS_FULL, loop_records.FIELD, loop_records.STOPPED,
-)  # fmt: skip
+    loop_records.BUDGET_SPENT,
+    loop_records.DONE,
+    loop_records.ROWS_FULL,
+    loop_records.FIELD,
+    loop_records.STOPPED,
+)
 
 
 class EnergyLoop(RunLoop):
@@ -40,8 +45,12 @@ class EnergyLoop(RunLoop):
     def watch(self, accounts: Accounts, on_step) -> None:
         """Start to add up the energies of `accounts`; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
-        self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
-        lines = (np.array(accounts.of(category), dtype=int) for category in ("supplied", "rate", "dissipated"))
+        # ledger lines, then the Newton residual
+        self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))
+        lines = (
+            np.array(accounts.of(category), dtype=int)
+            for category in ("supplied", "rate", "dissipated")
+        )
         self.supplied, self.rates, self.dissipated_lines = lines
         self.longest = float(self.control["step_max"])
         self.dydt, self.out_work = np.zeros(self.model.y_size), self.model.new_out()
@@ -49,16 +58,27 @@ class EnergyLoop(RunLoop):
 
     def run(self, budget: float) -> int:
         """Take up to `budget` steps, and add the energy of each accepted step; returns the status code of the loop."""
-        code, left, armed = super().run(0.0), budget, self.armed
-        while code == loop_records.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
-            t, y, rules = self.t, self.now.copy(), armed.copy()
+        code = super().run(0.0)
+        left = budget
+        armed = self.armed
+        while (
+            code == loop_records.BUDGET_SPENT
+            and left > 0.0
+            and not automatic.is_change_due(self.stepper)
+        ):
+            t = self.t
+            y = self.now.copy()
+            rules = armed.copy()
             first_values = self.stepper.k[0].copy(), self.stepper.ledger_rates[0].copy()
             steps = self.state["steps"]
             code, left = super().run(1.0), left - 1.0
             if self.state["steps"] > steps and code in ACCEPTED_CODES:
                 after = armed.copy()
                 self.run_data.use_flags(rules)  # those of the right-hand side of this step
-                self.add(self.released_stops(t, y, self.step_energy(t, y, *first_values)) + self.jump_correction(t, y))
+                self.add(
+                    self.released_stops(t, y, self.step_energy(t, y, *first_values))
+                    + self.jump_correction(t, y)
+                )
                 self.run_data.use_flags(after)
                 self.on_step()
         return code
@@ -73,10 +93,15 @@ class EnergyLoop(RunLoop):
         Times are fractions of the step. The first stage is the start of the step, for implicit methods too.
         """
         s = self.stepper.k.shape[0]
-        a, b, c = (self.stepper.coefficients[i : i + n] for i, n in ((0, s * s), (s * s, s), (s * s + s, s)))
+        a, b, c = (
+            self.stepper.coefficients[i : i + n]
+            for i, n in ((0, s * s), (s * s, s), (s * s + s, s))
+        )
         return a.reshape(s, s), b, c
 
-    def step_energy(self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray) -> np.ndarray:
+    def step_energy(
+        self, t: float, y: np.ndarray, first: np.ndarray, supply: np.ndarray
+    ) -> np.ndarray:
         """Energy [J] that the step from (t, y) adds to every account; the last entry is that of the Newton residual.
 
         first, supply : slope dy/dt and ledger rates, such as the supply of a node [kg/s], of the first stage at (t, y)
@@ -84,13 +109,15 @@ class EnergyLoop(RunLoop):
         """
         stepper, h = self.stepper, float(self.state["last"])
         (a, b, c), total = self.tableau(), np.zeros_like(self.total)
-        k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.ledger_rates[1:]])
+        k = np.vstack([first, stepper.k[1:]])
+        supplies = np.vstack([supply, stepper.ledger_rates[1:]])
         if stepper.method.kind == "linear":
             total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
             return h * total
         s = b.size
         by_error = self.control["mode"] == loop_records.TOLERANCE and stepper.method.kind != "full"
-        error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s] * by_error  # weights of the error estimate
+        # weights of the error estimate
+        error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s] * by_error
         quadrature_error = np.zeros_like(total)
         for i in np.flatnonzero((b != 0.0) | (error != 0.0)):
             power = self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
@@ -111,7 +138,9 @@ class EnergyLoop(RunLoop):
         """
         grow = MOST
         if off > 0.0:
-            grow = min(MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"]))
+            grow = min(
+                MOST, 0.9 * (QUADRATURE_TOLERANCE * lost / off) ** (1.0 / self.control["order"])
+            )
         least = LEAST_LIMIT * max(abs(self.t), abs(float(self.control["end"])))
         self.control["step_max"] = min(self.longest, max(h * max(LEAST, grow), least))
 
@@ -121,17 +150,24 @@ class EnergyLoop(RunLoop):
         The power at a stage is the power before or after a jump, so that the weights of the stages place the jump at a
         wrong time. Returns the correction for every energy account; the last entry is that for the Newton residual.
         """
-        past, total, h = history_of(self.run_data), np.zeros_like(self.total), self.t - t
+        past = history_of(self.run_data)
+        total = np.zeros_like(self.total)
+        h = self.t - t
         if not past.size or past[JUMPS_TRAVELLING] == 0.0:
             return total
         (_, b, c), separation = self.tableau(), time_tolerance(past)
         if self.stepper.method.kind == "linear":
-            big_c, _, gamma = self.rosenbrock_coefficients()  # b: weights of the powers at the stages in the energy
-            b = np.append(0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:]))
+            # b: weights of the powers at the stages in the energy
+            big_c, _, gamma = self.rosenbrock_coefficients()
+            b = np.append(
+                0.0, np.linalg.solve((np.eye(b.size - 1) - gamma * big_c[1:, 1:]).T, gamma * b[1:])
+            )
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
         for jump_time in jump_times(past, lines_of(self.model), begin, end):
             sides = jump_time - 2.0 * separation, jump_time + 2.0 * separation
-            before, after = (self.power(time, y + (time - t) / h * (self.now - y)) for time in sides)
+            before, after = (
+                self.power(time, y + (time - t) / h * (self.now - y)) for time in sides
+            )
             booked = h * float(b[t + c * h >= jump_time - separation].sum())
             total[:-1] += (after - before) * (min(h, max(0.0, self.t - jump_time)) - booked)
         return total
@@ -158,7 +194,11 @@ class EnergyLoop(RunLoop):
         """(C : float64[s, s], d : float64[s], gamma) of a Rosenbrock method with s stages, see `steppers/ros.py`."""
         s = self.stepper.k.shape[0]
         coefficients = self.stepper.coefficients[s * s + 3 * s :]
-        return coefficients[: s * s].reshape(s, s), coefficients[s * s : s * s + s], float(coefficients[s * s + s])
+        return (
+            coefficients[: s * s].reshape(s, s),
+            coefficients[s * s : s * s + s],
+            float(coefficients[s * s + s]),
+        )
 
     def linearly_implicit(self, t: float, y: np.ndarray, h: float, a, c, k) -> np.ndarray:
         """Stage values w of the energy accounts in a Rosenbrock step from (t, y) : float64[s, accounts] [W].
@@ -170,9 +210,13 @@ class EnergyLoop(RunLoop):
         The derivatives P_y and P_t are computed by differences.
         """
         s, (big_c, late, gamma) = len(c), self.rosenbrock_coefficients()
-        per, eps, slope = 1e-3 * h, 1e-3, 0.0
+        per = 1e-3 * h
+        eps = 1e-3
+        slope = 0.0
         if t + per > t:  # otherwise the step is so short that the term is negligible
-            slope = (4.0 * self.power(t + per, y) - 3.0 * self.power(t, y) - self.power(t + 2.0 * per, y)) / (2.0 * per)
+            slope = (
+                4.0 * self.power(t + per, y) - 3.0 * self.power(t, y) - self.power(t + 2.0 * per, y)
+            ) / (2.0 * per)
         w = np.zeros((s, len(self.total) - 1))
         for i in range(1, s):
             step = eps * h * k[i]
@@ -192,7 +236,9 @@ class EnergyLoop(RunLoop):
         if not lines:
             return part
         travels = [stop_travels(self.model, *state) for state in ((t, y), (self.t, self.now))]
-        for k, ((rate, loss), stop) in enumerate(zip(lines, motion_of(self.model).stop_table, strict=True)):
+        for k, ((rate, loss), stop) in enumerate(
+            zip(lines, motion_of(self.model).stop_table, strict=True)
+        ):
             was, leaves_before = stop_compression(stop, *travels[0][k])
             now, leaves_after = stop_compression(stop, *travels[1][k])
             if leaves_before or leaves_after:
@@ -239,7 +285,8 @@ class EnergyRun(Run):
         self.times, self.totals, self.holdings = [self.loop.t], [self.loop.total.copy()], []
         self.first = self.stored_energy()
         self.holdings.append(np.zeros_like(self.first))
-        self.impact_losses = np.zeros(len(model.column_names))  # energy lost by columns in impacts [J]
+        # energy lost by columns in impacts [J]
+        self.impact_losses = np.zeros(len(model.column_names))
         self.losses = [self.impact_losses.copy()]
         self.every = (self.end - self.start) / TABLE_ROWS
         self.step_times, self.step_totals = [self.loop.t], [self.loop.total.copy()]
@@ -265,7 +312,9 @@ class EnergyRun(Run):
         before = self.flows()
         super().stop_columns()
         columns, rho = self.model.tables.columns, self.model.case.properties.density
-        self.impact_losses += 0.5 * (before - self.flows()) ** 2 * columns["length"] / (rho * columns["area"])
+        self.impact_losses += (
+            0.5 * (before - self.flows()) ** 2 * columns["length"] / (rho * columns["area"])
+        )
 
     def flows(self) -> np.ndarray:
         """Mass flows of rigid columns [kg/s]."""
@@ -274,7 +323,8 @@ class EnergyRun(Run):
 
 
 ROUNDING = 1e-12  # fraction of the energy throughput below which a remainder is rounding
-IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds omitted in names of ledger lines
+# kinds omitted in names of ledger lines
+IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")
 
 
 @dataclass(frozen=True)
@@ -367,7 +417,11 @@ class Energy:
     @property
     def relative(self) -> float:
         """Magnitude of `numerical_remainder` at the end of the run over `throughput` [-]; 0 without throughput."""
-        return 0.0 if self.throughput == 0.0 else float(abs(self.numerical_remainder[-1]) / self.throughput)
+        return (
+            0.0
+            if self.throughput == 0.0
+            else float(abs(self.numerical_remainder[-1]) / self.throughput)
+        )
 
     @property
     def newton_counts(self) -> bool:
@@ -382,7 +436,11 @@ class Energy:
         """
         if self.relative <= ROUNDING:
             return "rounding"
-        return "the numbers dissipate" if self.numerical_remainder[-1] > 0.0 else "the numbers create energy"
+        return (
+            "the numbers dissipate"
+            if self.numerical_remainder[-1] > 0.0
+            else "the numbers create energy"
+        )
 
     def numerical(self) -> dict[str, np.ndarray]:
         """Remainder by cause, as float64[k] [J]: "scheme", "law", "step", "newton", and their sum "remainder".
@@ -390,26 +448,51 @@ class Energy:
         Causes that are always zero are left out, as is "newton" if it never exceeds rounding errors.
         """
         zeros = np.zeros(len(self.t))
-        causes = {"scheme": sum(self.scheme.values(), zeros), "law": sum(self.law.values(), zeros), "step": self.step,
-                  "newton": self.newton if self.newton_counts else zeros}  # fmt: skip
-        return {name: values for name, values in causes.items() if values.any()} | {"remainder": self.remainder}
+        causes = {
+            "scheme": sum(self.scheme.values(), zeros),
+            "law": sum(self.law.values(), zeros),
+            "step": self.step,
+            "newton": self.newton if self.newton_counts else zeros,
+        }
+        return {name: values for name, values in causes.items() if values.any()} | {
+            "remainder": self.remainder
+        }
 
     def plain(self) -> dict:
         """Plain values for JSON: energies at the end of the run, verdict, settings, and passivity at the port."""
-        lines = {json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
-                 for kind, json_name in JSON_NAMES.items()}  # fmt: skip
+        lines = {
+            json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
+            for kind, json_name in JSON_NAMES.items()
+        }
         port = None if self.port is None else self.port.plain()
         return {
-            "reason": self.reason, "ok": self.ok, "t": float(self.t[-1]), "steps": self.steps, **self.settings, **lines,
-            "step_loss": float(self.step[-1]), "newton_loss": float(self.newton[-1]),
-            "remainder": float(self.remainder[-1]), "through": self.throughput, "relative": self.relative,
-            "verdict": self.verdict, "datum": self.datum, "at_start": self.at_start, "marks": self.marks, "port": port,
+            "reason": self.reason,
+            "ok": self.ok,
+            "t": float(self.t[-1]),
+            "steps": self.steps,
+            **self.settings,
+            **lines,
+            "step_loss": float(self.step[-1]),
+            "newton_loss": float(self.newton[-1]),
+            "remainder": float(self.remainder[-1]),
+            "through": self.throughput,
+            "relative": self.relative,
+            "verdict": self.verdict,
+            "datum": self.datum,
+            "at_start": self.at_start,
+            "marks": self.marks,
+            "port": port,
             **({"energy_use": self.energy_use} if self.energy_use else {}),
-        }  # fmt: skip
+        }
 
 
-JSON_NAMES = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipated", "scheme": "scheme_loss",
-         "law": "law_loss"}  # fmt: skip
+JSON_NAMES = {
+    "supplied": "supplied",
+    "stored": "stored",
+    "dissipated": "dissipated",
+    "scheme": "scheme_loss",
+    "law": "law_loss",
+}
 
 
 @declared("study")
@@ -436,7 +519,9 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     """Energy balance of a finished run, from its recorded energies; summary : its `Summary`; port : as in `energy`."""
-    accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
+    accounts = run.accounts
+    totals = np.array(run.totals)
+    holdings = np.array(run.holdings)
     kinds = ("supplied", "dissipated", "scheme", "law")
     lines = {kind: lines_by_name(accounts.accounts, kind, totals) for kind in kinds}
     stored = lines_by_name(accounts.stored_accounts, "stored", holdings)
@@ -447,18 +532,34 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     zeros, stored_sum = np.zeros(len(run.times)), holdings.sum(axis=1)
     supplied, dissipated = (sum(lines[kind].values(), zeros) for kind in ("supplied", "dissipated"))
     numerics = run.model.case.numerics
-    settings = {key: getattr(numerics, key) for key in ("scheme", "method", "courant", "step", "rtol")}
+    settings = {
+        key: getattr(numerics, key) for key in ("scheme", "method", "courant", "step", "rtol")
+    }
     reason = "interrupted" if summary.reason.startswith("interrupted") else summary.reason
     return Energy(
-        reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
-        lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1)
-        - impact_losses.sum(axis=1) - stored_sum,
-        totals[:, -1], supplied - stored_sum - dissipated, available_energy(run.model),
-        float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
-        [f"{mark.text}: the energy balance from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
-         for mark in summary.marks],
-        None if port is None else port_verdict(run, port), summary.energy_use,
-    )  # fmt: skip
+        reason,
+        summary.finished,
+        np.array(run.times),
+        lines["supplied"],
+        stored,
+        lines["dissipated"],
+        lines["scheme"],
+        lines["law"],
+        totals[:, accounts.of("rate")].sum(axis=1) - impact_losses.sum(axis=1) - stored_sum,
+        totals[:, -1],
+        supplied - stored_sum - dissipated,
+        available_energy(run.model),
+        float(run.model.tables.settings[0]["datum"]),
+        settings | {"cells": run.model.cells},
+        summary.steps,
+        [
+            f"{mark.text}: the energy balance from {run.model.case.amount(mark.time, 'time', 6)} "
+            "on is not to be trusted"
+            for mark in summary.marks
+        ],
+        None if port is None else port_verdict(run, port),
+        summary.energy_use,
+    )
 
 
 def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str, np.ndarray]:
@@ -471,7 +572,11 @@ def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> di
     lines = {}
     for k, account in enumerate(accounts):
         if account.category == kind and columns[:, k].any():
-            several = kind == "dissipated" and account.kind not in IMPLIED_KINDS or account.kind == "over the rim"
+            several = (
+                kind == "dissipated"
+                and account.kind not in IMPLIED_KINDS
+                or account.kind == "over the rim"
+            )
             name = f"{account.place} {account.kind}" if several else account.place
             lines[name] = lines.get(name, 0.0) + columns[:, k]
     return lines
@@ -483,13 +588,19 @@ def check_port(case, port: str | None) -> None:
     if port is not None and port not in ports:
         hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
         hint = hint if ports else "; the case has no such node"
-        raise FvsolveError(f'no port named "{port}"; expected a reservoir, an inflow or a junction{hint}')
+        raise FvsolveError(
+            f'no port named "{port}"; expected a reservoir, an inflow or a junction{hint}'
+        )
 
 
 def port_verdict(run: EnergyRun, port: str) -> Port:
     """Check condition (2) of passivity (see `Port`) at every step of a run; port : name of the node."""
     lines, totals = run.accounts.accounts, np.array(run.step_totals)
-    own_lines = [k for k, account in enumerate(lines) if account.category == "supplied" and account.place == port]
+    own_lines = [
+        k
+        for k, account in enumerate(lines)
+        if account.category == "supplied" and account.place == port
+    ]
     supplied_lines = run.accounts.of("supplied")
     work = totals[:, own_lines].sum(axis=1)
     others = totals[:, supplied_lines].sum(axis=1) - work
@@ -500,24 +611,44 @@ def port_verdict(run: EnergyRun, port: str) -> Port:
     size = start + np.max(np.abs(work)) + np.max(np.abs(others))
     t = run.step_times
     verdict = Port(
-        port, float(work[least]), float(t[least]), start, float(others[worst]), float(margin[worst]), float(t[worst]),
-        bool(margin[worst] >= -ROUNDING * size), work[at_rows], -(start + others)[at_rows],
-    )  # fmt: skip
+        port,
+        float(work[least]),
+        float(t[least]),
+        start,
+        float(others[worst]),
+        float(margin[worst]),
+        float(t[worst]),
+        bool(margin[worst] >= -ROUNDING * size),
+        work[at_rows],
+        -(start + others)[at_rows],
+    )
     return replace(verdict, text=port_text(verdict, run.model.case))
 
 
 def port_text(port: Port, case) -> str:
     """Verdict on the passivity at a port as a sentence, in the units of `[output]` of the case."""
-    energies = port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin
+    energies = (
+        port.work,
+        0.0 - port.at_start,
+        -(port.at_start + port.others),
+        port.others,
+        port.margin,
+    )
     work, least, own_bound, others, margin = (case.amount(value, "energy", 6) for value in energies)
     if port.others:
         bound = f"-(E0 + others) = {own_bound} (E0: energy stored at the start; others: {others} from other ports)"
     else:
         bound = f"-E0 = {least} (E0: energy stored at the start)"
-    verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
+    verdict = (
+        "passive over this run"
+        if port.passive
+        else "NOT passive: the network supplied more energy than it had"
+    )
     time, margin_time = (case.amount(value, "time", 6) for value in (port.time, port.t_margin))
-    return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
-            f"least margin {margin} at {margin_time}: {verdict}")  # fmt: skip
+    return (
+        f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
+        f"least margin {margin} at {margin_time}: {verdict}"
+    )
 
 
 def write_table(result: Energy, path: Path) -> None:
@@ -527,9 +658,15 @@ def write_table(result: Energy, path: Path) -> None:
         columns |= {f"{kind} {name} [J]": values for name, values in getattr(result, kind).items()}
     if result.port is not None:
         columns |= {"integral of p q [J]": result.port.course, "bound [J]": result.port.bound}
-    columns |= {"step [J]": result.step, "newton [J]": result.newton, "remainder [J]": result.remainder}
+    columns |= {
+        "step [J]": result.step,
+        "newton [J]": result.newton,
+        "remainder [J]": result.remainder,
+    }
     text = [",".join(columns)]
-    text += [",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))]
+    text += [
+        ",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))
+    ]
     write_file(path, "\n".join(text) + "\n")
 
 
@@ -549,7 +686,13 @@ PAIR_COLUMNS = (  # columns of a row
 
 
 def measure_pairs(
-    case, schemes=None, methods=None, port: str | None = None, progress=None, points=None, watch=None
+    case,
+    schemes=None,
+    methods=None,
+    port: str | None = None,
+    progress=None,
+    points=None,
+    watch=None,
 ) -> list[dict]:
     """Run a case with every pair of scheme and method; returns a row (dict) with the energy remainders of each pair.
 
@@ -581,7 +724,11 @@ def measure_pairs(
 
 def pair_result(case, scheme: str, method: str, port: str | None, watch=None) -> dict:
     """Row of a pair: energy remainders of a run of the case with this scheme and method, see `measure_pairs`."""
-    missing = {column.key: None for column in PAIR_COLUMNS if column.key not in ("scheme", "method", "reason")}
+    missing = {
+        column.key: None
+        for column in PAIR_COLUMNS
+        if column.key not in ("scheme", "method", "reason")
+    }
     try:
         result = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
     except CaseError as error:
@@ -591,8 +738,13 @@ def pair_result(case, scheme: str, method: str, port: str | None, watch=None) ->
     sound = result.ok and bool(np.all(np.isfinite(result.remainder)))
     least = float(np.min(result.numerical_remainder))
     return missing | {
-        "remainder": float(result.remainder[-1]), "scheme_loss": sum(losses), "step_loss": float(result.step[-1]),
+        "remainder": float(result.remainder[-1]),
+        "scheme_loss": sum(losses),
+        "step_loss": float(result.step[-1]),
         "newton_loss": float(result.newton[-1]),
-        "least": least, "relative": result.relative, "creates": not sound or least < -ROUNDING * result.throughput,
-        "margin": None if result.port is None else result.port.margin, "reason": result.reason,
-    }  # fmt: skip
+        "least": least,
+        "relative": result.relative,
+        "creates": not sound or least < -ROUNDING * result.throughput,
+        "margin": None if result.port is None else result.port.margin,
+        "reason": result.reason,
+    }

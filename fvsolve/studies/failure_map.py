@@ -44,9 +44,13 @@ from fvsolve.studies.reference import Reference, find_reference
 from fvsolve.studies.resolution import delay_lines, fixed_choices
 from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
 
-STABLE, RINGING, COARSE, WRONG, BLOWN_UP, REFUSED, NOT_RUN = (
-    "stable", "ringing", "coarse", "wrong", "blown up", "refused", "not run",
-)  # fmt: skip
+STABLE = "stable"
+RINGING = "ringing"
+COARSE = "coarse"
+WRONG = "wrong"
+BLOWN_UP = "blown up"
+REFUSED = "refused"
+NOT_RUN = "not run"
 VERDICT_TEXTS = {
     STABLE: "error within the tolerance, and smooth",
     RINGING: "finite, but oscillates from step to step, or oscillates more and faster than the reference",
@@ -56,11 +60,15 @@ VERDICT_TEXTS = {
     REFUSED: "fvsolve refused the case, or stopped with a reason",
     NOT_RUN: "too many implicit steps, or given up after too much time",
 }
-BLOWN_RANGES = 3.0  # a run farther outside the values of the reference, in ranges of a probe, has blown up
+# a run farther outside the values of the reference, in ranges of a probe, has blown up
+BLOWN_RANGES = 3.0
 MIN_SWINGS = 8  # successive changes of alternating sign that count as ringing
-SWING_RANGE, REFERENCE_SWING = 0.02, 1e-3  # least swings that count [range]: of a run, of the reference, may decay
-PACE_RATIO = 0.5  # swings count if they follow in less than this fraction of the time of those of the reference
-EXCESS_VARIATION = 0.25  # greatest excess of the variation of a probe, as a fraction of that of the reference
+# least swings that count [range]: of a run, of the reference, may decay
+SWING_RANGE, REFERENCE_SWING = 0.02, 1e-3
+# swings count if they follow in less than this fraction of the time of those of the reference
+PACE_RATIO = 0.5
+# greatest excess of the variation of a probe, as a fraction of that of the reference
+EXCESS_VARIATION = 0.25
 ERROR_RATIO = 0.75  # a shorter step helps if at most this fraction of the error remains
 
 
@@ -142,16 +150,23 @@ def excess_variation(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray
     rows, reference : float64[k, probes]  values of the run and the reference; ranges : float64[probes]
     """
     smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
-    variation, expected = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference))
+    variation, expected = (
+        np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference)
+    )
     excesses = (variation - expected) / np.maximum(expected, 1.0)
-    quick = [turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
-             for a, b in zip(smooth.T, smooth_reference.T, strict=True)]  # fmt: skip
+    quick = [
+        turn_interval(a, SWING_RANGE) < PACE_RATIO * turn_interval(b, REFERENCE_SWING)
+        for a, b in zip(smooth.T, smooth_reference.T, strict=True)
+    ]
     return float(np.max(excesses[quick], initial=0.0))
 
 
 def turn_interval(values: np.ndarray, height: float) -> float:
     """Median number of rows between turning points of swings of `height` or more; inf for fewer than two points."""
-    turns, low, high, direction = [], 0, 0, 0
+    turns = []
+    low = 0
+    high = 0
+    direction = 0
     for i, value in enumerate(values):
         low, high = (i if value < values[low] else low), (i if value > values[high] else high)
         if direction >= 0 and value < values[high] - height:
@@ -175,24 +190,42 @@ def probe_ranges(reference: np.ndarray) -> np.ndarray:
 def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
     """Measures of a run against a reference, interpolated to its times; windows : float64[steps, probes] each."""
     if not outcome.ok:
-        return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
-    t, rows, reference_rows = outcome.rows[:, 0], outcome.rows[:, 1:], reference.rows(reference.run)
-    expected = np.column_stack([np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T])
+        return Measures(
+            outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0)
+        )
+    t = outcome.rows[:, 0]
+    rows = outcome.rows[:, 1:]
+    reference_rows = reference.rows(reference.run)
+    expected = np.column_stack(
+        [np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T]
+    )
     widths, steps = probe_ranges(reference_rows), np.concatenate([rows[-1:], *windows])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = [Deviation(off, time_weights(t), width).ranges()["L1"]
-                 for off, width in zip((rows - expected).T, widths, strict=True)]  # fmt: skip
-        outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
+        error = [
+            Deviation(off, time_weights(t), width).ranges()["L1"]
+            for off, width in zip((rows - expected).T, widths, strict=True)
+        ]
+        outside = (
+            np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps)
+            / widths
+        )
         return Measures(
-            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())),
-            ringing_amplitude(windows, widths), excess_variation(rows, expected, widths), outcome.counts["steps"],
+            outcome.reason,
+            True,
+            False,
+            float(np.max(error)),
+            max(0.0, float(outside.max())),
+            ringing_amplitude(windows, widths),
+            excess_variation(rows, expected, widths),
+            outcome.counts["steps"],
             outcome.seconds,
-        )  # fmt: skip
+        )
 
 
 WINDOW_STEPS = 9  # least number of successive steps in a window
 CPU_LIMIT = 10.0  # CPU time after which a run is given up [s]
-WINDOW_COUNT = 30  # in long runs the distance of windows is this fraction of the steps taken: 1 / 30
+# in long runs the distance of windows is this fraction of the steps taken: 1 / 30
+WINDOW_COUNT = 30
 
 
 class RecordedRun(CappedRun):
@@ -211,7 +244,9 @@ class RecordedRun(CappedRun):
     def pause(self) -> None:
         """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
         self.check()
-        self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
+        self.windows[-1].append(
+            self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out)
+        )
         apart = int(self.loop.state["steps"]) // WINDOW_COUNT
         self.budget = 1.0
         if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:
@@ -291,12 +326,17 @@ class FailureMap(PlainData):
 
     def row(self, scheme: str, method: str) -> list[Square]:
         """Runs of a scheme and a method in the order of the columns."""
-        return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
+        return [
+            square for square in self.squares if (square.scheme, square.method) == (scheme, method)
+        ]
 
 
 KEY_VALUES = Kind(
     lambda value: (
-        is_row(value, lambda item: True) and len(value) == 2 and TEXT.accepts(value[0]) and ROW.accepts(value[1])
+        is_row(value, lambda item: True)
+        and len(value) == 2
+        and TEXT.accepts(value[0])
+        and ROW.accepts(value[1])
     ),
     'a key and its values, for example ("links.main.cells", [20, 40])',
 )
@@ -308,11 +348,19 @@ KEY_VALUES = Kind(
     **STUDY_ARGUMENTS,
 )  # fmt: skip
 def failure_map(
-    case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
-    courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
-    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | ResultCache | None = None,
-    progress: Progress | None = None, set: Mapping | None = None, jobs: int = 1, dask: str | None = None,
-) -> FailureMap:  # fmt: skip
+    case,
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    courants: Sequence[float] | None = None,
+    steps: Sequence[float] | None = None,
+    key: tuple[str, Sequence] | None = None,
+    tolerance: float = TOLERANCE,
+    out: str | Path | ResultCache | None = None,
+    progress: Progress | None = None,
+    set: Mapping | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
+) -> FailureMap:
     """Run a case with every scheme and method at every step (or value of a key), and give a verdict on each run.
 
     case, set : as in `run`; schemes, methods : names; default: `default_schemes` and seven usual methods
@@ -329,12 +377,19 @@ def failure_map(
     refuse_basins(case, "map")
     case = load(case, fixed_choices(case))
     if not (math.isfinite(tolerance) and tolerance > 0):
-        raise FvsolveError(f"--tolerance {tolerance} is out of range; expected a positive number, for example 0.02")
+        raise FvsolveError(
+            f"--tolerance {tolerance} is out of range; expected a positive number, for example 0.02"
+        )
     base = {"output.every": (case.numerics.end - case.numerics.start) / OUTPUT_ROWS}
     column_set = map_columns(case, base, courants, steps, key)
     own_schemes = name_list(schemes) or default_schemes(case, column_set)
     schemes, methods = _check_names(own_schemes, name_list(methods) or METHODS)
-    places = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(column_set.sets))]
+    places = [
+        (scheme, method, k)
+        for scheme in schemes
+        for method in methods
+        for k in range(len(column_set.sets))
+    ]
     squares, report = [], progress or (lambda *_: None)
     with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
         trials = MapRuns(case, base, column_set, tolerance, points, queue)
@@ -347,9 +402,19 @@ def failure_map(
         words = f"{reference.words}, checked by {reference.second}"
     limited = tuple(name for name in schemes if name in LIMITED and column_set.wave_rate)
     return FailureMap(
-        case.name, column_set.name, tuple(column_set.values), schemes, methods, tuple(squares), tolerance,
-        words, trials.uncertainty, column_set.wave_rate, limited, bool(delay_lines(case)),
-    )  # fmt: skip
+        case.name,
+        column_set.name,
+        tuple(column_set.values),
+        schemes,
+        methods,
+        tuple(squares),
+        tolerance,
+        words,
+        trials.uncertainty,
+        column_set.wave_rate,
+        limited,
+        bool(delay_lines(case)),
+    )
 
 
 class MapRuns:
@@ -360,9 +425,21 @@ class MapRuns:
     """
 
     def __init__(
-        self, case, base: dict, column_set: Columns, tolerance: float, points: ResultCache, queue: RunQueue
+        self,
+        case,
+        base: dict,
+        column_set: Columns,
+        tolerance: float,
+        points: ResultCache,
+        queue: RunQueue,
     ) -> None:
-        self.case, self.base, self.columns, self.tolerance, self.cache = case, base, column_set, tolerance, points
+        self.case, self.base, self.columns, self.tolerance, self.cache = (
+            case,
+            base,
+            column_set,
+            tolerance,
+            points,
+        )
         self.queue, self.collecting = queue, False
         self.span = column_set.span
         self._references: dict[int, Reference] = {}
@@ -444,12 +521,19 @@ class MapRuns:
         If only the error decides on the verdict and is above the tolerance, a run with half the step follows, and if
         that does not help, one with a quarter. Implicit methods are not run for more than 50 000 steps.
         """
-        trial = {**self.base, **self.columns.sets[k], "numerics.scheme": scheme, "numerics.method": method}
+        trial = {
+            **self.base,
+            **self.columns.sets[k],
+            "numerics.scheme": scheme,
+            "numerics.method": method,
+        }
         step, waves = trial.get("numerics.step"), self.columns.wave_rate
         limit, errors = self.limit(scheme, method, k), []
 
         def shorter() -> Measures:
-            measures = self.measure({**trial, **_shorter_steps(self.case, trial, 2 ** (len(errors) + 1))}, k)
+            measures = self.measure(
+                {**trial, **_shorter_steps(self.case, trial, 2 ** (len(errors) + 1))}, k
+            )
             errors.append(measures.error)
             return measures
 
@@ -460,12 +544,15 @@ class MapRuns:
             run = self.measure(trial, k)
             word = verdict(run, shorter, self.tolerance)
         courant = step * waves if step and waves else None
-        return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
+        return Square(
+            scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit
+        )
 
     def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
         """Make all runs in other processes, shorter steps last; places : (scheme, method, column) of each square."""
         while missing := self.missing_runs(places):
-            missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
+            # the most expensive last
+            missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))
             requests = [RunRequest(run_recorded, run.keys) for run in missing]
             for count, at in enumerate(self.queue.run_ahead(requests), 1):
                 self.measure(missing[at].trial, missing[at].column)
@@ -487,17 +574,22 @@ class MapRuns:
 
         Raises MissingRun for a run that is not in the cache while `missing_runs` collects such runs.
         """
-        every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # no rows between two steps
+        # no rows between two steps
+        every = max(trial["output.every"], trial.get("numerics.step", 0.0))
         reference, run = self.reference(k), {**trial, "output.every": every}
         extra = {"study": "map", "set": trial, "reference": reference.words}
         if self.collecting and self.cache.find(self.case, extra) is None:
             raise MissingRun(trial, run, k)
 
         def make() -> dict:
-            return asdict(measure_run(*self.queue(self.case, RunRequest(run_recorded, run)), reference))
+            return asdict(
+                measure_run(*self.queue(self.case, RunRequest(run_recorded, run)), reference)
+            )
 
         data = self.cache.get(self.case, extra, make)
-        return Measures(**{name: math.nan if value is None else value for name, value in data.items()})
+        return Measures(
+            **{name: math.nan if value is None else value for name, value in data.items()}
+        )
 
 
 class MissingRun(Exception):
@@ -529,7 +621,9 @@ def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...
     from fvsolve.case.sections import MethodNames
     from fvsolve.core.schemes import SCHEMES
 
-    for kind, requested, known in zip(("scheme", "method"), given, (tuple(SCHEMES), tuple(MethodNames())), strict=True):
+    for kind, requested, known in zip(
+        ("scheme", "method"), given, (tuple(SCHEMES), tuple(MethodNames())), strict=True
+    ):
         for name in requested:
             if name not in known:
                 raise FvsolveError(f'no {kind} named "{name}"{did_you_mean(name, known)}')

@@ -42,7 +42,9 @@ def eigenvalues_of(case, set: dict) -> np.ndarray | None:
         return None
     rest = np.zeros(model.y_size)
     times = (model.case.numerics.start, model.case.numerics.end)
-    return np.concatenate([np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times])
+    return np.concatenate(
+        [np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times]
+    )
 
 
 def modes_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
@@ -77,19 +79,27 @@ class WaveGrowthLimit:
 
     def __init__(self, case, set: dict, steps: list[float]) -> None:
         self.case, self.set = case, set
-        self.steps = [float(h) for h in np.geomspace(min(steps) / STEP_MARGIN, STEP_MARGIN * max(steps), STEP_COUNT)]
+        self.steps = [
+            float(h)
+            for h in np.geomspace(min(steps) / STEP_MARGIN, STEP_MARGIN * max(steps), STEP_COUNT)
+        ]
         self.models: dict[float, object] = {}
 
     def model(self, h: float):
         """Model with delay lines divided into stretches for steps of h [s]."""
         if h not in self.models:
-            self.models[h] = study_model(self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"})
+            self.models[h] = study_model(
+                self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"}
+            )
         return self.models[h]
 
     def grows(self, method: str, h: float) -> bool:
         """True if waves between a storing node and a delay line grow 1000 times or more in a run of steps h [s]."""
         numerics = self.case.numerics
-        return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= VISIBLE_GROWTH
+        return (
+            wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0]
+            >= VISIBLE_GROWTH
+        )
 
     def __call__(self, method: str) -> float | None:
         """Greatest step [s] up to which waves grow less than 1000 times in the run with a method.
@@ -97,10 +107,14 @@ class WaveGrowthLimit:
         It is inf if they do so at all steps tried, and 0 if they grow more at the shortest of these steps. The result
         is None for Rosenbrock methods if delay lines end at storing nodes, as their growth is not known.
         """
-        if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
+        if method_named(method).kind == "linear" and any(
+            storing_nodes(self.model(self.steps[0]), 1.0)
+        ):
             return None
         grows = functools.partial(self.grows, method)
-        return greatest_step(grows, self.steps, width=0.0, halvings=HALVINGS, mean=geometric_mean).step
+        return greatest_step(
+            grows, self.steps, width=0.0, halvings=HALVINGS, mean=geometric_mean
+        ).step
 
 
 def geometric_mean(low: float, high: float) -> float:
@@ -111,7 +125,8 @@ def geometric_mean(low: float, high: float) -> float:
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
 COLUMN_COUNT = 10  # default number of steps, if waves are not the fastest
 STIFFNESS_RATIO = 8.0  # a case is stiff if its fastest rate is above this multiple of the wave rate
-STIFF_STEPS = 1e5  # without pipes a case is stiff if its fastest rate times the time span is above this
+# without pipes a case is stiff if its fastest rate times the time span is above this
+STIFF_STEPS = 1e5
 MAP_KEYS = tuple(f"numerics.{name}" for name in ("scheme", "method", "courant", "step", "rtol"))
 
 
@@ -144,7 +159,9 @@ class Columns:
     def label(self, k: int) -> str:
         """Key and value of column k in words."""
         value = self.values[k]
-        return f"{self.name} = {value:.3g}" if isinstance(value, float) else f"{self.name} = {value}"
+        return (
+            f"{self.name} = {value:.3g}" if isinstance(value, float) else f"{self.name} = {value}"
+        )
 
 
 def map_columns(case, base: dict, courants, steps, key) -> Columns:
@@ -162,10 +179,14 @@ def map_columns(case, base: dict, courants, steps, key) -> Columns:
         control |= {"numerics.step": steps[0]} if steps is not None else {}
         sets = [{name: value, **control} for value in values]
         rates = [_fastest_and_wave_rate(case, {**base, name: value}) for value in values]
-        return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
+        return Columns(
+            name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]})
+        )
     rates, waves = _fastest_and_wave_rate(case, base), _wave_rate(case, base)
     if courants is not None and waves is None:
-        raise FvsolveError("Courant numbers need pipes with cells, but this case has no such pipe; use --step")
+        raise FvsolveError(
+            "Courant numbers need pipes with cells, but this case has no such pipe; use --step"
+        )
     chosen = [c / waves for c in courants] if courants is not None else steps
     chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
     return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
@@ -181,7 +202,11 @@ def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
     model = study_model(case, set)
     waves = float(model.wave_rates.max()) if model.cells else None
     eigenvalues = eigenvalues_of(case, set)
-    fastest = float(np.abs(eigenvalues).max(initial=0.0)) if eigenvalues is not None else (waves or math.inf)
+    fastest = (
+        float(np.abs(eigenvalues).max(initial=0.0))
+        if eigenvalues is not None
+        else (waves or math.inf)
+    )
     return fastest, waves
 
 
@@ -200,7 +225,9 @@ def cells_for_delay_lines(case, set: dict) -> dict:
 
 def _slowest_travel_time(case) -> float:
     """Greatest travel time of a wave along a delay line of the case [s]; 0 without delay lines."""
-    return max((case.links[name].length / case.wave_speed(name) for name in delay_lines(case)), default=0.0)
+    return max(
+        (case.links[name].length / case.wave_speed(name) for name in delay_lines(case)), default=0.0
+    )
 
 
 def _default_steps(case, rates, waves: float | None) -> list[float]:
@@ -213,11 +240,15 @@ def _default_steps(case, rates, waves: float | None) -> list[float]:
     rates : result of `_fastest_and_wave_rate`
     waves : wave rate of the cells of the case itself [1/s], None without cells
     """
-    fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _slowest_travel_time(case)
+    fastest = rates[0]
+    span = case.numerics.end - case.numerics.start
+    travel = _slowest_travel_time(case)
     if not waves and travel:
         quickest = float(np.abs(eigenvalues_of(case, {})).max(initial=0.0))
         shortest = min(travel / 100, 0.3 / quickest if quickest > 0.0 else math.inf)
-        return [float(f"{h:.2g}") for h in np.geomspace(shortest, min(span / 10, travel), COLUMN_COUNT)]
+        return [
+            float(f"{h:.2g}") for h in np.geomspace(shortest, min(span / 10, travel), COLUMN_COUNT)
+        ]
     if waves and fastest <= STIFFNESS_RATIO * waves:
         return [c / waves for c in COURANTS]
     longest = min(span / 10, 1.5 / waves if waves else math.inf)
@@ -248,4 +279,6 @@ def _check_options(courants, steps, key) -> None:
     if key is not None and not key[1]:
         raise FvsolveError("--key has no values; expected KEY=a,b,c with at least one value")
     if key is not None and key[0] in MAP_KEYS:
-        raise FvsolveError(f"--key {key[0]} is impossible: the map sets it by --scheme, --method, --courant and --step")
+        raise FvsolveError(
+            f"--key {key[0]} is impossible: the map sets it by --scheme, --method, --courant and --step"
+        )

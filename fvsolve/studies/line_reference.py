@@ -19,10 +19,13 @@ from fvsolve.features.delay_lines.choice import reason_for_cells
 from fvsolve.features.delay_lines.feature import lines_of
 from fvsolve.studies.resolution import pipe_model_keys, pipes
 
-FIRST_STEPS, FEWEST_STEPS = 4, 4000  # steps of the first reference: for each step of the run, and at least
+# steps of the first reference: for each step of the run, and at least
+FIRST_STEPS, FEWEST_STEPS = 4, 4000
 STEP_RATIO, TOLERANCE_RATIO = 4, 8.0
-TOLERANCES = (2.5e-5, 1e-4, 4e-4, 1.6e-3, 6.4e-3)  # of the second reference: the least that is cheap enough
-LEAST_WITH_JUMPS = 4e-4  # least tolerance if schedules jump, because smaller reflections of jumps are many
+# of the second reference: the least that is cheap enough
+TOLERANCES = (2.5e-5, 1e-4, 4e-4, 1.6e-3, 6.4e-3)
+# least tolerance if schedules jump, because smaller reflections of jumps are many
+LEAST_WITH_JUMPS = 4e-4
 MOST_STRETCH_STEPS = 2e7  # number of steps times stretches below which a tolerance is cheap enough
 METHOD = "rk4"
 
@@ -32,7 +35,9 @@ def can_be_lines(case: Any) -> bool:
     lines = pipes(case)
     if not lines or case.meshes or any(link.kind == "conduit" for link in case.links.values()):
         return False
-    if any((line.pipe_model or case.numerics.pipe_model) == "quasi-steady" for line in lines.values()):
+    if any(
+        (line.pipe_model or case.numerics.pipe_model) == "quasi-steady" for line in lines.values()
+    ):
         return False
     return not any(reason_for_cells(case, name, line) for name, line in lines.items())
 
@@ -49,7 +54,9 @@ def line_references(
         return {}
     first = max(FIRST_STEPS * steps, FEWEST_STEPS)
     try:
-        step, steps, velocity = duration / (STEP_RATIO * first), STEP_RATIO * first, case.numerics.delay_velocity
+        step = duration / (STEP_RATIO * first)
+        steps = STEP_RATIO * first
+        velocity = case.numerics.delay_velocity
         tolerance = cheap_tolerance(case, step, steps, velocity)
         if progress is not None:
             progress("delay lines with short steps")
@@ -57,7 +64,9 @@ def line_references(
         flows = {name: [f"links.{name}.flow@{end}" for end in (0, 1)] for name in pipes(case)}
         named = settings.get("output.probes", [probe.text for probe in case.output.probes])
         added = [text for pair in flows.values() for text in pair if text not in named]
-        coarse = run(load(case, keys), set=settings | {"output.probes": [*named, *added]}, pictures=False)
+        coarse = run(
+            load(case, keys), set=settings | {"output.probes": [*named, *added]}, pictures=False
+        )
         if coarse.reason != "finished":
             return {}
         if progress is not None:
@@ -67,7 +76,9 @@ def line_references(
             for text in flows[name]:  # at both ends
                 velocity = max(velocity, float(np.abs(coarse.si(text)).max()) / section)
         tolerance = cheap_tolerance(case, step, steps, velocity)
-        fine = run(load(case, line_keys(case, step, tolerance, velocity)), set=settings, pictures=False)
+        fine = run(
+            load(case, line_keys(case, step, tolerance, velocity)), set=settings, pictures=False
+        )
     except (CaseError, RunError):
         return {}
     return {1: coarse, STEP_RATIO: fine} if fine.reason == "finished" else {}
@@ -78,16 +89,24 @@ def line_keys(case: Any, step: float, tolerance: float, velocity: float) -> dict
 
     tolerance, velocity : `delay_tolerance` and `delay_velocity` [m/s]
     """
-    keys: dict[str, Any] = {"numerics.pipe_model": "delay-line", "numerics.method": METHOD, "numerics.step": step}
+    keys: dict[str, Any] = {
+        "numerics.pipe_model": "delay-line",
+        "numerics.method": METHOD,
+        "numerics.step": step,
+    }
     keys |= {"numerics.delay_tolerance": tolerance, "numerics.delay_velocity": velocity}
-    return keys | pipe_model_keys({name: "delay-line" for name, line in pipes(case).items() if line.pipe_model})
+    return keys | pipe_model_keys(
+        {name: "delay-line" for name, line in pipes(case).items() if line.pipe_model}
+    )
 
 
 def cheap_tolerance(case: Any, step: float, steps: int, velocity: float) -> float:
     """Least of `TOLERANCES` whose stretches, times the number of steps, are below `MOST_STRETCH_STEPS`."""
     for tolerance in TOLERANCES:
         model = model_of(load(case, line_keys(case, step, tolerance, velocity)))
-        if tolerance < LEAST_WITH_JUMPS and any(jump for t, jump in model.breaks if t > case.numerics.start):
+        if tolerance < LEAST_WITH_JUMPS and any(
+            jump for t, jump in model.breaks if t > case.numerics.start
+        ):
             continue
         if math.prod((steps, int(lines_of(model)["stretches"].sum()))) <= MOST_STRETCH_STEPS:
             return tolerance

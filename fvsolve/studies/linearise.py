@@ -111,21 +111,41 @@ class Linear:
             entries = a.tocoo()
             a = {"row": entries.row, "column": entries.col, "value": entries.data}
         return {
-            "case": self.at.model.case.name, "at": self.at.t, "when": self.at.when,
-            "scheme": self.at.model.case.numerics.scheme if self.at.model.cells or self.at.model.meshed else None,
-            "states": self.states, "state_units": self.state_units, "inputs": self.inputs,
-            "input_units": self.input_units, "input_values": self.input_values, "outputs": self.outputs,
-            "output_units": self.output_units, "output_values": self.output_values,
-            "A": a, "B": self.b, "C": self.c, "D": self.d, "error": self.error,
-            "state": self.at.y, "rate": self.at.rate,
-        }  # fmt: skip
+            "case": self.at.model.case.name,
+            "at": self.at.t,
+            "when": self.at.when,
+            "scheme": self.at.model.case.numerics.scheme
+            if self.at.model.cells or self.at.model.meshed
+            else None,
+            "states": self.states,
+            "state_units": self.state_units,
+            "inputs": self.inputs,
+            "input_units": self.input_units,
+            "input_values": self.input_values,
+            "outputs": self.outputs,
+            "output_units": self.output_units,
+            "output_values": self.output_values,
+            "A": a,
+            "B": self.b,
+            "C": self.c,
+            "D": self.d,
+            "error": self.error,
+            "state": self.at.y,
+            "rate": self.at.rate,
+        }
 
 
 @declared("study")
 @validated(inputs=NAMES, outputs=NAMES, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def linearise(
-    case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,
-) -> Linear:  # fmt: skip
+    case,
+    inputs=(),
+    outputs=None,
+    at: float | None = None,
+    before: bool = False,
+    scheme: str | None = None,
+    set=None,
+) -> Linear:
     """Linearise a case by central differences at its start, or at the time `at` [s], with schedules held constant.
 
     inputs : names such as "valve.opening", "lake.pressure"; outputs : probes; default: the probes of the case
@@ -137,10 +157,14 @@ def linearise(
     """
     set = dict(set or {}) | ({} if scheme is None else {"numerics.scheme": scheme})
     point = operating_point(case, set, at, before, outputs or ())
-    return linearise_at(point, inputs, len(outputs) if outputs is not None else len(point.model.probes))
+    return linearise_at(
+        point, inputs, len(outputs) if outputs is not None else len(point.model.probes)
+    )
 
 
-def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: bool = False) -> Linear:
+def linearise_at(
+    at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: bool = False
+) -> Linear:
     """Linearise about an operating point, with named inputs; outputs are the first `outputs` of its probes.
 
     hold_delays : True to hold the outputs of delays, for step limits; else a delay that is not an input is refused
@@ -160,22 +184,37 @@ def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0, hold_delays: b
     if uncut and not hold_delays:
         text = f"{listing(uncut)} of type delay needs earlier inputs, so no matrix A describes it"
         raise FvsolveError(f'{text}; cut the loop there, with the input "{uncut[0]}.output"')
-    cut = {name: value_of_input(at, available[name]) for name in inputs if available[name].held is not None}
+    cut = {
+        name: value_of_input(at, available[name])
+        for name in inputs
+        if available[name].held is not None
+    }
     at = replace(at, model=hold(model, cut))
     a, size, error_a, steps = state_matrix(at)
     c, error_c = output_matrix(at, outputs, steps)
     values = [value_of_input(at, available[name]) for name in inputs]
-    columns = [input_column(at, name, available[name], value, size, outputs, steps)
-               for (name, value) in zip(inputs, values, strict=True)]  # fmt: skip
-    n, bd = model.y_size, np.array([column for column, _ in columns]).reshape(len(inputs), model.y_size + outputs).T
+    columns = [
+        input_column(at, name, available[name], value, size, outputs, steps)
+        for (name, value) in zip(inputs, values, strict=True)
+    ]
+    n = model.y_size
+    bd = np.array([column for column, _ in columns]).reshape(len(inputs), model.y_size + outputs).T
     error = max((error for _, error in columns), default=0.0)
     probes = model.case.probes[:outputs]
     return Linear(
-        at, a, bd[:n].copy(), c, bd[n:].copy(), inputs, tuple(probe.text for probe in probes),
+        at,
+        a,
+        bd[:n].copy(),
+        c,
+        bd[n:].copy(),
+        inputs,
+        tuple(probe.text for probe in probes),
         tuple(available[name].sort.unit for name in inputs),
         tuple(probe.unit or DIMENSIONS[probe.dimension].si for probe in probes),
-        tuple(values), tuple(responses(at, at.y, outputs)[n:].tolist()), {"A": error_a, "C": error_c, "BD": error},
-    )  # fmt: skip
+        tuple(values),
+        tuple(responses(at, at.y, outputs)[n:].tolist()),
+        {"A": error_a, "C": error_c, "BD": error},
+    )
 
 
 def refuse_limiter(model) -> None:
@@ -186,7 +225,9 @@ def refuse_limiter(model) -> None:
         if model.meshed and all(part.is_grid for part in model.meshed):
             linear = "upwind or upwind5"
         elif "upwind5" in schemes and not model.meshed:
-            linear = f"{SCHEMES[scheme].twin} (equals {scheme} in smooth solutions), upwind or upwind5"
+            linear = (
+                f"{SCHEMES[scheme].twin} (equals {scheme} in smooth solutions), upwind or upwind5"
+            )
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
             f"the deviation; linearise with a linear scheme, --scheme {linear}"
@@ -210,7 +251,9 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     """
     model = at.model
     usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
-    width = np.array([usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))])
+    width = np.array(
+        [usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))]
+    )
     low, high = input_.sort.least, input_.sort.greatest
     differences = two_sided_differences
     if input_.sort.bounded:
@@ -226,29 +269,44 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
 
     x = np.array([value])
     sides = differences(at_input, x, width, at_input(x), steps)
-    slope, error, kink = longest_step_slopes(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
+    slope, error, kink = longest_step_slopes(
+        *sides, np.concatenate([size, np.zeros(outputs)]), steps
+    )
     if max(np.max(error), np.max(kink)) > SLOPE_TOLERANCE:
-        reason = "differ" if np.max(kink) > SLOPE_TOLERANCE else "depend on the size of the small deviation"
-        raise FvsolveError(f"{name} = {value:g} cannot be linearised: the slopes for a rise and a fall of this input "
-                           f"{reason}; set another value with --set, or choose another time with --at")  # fmt: skip
+        reason = (
+            "differ"
+            if np.max(kink) > SLOPE_TOLERANCE
+            else "depend on the size of the small deviation"
+        )
+        raise FvsolveError(
+            f"{name} = {value:g} cannot be linearised: the slopes for a rise and a fall of this input "
+            f"{reason}; set another value with --set, or choose another time with --at"
+        )
     return slope / width[0], float(np.max(error))
 
 
 # eigenvalues ------------------------------------------------------------------------------------------------------
 
-MAX_DENSE = 1500  # greatest number of states for which all eigenvalues are computed; above, some by ARPACK
+# greatest number of states for which all eigenvalues are computed; above, some by ARPACK
+MAX_DENSE = 1500
 ARPACK_COUNT = 20  # eigenvalues that ARPACK computes at each place
-RIM_PLACES = 5  # places on the spectral circle, from i to -1: the lower half plane mirrors the upper one
+# places on the spectral circle, from i to -1: the lower half plane mirrors the upper one
+RIM_PLACES = 5
 RESTARTS, TIME_LIMIT = 12, 10.0  # restarts of ARPACK at each place; time limit of all places [s]
 POLES = (
     Column("real", "real [1/s]", ".6g"),
-    Column("imaginary", "imaginary [1/s]", lambda pole: f"±{pole['imaginary']:.6g}" if pole["pair"] else "-"),
+    Column(
+        "imaginary",
+        "imaginary [1/s]",
+        lambda pole: f"±{pole['imaginary']:.6g}" if pole["pair"] else "-",
+    ),
     Column("pair"),
     Column("frequency", "frequency [Hz]", ".6g"),
     Column("damping", words=".4f"),
     Column("time_constant", "time constant [s]", ".4g"),
 )
-ZERO_TOLERANCE = 1e-10  # of the greatest modulus: smaller eigenvalues and real or imaginary parts are round-off
+# of the greatest modulus: smaller eigenvalues and real or imaginary parts are round-off
+ZERO_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,11 +329,16 @@ class Spectrum:
         rows = []
         for s in self.values[self.values.imag >= 0.0]:
             size = abs(s)
-            rows.append({
-                "real": float(s.real), "imaginary": float(s.imag), "pair": bool(s.imag > 0.0),
-                "frequency": float(size / (2.0 * np.pi)), "damping": float(0.0 - s.real / size) if size > 0.0 else None,
-                "time_constant": float(1.0 / abs(s.real)) if s.real != 0.0 else None,
-            })  # fmt: skip
+            rows.append(
+                {
+                    "real": float(s.real),
+                    "imaginary": float(s.imag),
+                    "pair": bool(s.imag > 0.0),
+                    "frequency": float(size / (2.0 * np.pi)),
+                    "damping": float(0.0 - s.real / size) if size > 0.0 else None,
+                    "time_constant": float(1.0 / abs(s.real)) if s.real != 0.0 else None,
+                }
+            )
         return rows
 
 
@@ -317,10 +380,16 @@ def find_eigenvalues(e: Any) -> Spectrum:
             "states: use fewer cells, --set links.NAME.cells=100"
         )
     digits = 9 - int(np.log10(np.abs(values).max()))
-    distinct = sort_eigenvalues(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))
+    distinct = sort_eigenvalues(
+        np.unique(np.round(np.concatenate([values, values.conj()]), digits))
+    )
     on_rim = sum(part.size > 0 for part in by_place[1:])
     zero = "eigenvalues nearest 0" if by_place[0].size else "none near 0 converged"
-    on_circle = f"nearest {on_rim} of {RIM_PLACES} places" if on_rim else f"none of {RIM_PLACES} places converged"
+    on_circle = (
+        f"nearest {on_rim} of {RIM_PLACES} places"
+        if on_rim
+        else f"none of {RIM_PLACES} places converged"
+    )
     where = f"{zero}; on the circle |s| = {rim_radius:.4g} 1/s {on_circle}"
     return Spectrum(distinct, False, f"{distinct.size} of {n}: {where}; by ARPACK")
 
@@ -356,8 +425,16 @@ def eigenvalues_near(e: Any, place: complex, latest: float = np.inf) -> np.ndarr
 
     inverse = LinearOperator(e.shape, matvec=solve, dtype=kind)
     try:
-        return eigs(e, ARPACK_COUNT, sigma=place, OPinv=inverse, ncv=3 * ARPACK_COUNT, maxiter=RESTARTS, v0=start,
-                    return_eigenvectors=False)  # fmt: skip
+        return eigs(
+            e,
+            ARPACK_COUNT,
+            sigma=place,
+            OPinv=inverse,
+            ncv=3 * ARPACK_COUNT,
+            maxiter=RESTARTS,
+            v0=start,
+            return_eigenvectors=False,
+        )
     except ArpackNoConvergence as error:
         return error.eigenvalues
     except TimeoutError:
@@ -368,6 +445,8 @@ def sort_eigenvalues(values: np.ndarray) -> np.ndarray:
     """Sort eigenvalues by modulus; real and imaginary parts below 1e-10 of the greatest modulus are set to zero."""
     values = np.asarray(values, dtype=complex)
     floor = ZERO_TOLERANCE * np.max(np.abs(values), initial=0.0)
-    real, imaginary = (np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag))
+    real, imaginary = (
+        np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag)
+    )
     values = real + 1j * imaginary
     return values[np.lexsort((-values.imag, -values.real, np.round(np.abs(values), 12)))]

@@ -27,7 +27,8 @@ from fvsolve.features.controls.feature import blocks_of, numbers_of, with_blocks
 from fvsolve.studies.outcome import outcome, study_model
 from fvsolve.studies.resolution import as_cells, delay_lines
 
-DELAY_ERROR = 0.01  # relative error of a wave in cells that replace a delay line, for the frequency in the note
+# relative error of a wave in cells that replace a delay line, for the frequency in the note
+DELAY_ERROR = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,11 +112,20 @@ def frequency_limit_note(model, lines: list[str]) -> str:
     for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
         if pipe.name in lines:
             accurate = theta[pipe.cells * error <= DELAY_ERROR]
-            rates.append((accurate.max() if accurate.size else 0.0) * row["speed"] / row["dx"] / (2.0 * np.pi))
-    return f", delay lines as cells (error of waves at most {DELAY_ERROR:g} up to {min(rates):.3g} Hz)"
+            rates.append(
+                (accurate.max() if accurate.size else 0.0)
+                * row["speed"]
+                / row["dx"]
+                / (2.0 * np.pi)
+            )
+    return (
+        f", delay lines as cells (error of waves at most {DELAY_ERROR:g} up to {min(rates):.3g} Hz)"
+    )
 
 
-def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _state_at(
+    model, at: float | None
+) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Time [s], state, event flags, outputs and discrete numbers of controls of a run at the time `at` [s].
 
     They are those of the start if `at` is None.
@@ -127,13 +137,23 @@ def _state_at(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray, n
             applied, numbers = data.written.applied[:blocks].copy(), numbers_of(data).copy()
         return start, model.start.copy(), model.flags.copy(), applied, numbers
     if not start < at < np.inf:
-        raise FvsolveError(f"at = {at:g} s is not a finite time after the start of the case, {start:g} s")
+        raise FvsolveError(
+            f"at = {at:g} s is not a finite time after the start of the case, {start:g} s"
+        )
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
     run = outcome(replace(model, case=replace(model.case, numerics=numerics)))
     if not run.ok:
-        raise FvsolveError(f"the run to t = {at:g} s, where the case is to be linearised, failed: {run.reason}")
+        raise FvsolveError(
+            f"the run to t = {at:g} s, where the case is to be linearised, failed: {run.reason}"
+        )
     data = run.run_data
-    return float(at), run.y, data.armed, data.written.applied[:blocks].copy(), numbers_of(data).copy()
+    return (
+        float(at),
+        run.y,
+        data.armed,
+        data.written.applied[:blocks].copy(),
+        numbers_of(data).copy(),
+    )
 
 
 def with_held_schedules(model, t: float, before: bool = False):
@@ -152,7 +172,8 @@ def with_held_schedules(model, t: float, before: bool = False):
             schedules[k] = (len(tables.pieces) + k, 1)
     for k in {k for feature in model.features for k in feature.driven()} - {-1}:
         rows[k][4] = slope_at(tables, k, t, limit)
-    pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])  # the first ones contain formulas of blocks
+    # the first ones contain formulas of blocks
+    pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])
     tables = tables._replace(schedules=schedules, pieces=pieces)
     for feature in model.features:
         tables = tables._replace(**feature.held_tables(tables, t))
@@ -196,12 +217,17 @@ def has_limiter(model) -> bool:
 STEPS = 2.0 ** -np.arange(8.0, 25.0, 4.0)  # in units of the small deviation: 1/256 to 6e-8
 # if those give no slope: down to 1.5e-11, for the laminar range of a valve
 FINER_STEPS = 2.0 ** -np.arange(8.0, 37.0, 4.0)
-COARSE_STEPS = 2.0 ** -np.arange(2.0, 8.0, 2.0)  # before STEPS, for an input with a range: laminar ranges end below
+# before STEPS, for an input with a range: laminar ranges end below
+COARSE_STEPS = 2.0 ** -np.arange(2.0, 8.0, 2.0)
 SLOPE_TOLERANCE = 1e-3  # relative difference of steps or sides above which there is no derivative
-ROUNDING_SHARE = 1e-12  # of the size of a row, over the step: round-off of its slopes, with a safety factor of 1000
-HIDDEN_KINK = 1e-4  # of a row: least constant difference of both sides that is a kink; friction factors have 3e-6
-CONSTANT_SHARE = 0.25  # change of a constant difference of both sides with the step; a smooth one loses 15/16
-BEND_FACTOR = 4.0  # kink: sides differ by more than this times their change with the step; smooth ones by less
+# of the size of a row, over the step: round-off of its slopes, with a safety factor of 1000
+ROUNDING_SHARE = 1e-12
+# of a row: least constant difference of both sides that is a kink; friction factors have 3e-6
+HIDDEN_KINK = 1e-4
+# change of a constant difference of both sides with the step; a smooth one loses 15/16
+CONSTANT_SHARE = 0.25
+# kink: sides differ by more than this times their change with the step; smooth ones by less
+BEND_FACTOR = 4.0
 DENSE = 1000  # greatest number of states for which A is a full array
 C_TIME, MAX_ENTRIES = 20.0, 10_000_000  # time limit of C [s], greatest number of its entries
 RATE_FLOOR = 1e-10  # of the greatest rate per deviation: smaller rows are round-off of sums
@@ -233,7 +259,10 @@ def single_sided_differences(
 
     It is (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, second order in the step h : float64[steps, m].
     """
-    slopes = [(4.0 * (f(x + h * direction) - base) - (f(x + 2.0 * h * direction) - base)) / (2.0 * h) for h in steps]
+    slopes = [
+        (4.0 * (f(x + h * direction) - base) - (f(x + 2.0 * h * direction) - base)) / (2.0 * h)
+        for h in steps
+    ]
     return np.array(slopes), np.array(slopes)
 
 
@@ -257,7 +286,9 @@ def longest_step_slopes(
     started = np.maximum.accumulate(good, axis=0)
     stretch = good & ~np.maximum.accumulate(started & ~good, axis=0)
     none = ~started[-1]
-    errors = np.where(none, change / peak, np.where(stretch, change / above_zero(magnitude[1:]), np.inf))
+    errors = np.where(
+        none, change / peak, np.where(stretch, change / above_zero(magnitude[1:]), np.inf)
+    )
     errors = np.nan_to_num(errors, nan=np.inf)
     best, entries = np.argmin(errors, axis=0), np.arange(size.size)
     side_change = np.maximum(np.abs(np.diff(forward, axis=0)), np.abs(np.diff(backward, axis=0)))
@@ -270,7 +301,9 @@ def above_zero(x: np.ndarray) -> np.ndarray:
     return np.where(x > 0.0, x, 1.0)
 
 
-def best_slopes(slopes: np.ndarray, size: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def best_slopes(
+    slopes: np.ndarray, size: np.ndarray, starts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Derivative of each matrix entry : float64[p], and error of each column : float64[columns], relative to `size`.
 
     They come from the two consecutive steps that agree best for the column.
@@ -309,7 +342,9 @@ def hidden_kinks(
     if sides.shape[1] == 0:
         return np.zeros(0, dtype=bool)
     constant = np.abs(np.diff(sides, axis=0)) <= CONSTANT_SHARE * np.abs(sides[1:])
-    clear = np.abs(sides[2:]) > np.maximum(HIDDEN_KINK * size, ROUNDING_SHARE * rounding / steps[2:, None])
+    clear = np.abs(sides[2:]) > np.maximum(
+        HIDDEN_KINK * size, ROUNDING_SHARE * rounding / steps[2:, None]
+    )
     return np.logical_or.reduceat(np.any(constant[:-1] & constant[1:] & clear, axis=0), starts)
 
 
@@ -340,7 +375,9 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     """
     from scipy.sparse import csc_array
 
-    model, n, width = at.model, at.model.y_size, np.maximum(at.model.scale, np.abs(at.y))
+    model = at.model
+    n = at.model.y_size
+    width = np.maximum(at.model.scale, np.abs(at.y))
     pattern = model.structure.pattern[:n].tocsc()
     pattern.sort_indices()
     rows, starts = pattern.indices, pattern.indptr[:-1]
@@ -367,17 +404,23 @@ def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray
     return (a if n > DENSE else a.toarray()), size, float(np.max(errors)), steps
 
 
-def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
+def matrix_entries(
+    at: OperatingPoint, width, rows, columns, steps
+) -> tuple[np.ndarray, np.ndarray]:
     """Central difference quotients of matrix entries, and forward minus backward ones : float64[steps, entries] each.
 
     They are changes of a rate per small deviation of a state.
     rows, columns : int64[entries]  rows and columns of the entries in A
     """
-    structure, slopes, sides = at.model.structure, [], []
+    structure = at.model.structure
+    slopes = []
+    sides = []
     base = responses(at, at.y, 0)
     for color in range(structure.color_count):
         direction = np.where(structure.colors == color, width, 0.0)
-        slope, side = central_differences(lambda y: responses(at, y, 0), at.y, direction, base, steps)
+        slope, side = central_differences(
+            lambda y: responses(at, y, 0), at.y, direction, base, steps
+        )
         slopes.append(slope)
         sides.append(side)
     picked = (slice(None), structure.colors[columns], rows)
@@ -389,21 +432,25 @@ def refuse_state(model, j: int, cause: str) -> None:
 
     cause : "slope" if difference quotients do not converge, "kink" if they differ from side to side
     """
-    basin = next((part for part in model.meshed if model.state_names[j].startswith(f"{part.name}.")), None)
+    basin = next(
+        (part for part in model.meshed if model.state_names[j].startswith(f"{part.name}.")), None
+    )
     if basin is not None:
         cause = "basin"
     reason = {
         "basin": "fluxes of this basin have a kink near its state (equal wave speeds from both sides, or cells that "
-                 "run dry); choose another time with --at",
+        "run dry); choose another time with --at",
         "slope": "the slopes there do not converge, as for a valve with a pressure drop of zero: give the valve the "
-                 "key `laminar_reynolds`, or linearise at a time with flow (--at)",
+        "key `laminar_reynolds`, or linearise at a time with flow (--at)",
         "kink": "the slopes for a rise and a fall of this state differ (a tank dry or full, an end stop or seat just "
-                "touched); choose another time with --at",
-    }[cause]  # fmt: skip
+        "touched); choose another time with --at",
+    }[cause]
     raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {reason}")
 
 
-def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
+def check_directions(
+    at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray
+) -> None:
     """Check A (size : sizes of its rows) along random directions; raises FvsolveError if rates are not linear there."""
     model, rng = at.model, np.random.default_rng(1)
     base = responses(at, at.y, 0)
@@ -414,8 +461,10 @@ def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray,
         worst = np.min(error, axis=0)
         if np.max(worst) > SLOPE_TOLERANCE:
             where = model.state_names[int(np.argmax(worst))]
-            raise FvsolveError(f"the state cannot be linearised: the rate of {where} is not a linear function of "
-                               "combined small deviations; choose another time with --at")  # fmt: skip
+            raise FvsolveError(
+                f"the state cannot be linearised: the rate of {where} is not a linear function of "
+                "combined small deviations; choose another time with --at"
+            )
 
 
 def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
@@ -435,7 +484,9 @@ def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[
             raise too_large(n, outputs)
         direction = np.zeros(n)
         direction[j] = width[j]
-        differences = central_differences(lambda y: responses(at, y, outputs), at.y, direction, base, steps)
+        differences = central_differences(
+            lambda y: responses(at, y, outputs), at.y, direction, base, steps
+        )
         slopes[:, j], sides[:, j] = (part[:, n:] for part in differences)
     size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
     size = np.maximum(size, ROUNDING_SHARE / steps[0] * np.abs(base[n:]))
@@ -446,21 +497,27 @@ def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[
     kink = np.maximum(side_differences(sides.reshape(len(steps), -1), row_size, starts), errors)
     if np.max(kink) > SLOPE_TOLERANCE:
         j, k = divmod(int(np.argmax(kink)), outputs)
-        raise FvsolveError(f"{at.model.case.probes[k].text} cannot be linearised along {at.model.state_names[j]}: its "
-                           "slopes for a rise and a fall of this state differ, or depend on the size of the small "
-                           "deviation; leave this probe out of --outputs, or choose another time with "
-                           "--at")  # fmt: skip
+        raise FvsolveError(
+            f"{at.model.case.probes[k].text} cannot be linearised along {at.model.state_names[j]}: its "
+            "slopes for a rise and a fall of this state differ, or depend on the size of the small "
+            "deviation; leave this probe out of --outputs, or choose another time with "
+            "--at"
+        )
     return values.reshape(n, outputs).T / width, float(np.max(errors))
 
 
 def too_large(n: int, outputs: int) -> FvsolveError:
     """Error for a matrix C that is too large or takes too long."""
-    return FvsolveError(f"C of {n} states and {outputs} outputs is too large, or takes longer than {C_TIME:g} s: use "
-                        "fewer --outputs, or give pipes or basins fewer cells, --set links.NAME.cells=100 or "
-                        "nodes.NAME.cells=[20,20]")  # fmt: skip
+    return FvsolveError(
+        f"C of {n} states and {outputs} outputs is too large, or takes longer than {C_TIME:g} s: use "
+        "fewer --outputs, or give pipes or basins fewer cells, --set links.NAME.cells=100 or "
+        "nodes.NAME.cells=[20,20]"
+    )
 
 
-def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
+def visible_states(
+    at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray
+) -> Iterator[int]:
     """Yield the numbers of the states that change an output, by bisection; base : float64[outputs]  their values."""
     rng, n = np.random.default_rng(2), width.size
     direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]

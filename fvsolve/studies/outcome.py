@@ -14,12 +14,15 @@ from fvsolve.errors import CaseError, FvsolveError, collect_faults, listing
 # Overrides: no output of cell values, which no study needs.
 NO_FIELDS: dict = {"output.fields": 0, "output.lines": {}, "output.grids": {}}
 POINTS = 5  # points of a cell of a line at which waves are evaluated
-WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
+# at the middles of fifths; exact to degree 5
+WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0
 
 
 def name_list(given: str | Sequence[str] | None) -> list[str] | None:
     """Convert a name or names to a list without duplicates; None stays None."""
-    return None if given is None else list(dict.fromkeys([given] if isinstance(given, str) else given))
+    return (
+        None if given is None else list(dict.fromkeys([given] if isinstance(given, str) else given))
+    )
 
 
 def has_diverged(reason: str) -> bool:
@@ -99,9 +102,13 @@ def study_model(case, set: Mapping | None = None):
 
 
 def outcome(
-    case, set: Mapping | None = None, y: np.ndarray | None = None, best_of: int = 1, run: Callable | None = None,
+    case,
+    set: Mapping | None = None,
+    y: np.ndarray | None = None,
+    best_of: int = 1,
+    run: Callable | None = None,
     budget: float = np.inf,
-) -> Outcome:  # fmt: skip
+) -> Outcome:
     """Run a case with changed keys, or a model as it is. A refused case gives an outcome with its reason.
 
     set : changed keys of a case, ignored for a model
@@ -116,7 +123,9 @@ def outcome(
     except CaseError as error:
         return Outcome(refusal_text(error), refused=True)
     outcomes = [_single_run(model, y, run)]
-    outcomes += [_single_run(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget]
+    outcomes += [
+        _single_run(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget
+    ]
     return min(outcomes, key=lambda entry: entry.seconds)
 
 
@@ -145,7 +154,9 @@ def checked_case(case, set: Mapping | None, find_faults: Callable):
 def refusal_text(error: CaseError) -> str:
     """Reason of a refusal in one line: each different message once, after the first key at which it occurs."""
     first = {fault.message: fault.place for fault in reversed(error.faults)}
-    return f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
+    return (
+        f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
+    )
 
 
 def _single_run(model, y, run) -> Outcome:
@@ -161,10 +172,21 @@ def _single_run(model, y, run) -> Outcome:
     rows = np.concatenate([np.empty((0, 1 + len(model.probes))), *sink.blocks])
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
-        summary.reason, summary.finished, False, summary.t, solver.loop.now.copy(), rows, names,
-        summary.envelope, summary.counts, summary.seconds, solver.processor, model, solver.run_data,
+        summary.reason,
+        summary.finished,
+        False,
+        summary.t,
+        solver.loop.now.copy(),
+        rows,
+        names,
+        summary.envelope,
+        summary.counts,
+        summary.seconds,
+        solver.processor,
+        model,
+        solver.run_data,
         line_averages(solver.run_data, summary.t, solver.loop.stepper.out),
-    )  # fmt: skip
+    )
 
 
 def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -181,7 +203,8 @@ def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.nda
     return sums
 
 
-STUDY_ARGUMENTS = {"set": TABLE, "jobs": COUNT, "dask": TEXT, "progress": FUNCTION}  # kinds, for `validated`
+# kinds, for `validated`
+STUDY_ARGUMENTS = {"set": TABLE, "jobs": COUNT, "dask": TEXT, "progress": FUNCTION}
 Progress = Callable[[int, int, str], None]  # (finished points, all points, text of the next point)
 
 
@@ -190,7 +213,11 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
 
     study : name of the study in the message; allow_sloshing : True to accept basins with a free surface on bodies
     """
-    sloshing = [name for name in case.meshes if case.nodes[name].on and case.nodes[name].physics_type.has_modes]
+    sloshing = [
+        name
+        for name in case.meshes
+        if case.nodes[name].on and case.nodes[name].physics_type.has_modes
+    ]
     names = [name for name in case.meshes if not (allow_sloshing and name in sloshing)]
     if names:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")
@@ -199,9 +226,11 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
 # limits of CPU time -----------------------------------------------------------------------------------------------
 
 MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
-REPEAT_TIME = 0.4  # wall time of all runs together, including the first, above which no run is repeated [s]
+# wall time of all runs together, including the first, above which no run is repeated [s]
+REPEAT_TIME = 0.4
 CPU_LIMIT = 30.0  # CPU time after which a run is stopped [s]
-REFERENCE_CPU_LIMIT = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
+# CPU time after which a reference run, or a row of an order study, is stopped [s]
+REFERENCE_CPU_LIMIT = 120.0
 PROBE_STEPS = 20_000  # steps after which a run that only compiles is stopped
 GIVEN_UP = "given up after"
 
@@ -226,7 +255,9 @@ class CappedRun(Run):
         try:
             return super().segments()
         except GivenUp:
-            return f"{GIVEN_UP} {self.processor:.3g} s, at t = {self.loop.t:.3g} s of {self.end:.3g} s"
+            return (
+                f"{GIVEN_UP} {self.processor:.3g} s, at t = {self.loop.t:.3g} s of {self.end:.3g} s"
+            )
 
 
 class GivenUp(Exception):

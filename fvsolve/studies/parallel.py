@@ -24,9 +24,11 @@ from fvsolve.studies.outcome import Outcome, study_model
 
 CHUNK_TIME = 1.0  # intended time of a chunk [s]
 MAX_GROWTH = 8  # greatest ratio of sizes of successive chunks
-TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker; interval of checks that workers can be reached [s]
+# timeout for a scheduler, and for its first worker; interval of checks that workers can be reached [s]
+TIMEOUT = 10.0
 CHUNKS_PER_THREAD = 2  # chunks per thread: one in work, one that waits on the worker
-MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # versions must be equal on both sides
+# versions must be equal on both sides
+MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")
 MAX_CRASHES = 2  # number of processes that a task may crash before it counts as lost
 
 
@@ -44,7 +46,9 @@ class Work:
 
     def lost_result(self, task: Any) -> Any:
         """Answer for a task that crashed its process repeatedly and so has no result; here raises RunError."""
-        raise RunError(f"the process {self.process_text(task)} was killed repeatedly. Is there enough memory?")
+        raise RunError(
+            f"the process {self.process_text(task)} was killed repeatedly. Is there enough memory?"
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {name: {} for name in self.unsent}
@@ -72,7 +76,11 @@ class TaskPool:
         if local < len(tasks):
             if self.workers is None:
                 local_pool = self.dask is None
-                self.workers = ProcessPool(self.work, self.jobs) if local_pool else Cluster(self.work, self.dask)
+                self.workers = (
+                    ProcessPool(self.work, self.jobs)
+                    if local_pool
+                    else Cluster(self.work, self.dask)
+                )
             yield from distribute(self.work, tasks, self.workers, local)
 
     def __enter__(self) -> Self:
@@ -98,8 +106,13 @@ def distribute(work: Work, tasks: Sequence, workers: Any, first: int) -> Iterato
     size = 1  # start with single tasks: computing times of tasks may differ by orders of magnitude
     while waiting or retry or in_work:
         while (waiting or retry) and len(in_work) < workers.capacity:
-            fair_share = -(-len(waiting) // workers.capacity)  # limits chunks near the end, so that no worker is idle
-            numbers_given = retry.popleft() if retry else [waiting.popleft() for _ in range(min(size, fair_share))]
+            # limits chunks near the end, so that no worker is idle
+            fair_share = -(-len(waiting) // workers.capacity)
+            numbers_given = (
+                retry.popleft()
+                if retry
+                else [waiting.popleft() for _ in range(min(size, fair_share))]
+            )
             in_work[workers.submit([tasks[k] for k in numbers_given])] = numbers_given
         done = wait(in_work, TIMEOUT, FIRST_COMPLETED).done
         if not done:
@@ -205,7 +218,10 @@ class RequestRunner(Work):
         return request.function(self.staged[name], request.keys)
 
     def process_text(self, request: RunRequest) -> str:
-        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items()) or "the keys of the case"
+        keys = (
+            ", ".join(f"{key} = {value}" for key, value in request.keys.items())
+            or "the keys of the case"
+        )
         return f"that made the run with {keys}"
 
 
@@ -223,7 +239,10 @@ class PickledCase:
         if isinstance(raw, Case):
             raw = Raw(raw.raw, raw.name, raw.path, raw.folder)
         source = raw if isinstance(raw, Raw) else read_raw(find_source(raw))
-        return {"source": source, "methods": {name: method for name, method in METHODS.items() if name not in BUILT_IN}}
+        return {
+            "source": source,
+            "methods": {name: method for name, method in METHODS.items() if name not in BUILT_IN},
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         METHODS.update(state["methods"])
@@ -272,7 +291,8 @@ class Cluster:
         self.client.close()
 
 
-WORKER_CACHE = threading.local()  # for each thread: name of the last work, and the work with the data that it has read
+# for each thread: name of the last work, and the work with the data that it has read
+WORKER_CACHE = threading.local()
 
 
 def run_on_worker(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
@@ -293,16 +313,21 @@ def connect(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError:
-        raise FvsolveError("--dask needs the package distributed: pip install fvsolve[dask]") from None
+        raise FvsolveError(
+            "--dask needs the package distributed: pip install fvsolve[dask]"
+        ) from None
     client, text = None, ""
     try:
         client = Client(address, timeout=TIMEOUT, set_as_default=False)
     except Exception as error:  # Dask raises many types of exceptions
         text = str(error).split("\n")[0] or type(error).__name__
     if client is None:
-        gc.collect()  # closes the failed client now: while another client starts, Dask would wait for ever
-        raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}; expected an address such as '
-                           "tcp://10.0.0.1:8786; the command `dask scheduler` prints it")  # fmt: skip
+        # closes the failed client now: while another client starts, Dask would wait for ever
+        gc.collect()
+        raise FvsolveError(
+            f'no Dask scheduler answers at "{address}": {text}; expected an address such as '
+            "tcp://10.0.0.1:8786; the command `dask scheduler` prints it"
+        )
     return client
 
 
@@ -315,21 +340,31 @@ def check_versions(client: Any, address: str) -> None:
     try:
         client.wait_for_workers(1, timeout=TIMEOUT)
     except TimeoutError:
-        text = f"the Dask scheduler at {address} has no workers; start workers: dask worker {address}"
+        text = (
+            f"the Dask scheduler at {address} has no workers; start workers: dask worker {address}"
+        )
         raise FvsolveError(text) from None
     reported = client.get_versions(check=False)
     ends = {"the scheduler": reported["scheduler"]}
     ends |= {f"worker {name}": text for name, text in reported["workers"].items()}
     here = version_numbers(reported["client"])
     faults = [
-        f"{end} has {item}" for end, text in ends.items() for item in differing_versions(here, version_numbers(text))
+        f"{end} has {item}"
+        for end, text in ends.items()
+        for item in differing_versions(here, version_numbers(text))
     ]
     if not faults:
         programs = client.run(program_versions, on_error="return")
-        faults = [f"worker {name} has {item}" for name, text in programs.items() for item in program_differences(text)]
+        faults = [
+            f"worker {name} has {item}"
+            for name, text in programs.items()
+            for item in program_differences(text)
+        ]
     if faults:
-        raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
-                           f"{listing(faults)}; install the same versions there and here")  # fmt: skip
+        raise FvsolveError(
+            f"the Dask cluster at {address} has other versions, so its results could differ: "
+            f"{listing(faults)}; install the same versions there and here"
+        )
 
 
 def program_differences(reported: Any) -> list[str]:
@@ -347,7 +382,10 @@ def version_numbers(reported: dict) -> dict[str, str]:
     """Versions of `MATCHING_PACKAGES` from the report of a Dask process : package -> version; Python as major.minor."""
     host, packages = reported.get("host", {}), reported.get("packages", {})
     numbers = {name: str(packages.get(name)) for name in MATCHING_PACKAGES[1:]}
-    return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **numbers}
+    return {
+        "python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]),
+        **numbers,
+    }
 
 
 def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:

@@ -113,7 +113,9 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     schemes = check_names(schemes, list(SCHEMES), "scheme")
     methods = check_names(methods, method_names(), "method")
     report, total = progress or (lambda *_: None), len(schemes) + len(methods)
-    of_schemes, of_methods, limits = [], [], {}
+    of_schemes = []
+    of_methods = []
+    limits = {}
     for done, name in enumerate(schemes):
         report(done, total, name)
         of_schemes.append(scheme_claim(name))
@@ -121,7 +123,9 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
         report(len(schemes) + done, total, name)
         of_methods.append(method_claim(name))
         limits |= {(scheme, name): courant_limit(scheme, name) for scheme in schemes}
-    pairs = [Pair(scheme, method, limits[scheme, method]) for scheme in schemes for method in methods]
+    pairs = [
+        Pair(scheme, method, limits[scheme, method]) for scheme in schemes for method in methods
+    ]
     return Passivity(of_methods, of_schemes, pairs)
 
 
@@ -179,15 +183,38 @@ def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """
     from fvsolve.studies.outcome import study_model
 
-    model = study_model({
-        "schema": 1, "fluid": {"name": "user", "density": 1000.0, "bulk_modulus": 2e9, "viscosity": 1e-3,
-                               "vapor_pressure": 2000.0, "law": "linear"},
-        "nodes": {"a": {"type": "junction"}, "b": {"type": "junction"}, "tap": {"type": "reservoir", "pressure": 1e6}},
-        "links": {"pipe": {"type": "pipe", "from": "a", "to": "b", "length": 1000.0, "diameter": 0.3, "cells": CELLS,
-                           "wave_speed": 1000.0, "friction": {"model": "none"}},
-                  "shut": {"type": "valve", "from": "b", "to": "tap", "area": 1e-4, "opening": 0.0}},
-        "numerics": {"end": 1.0, "initial": "rest", "scheme": scheme},
-    })  # fmt: skip
+    model = study_model(
+        {
+            "schema": 1,
+            "fluid": {
+                "name": "user",
+                "density": 1000.0,
+                "bulk_modulus": 2e9,
+                "viscosity": 1e-3,
+                "vapor_pressure": 2000.0,
+                "law": "linear",
+            },
+            "nodes": {
+                "a": {"type": "junction"},
+                "b": {"type": "junction"},
+                "tap": {"type": "reservoir", "pressure": 1e6},
+            },
+            "links": {
+                "pipe": {
+                    "type": "pipe",
+                    "from": "a",
+                    "to": "b",
+                    "length": 1000.0,
+                    "diameter": 0.3,
+                    "cells": CELLS,
+                    "wave_speed": 1000.0,
+                    "friction": {"model": "none"},
+                },
+                "shut": {"type": "valve", "from": "b", "to": "tap", "area": 1e-4, "opening": 0.0},
+            },
+            "numerics": {"end": 1.0, "initial": "rest", "scheme": scheme},
+        }
+    )
     unit = 100.0 * np.eye(model.y_size)
     a = np.column_stack([model.rhs(0.0, state) / 100.0 for state in unit]) / model.wave_rates[0]
     return a, np.kron(np.eye(2), energy_matrix(model.tables.settings[0], CELLS))
@@ -224,7 +251,9 @@ def scheme_claim(scheme: str) -> SchemeClaim:
     b = pipe_operator(scheme)
     rate = float(np.linalg.eigvalsh(b + b.T)[-1])
     passive = rate <= NORM_TOLERANCE
-    return SchemeClaim(scheme, 0.0 if passive else rate, 1.0 if passive else greatest_gain(b), passive)
+    return SchemeClaim(
+        scheme, 0.0 if passive else rate, 1.0 if passive else greatest_gain(b), passive
+    )
 
 
 def greatest_gain(b: np.ndarray) -> float:
@@ -265,8 +294,12 @@ def courant_limit(scheme: str, method: str) -> float | None:
     def gains(courant: float) -> bool:
         # greatest growth of the square root of the energy in a step: norm of R(courant A), R the stability function
         b = courant * pipe_operator(scheme)
-        numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
-        return not np.linalg.norm(np.linalg.solve(denominator, numerator), 2) <= 1.0 + NORM_TOLERANCE
+        numerator, denominator = (
+            matrix_polynomial(coefficients, b) for coefficients in polynomials(method)
+        )
+        return (
+            not np.linalg.norm(np.linalg.solve(denominator, numerator), 2) <= 1.0 + NORM_TOLERANCE
+        )
 
     return greatest_step(gains, np.geomspace(LEAST, MOST, 120), width=1e-9).step
 
@@ -277,7 +310,9 @@ def polynomials(method: str) -> tuple[list[float], list[float]]:
     from fvsolve.core.steppers import method_named, stability_function
 
     r = stability_function(method_named(method))
-    return [float(x) for x in r.numerator.coefficients], [float(x) for x in r.denominator.coefficients]
+    return [float(x) for x in r.numerator.coefficients], [
+        float(x) for x in r.denominator.coefficients
+    ]
 
 
 def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:

@@ -57,22 +57,29 @@ from fvsolve.studies.separated_peaks import first_peak, separate_maxima, separat
 
 LEVELS = (0.5, 1.0, 2.0)
 FINEST = 4.0  # greatest resolution, with column separation
-RELATIVE_FLOOR = 5e-6  # least relative error, from iterations, interpolated rows and nearly decayed oscillations
-ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
+# least relative error, from iterations, interpolated rows and nearly decayed oscillations
+RELATIVE_FLOOR = 5e-6
+# rounding error relative to the greatest value in that unit (for angles at least 1 rad)
+ROUNDING = 1e-12
 SIGNS = {"minimum": -1.0, "maximum": 1.0}
 SIDES = tuple(SIGNS)
-MIN_ROWS, MAX_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
+# limits of the number of rows of signals, at the resolution of the run itself
+MIN_ROWS, MAX_ROWS = 500, 4000
 PLACES_PER_PART = 12  # greatest number of places of a part with signals, under a bound
 MAX_PLACES = 400  # greatest number of places with signals, of all limits
 Signal = tuple[np.ndarray, np.ndarray]  # times and values
 Part = tuple[str, str]  # group and name
-MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
-SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
-MIN_CELLS = 4  # cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
+# accumulated error of steps between jumps of delay lines, in tolerances of a step
+MANY_STEPS = 20.0
+# effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, over that key
+SMOOTHED = 0.05
+# cells recommended for a pipe, and for the travel time of a short pipe in its neighbour
+MIN_CELLS = 4
 REFERENCE_ROWS = 4.0  # rows of references for each row of the run
 REFERENCE_SAFETY = 1.5  # factor on the difference of both references
 DIFFERENCE_SAFETY = 1.2  # factor on the difference to the second reference
-SPREAD_SHARE = 0.5  # fraction of the greatest relative difference of both references that counts for every peak
+# fraction of the greatest relative difference of both references that counts for every peak
+SPREAD_SHARE = 0.5
 MOST_SPREAD = 0.02  # limit of this difference: a single chaotic signal does not widen all bands
 LINES_TEXT, FINEST_TEXT = "delay lines with short steps", f"{FINEST:g} times the resolution"
 MAX_NAMES = 3  # greatest number of names in a text
@@ -106,7 +113,11 @@ def pulse_width(value: Any) -> float:
     if not isinstance(value, Schedule) or value.wave or len(value.time) < 3:
         return np.inf
     changes = np.flatnonzero(np.diff(value.value))
-    turns = [(a, b) for a, b in zip(changes, changes[1:], strict=False) if np.prod(np.diff(value.value)[[a, b]]) < 0.0]
+    turns = [
+        (a, b)
+        for a, b in zip(changes, changes[1:], strict=False)
+        if np.prod(np.diff(value.value)[[a, b]]) < 0.0
+    ]
     return min((float(value.time[b + 1] - value.time[a]) for a, b in turns), default=np.inf)
 
 
@@ -127,16 +138,29 @@ class Unresolved:
         if is_pair(references):
             self.tolerance = SPREAD_SHARE * greatest_spread(references)
         elif case.numerics.rtol is not None and delay_lines(case):
-            self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance)
-        liquid = ["column separation, so no order is assumed; use more cells"] if has_separation(runs) else []
+            self.tolerance = max(
+                MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance
+            )
+        liquid = (
+            ["column separation, so no order is assumed; use more cells"]
+            if has_separation(runs)
+            else []
+        )
         self.shared = [*liquid, *differing_events(runs), *coarse_pipes_at_devices(case)]
 
     def ceiling(self, probe: str) -> float:
         """Negative of the least possible value of a probe, in its unit; inf unless vapour bounds it."""
         return math.inf if self.vapor is None else self.vapor.ceiling(probe)
 
-    def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
-               unit: str, difference: float | None) -> str | None:  # fmt: skip
+    def reason(
+        self,
+        part: tuple[str, str],
+        triple: Sequence[float | None],
+        error: float | None,
+        span: float,
+        unit: str,
+        difference: float | None,
+    ) -> str | None:
         """Reason why the error of a peak is unknown, or wide (above `WIDE_ERROR` times `span`); otherwise None.
 
         part : (group, name) of the part; triple : peak at half, one and twice the resolution; span : range of the
@@ -154,7 +178,9 @@ class Unresolved:
                     self.case, self.runs[1.0], difference, error / (WIDE_ERROR * span), unit
                 )
         if error > span:
-            return f"this estimate exceeds the range of the signal, so the peak is not known; {causes}"
+            return (
+                f"this estimate exceeds the range of the signal, so the peak is not known; {causes}"
+            )
         return causes
 
 
@@ -182,7 +208,9 @@ class VaporValues:
                 return -math.inf
             elevation = float(pipe.height(probe.fraction * self.case.links[probe.name].length))
         pressure = (1.0 + 1e-9) * self.case.properties.vapor_pressure  # at it a head is not finite
-        return float(self.columns[text].from_si(in_quantity(model, probe.quantity, pressure, elevation)))
+        return float(
+            self.columns[text].from_si(in_quantity(model, probe.quantity, pressure, elevation))
+        )
 
     def ceiling(self, text: str) -> float:
         """Negative of `value`."""
@@ -240,20 +268,30 @@ def unknown_parts(case: Any) -> dict[Part, str]:
     """
     reasons: dict[Part, str] = {}
     lengths = {name: pipe.length / pipe.cells for name, pipe in pipes_with_cells(case).items()}
-    crossing = max((length / case.wave_speed(name) for name, length in lengths.items()), default=0.0)
+    crossing = max(
+        (length / case.wave_speed(name) for name, length in lengths.items()), default=0.0
+    )
     pulses = []
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             keys = type(part).model_fields
-            pulses += [f"{group}.{name}.{key}" for key in keys if pulse_width(getattr(part, key)) < crossing]
+            pulses += [
+                f"{group}.{name}.{key}"
+                for key in keys
+                if pulse_width(getattr(part, key)) < crossing
+            ]
     if pulses:
         text = (
             f"{listing(pulses, MAX_NAMES)} {'change' if len(pulses) > 1 else 'changes'} in both directions within the "
             "travel time of a cell; use more cells"
         )
-        reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
-    texts = {name: f"a wave crosses {name} faster than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
-             for name, (neighbour, cells) in short_pipes(case).items()}  # fmt: skip
+        reasons = {
+            (group, name): text for group in ("nodes", "links") for name in getattr(case, group)
+        }
+    texts = {
+        name: f"a wave crosses {name} faster than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
+        for name, (neighbour, cells) in short_pipes(case).items()
+    }
     half = scaled(cell_counts(case), 0.5)
     for name, pipe in pipes_with_cells(case).items():
         if half[f"links.{name}.cells"] == (pipe.cells,):  # no coarser cells
@@ -267,12 +305,21 @@ def unknown_parts(case: Any) -> dict[Part, str]:
 
 def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
     """Reason why runs at other resolutions give no value of a peak; runs : factor of resolution -> result."""
-    ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
+    ended = [
+        f"{times:g} times the resolution: {run.reason}"
+        for times, run in runs.items()
+        if run.reason != "finished"
+    ]
     if len(runs) == 1:
         files = listing(basins_from_files(case), MAX_NAMES)
-        return (f"the cells of {files} come from a file, so there is no run at another resolution; run the case with a "
-                "file of finer cells, and compare both runs with fvsolve compare")  # fmt: skip
-    return "; ".join(ended) or "at another resolution the peak is not a number; use more cells or shorter steps"
+        return (
+            f"the cells of {files} come from a file, so there is no run at another resolution; run the case with a "
+            "file of finer cells, and compare both runs with fvsolve compare"
+        )
+    return (
+        "; ".join(ended)
+        or "at another resolution the peak is not a number; use more cells or shorter steps"
+    )
 
 
 def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
@@ -313,14 +360,24 @@ def differing_events(runs: dict[float, Any]) -> list[str]:
     counts = [Counter(event["name"] for event in run.summary["events"]) for run in finished]
     names = sorted(set().union(*counts)) if len(finished) > 1 else []
     by_device = {name: [event[name] for event in counts] for name in names}
-    texts = [f"{name} ({', '.join(map(str, values))})" for name, values in by_device.items() if len(set(values)) > 1]
-    return [f"numbers of events differ between resolutions: {listing(texts, MAX_NAMES)}"] if texts else []
+    texts = [
+        f"{name} ({', '.join(map(str, values))})"
+        for name, values in by_device.items()
+        if len(set(values)) > 1
+    ]
+    return (
+        [f"numbers of events differ between resolutions: {listing(texts, MAX_NAMES)}"]
+        if texts
+        else []
+    )
 
 
 # errors of peaks and margins -----------------------------------------------------------------------------------------
 
 
-def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
+def peak_errors(
+    result: Result, case: Any, progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
     """Add errors of peaks, expectations and limit verdicts to the summary of a run, from further runs of its case.
 
     Returns the summary. Its entry `peaks` has for each probe the `unit`, and `minimum` and `maximum` as {value, error,
@@ -336,16 +393,24 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     runs, references = refined_runs(own, case, progress)
     summary, unresolved = result.summary, Unresolved(case, runs, references)
     summary["peaks"] = peak_rows(result, runs, references, unresolved)
-    summary["verdicts"] = [verdict([limit_row(runs, references, k, j, row, unresolved) for j, row in enumerate(rows)])
-                        for k, rows in enumerate(own.places)]  # fmt: skip
+    summary["verdicts"] = [
+        verdict([limit_row(runs, references, k, j, row, unresolved) for j, row in enumerate(rows)])
+        for k, rows in enumerate(own.places)
+    ]
     for k, claim in enumerate(summary["expectations"]):
-        error = expectation_error(runs, references, case.expect[claim["text"]], k, summary["peaks"], claim["found"])
+        error = expectation_error(
+            runs, references, case.expect[claim["text"]], k, summary["peaks"], claim["found"]
+        )
         claim["error"] = error
     words = description(runs, case)
     if references:
         words += "; errors from " + (LINES_TEXT if is_pair(references) else FINEST_TEXT)
-    summary["resolution"] = {"levels": sorted(runs), "kept": basins_from_files(case), "words": words,
-                          "reasons": reason_texts(summary)}  # fmt: skip
+    summary["resolution"] = {
+        "levels": sorted(runs),
+        "kept": basins_from_files(case),
+        "words": words,
+        "reasons": reason_texts(summary),
+    }
     return summary
 
 
@@ -357,11 +422,19 @@ def reason_texts(summary: dict[str, Any]) -> list[str]:
             names_by_reason.setdefault(peak[side]["reason"], {})[probe] = None
     for limit in summary["verdicts"]:
         for row in limit["worst"]:
-            names_by_reason.setdefault(row["reason"], {})[f"{limit['name']} at {row['place']}"] = None
-    return [f"{listing(list(names), MAX_NAMES)}: {text}" for text, names in names_by_reason.items() if text is not None]
+            names_by_reason.setdefault(row["reason"], {})[f"{limit['name']} at {row['place']}"] = (
+                None
+            )
+    return [
+        f"{listing(list(names), MAX_NAMES)}: {text}"
+        for text, names in names_by_reason.items()
+        if text is not None
+    ]
 
 
-def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None) -> tuple[dict, dict]:
+def refined_runs(
+    own: Result, case: Any, progress: Callable[[str], None] | None
+) -> tuple[dict, dict]:
     """Run a case at half, one and twice the resolution, with about as many rows of output as steps, and references.
 
     At resolution 1 the number of rows is that of the steps, limited to `MIN_ROWS` to `MAX_ROWS`, or that of the case if
@@ -371,32 +444,51 @@ def refined_runs(own: Result, case: Any, progress: Callable[[str], None] | None)
     """
     named = [probe.text for probe in case.output.probes]
     rows = min(max(own.summary["steps"], MIN_ROWS), MAX_ROWS)
-    every = min(case.output.every, own.summary["t"] / rows) if own.summary["t"] > 0.0 else case.output.every
+    every = (
+        min(case.output.every, own.summary["t"] / rows)
+        if own.summary["t"] > 0.0
+        else case.output.every
+    )
     settings, runs = NO_FIELDS | {"output.probes": [*named, *limit_probes(own, case, named)]}, {}
     for times in LEVELS:
         keys = refined_keys(case, times) if times != 1.0 else {}
         if keys or times == 1.0:
             if progress is not None:
                 progress(f"{times:g} times the resolution")
-            runs[times] = run(case, set=keys | settings | {"output.every": every / times}, pictures=False)
+            runs[times] = run(
+                case, set=keys | settings | {"output.every": every / times}, pictures=False
+            )
     if has_separation(runs):
-        return runs, separated_runs(runs, case, settings | {"output.every": every / FINEST}, progress)
-    return runs, line_references(own, case, settings | {"output.every": every / REFERENCE_ROWS}, progress)
+        return runs, separated_runs(
+            runs, case, settings | {"output.every": every / FINEST}, progress
+        )
+    return runs, line_references(
+        own, case, settings | {"output.every": every / REFERENCE_ROWS}, progress
+    )
 
 
 def separated_runs(
-    runs: dict[float, Result], case: Any, settings: dict[str, Any], progress: Callable[[str], None] | None
+    runs: dict[float, Result],
+    case: Any,
+    settings: dict[str, Any],
+    progress: Callable[[str], None] | None,
 ) -> dict[float, Result]:
     """Results at one, two and four times the resolution of a case of pipes with column separation, or {}.
 
     runs : results at lower resolutions; settings : changed keys of the run at four times the resolution
     """
-    if case.meshes or any(times not in runs or runs[times].reason != "finished" for times in LEVELS[1:]):
+    if case.meshes or any(
+        times not in runs or runs[times].reason != "finished" for times in LEVELS[1:]
+    ):
         return {}
     if progress is not None:
         progress(f"{FINEST:g} times the resolution")
     finest = run(case, set=refined_keys(case, FINEST) | settings, pictures=False)
-    return {times: runs[times] for times in LEVELS[1:]} | {FINEST: finest} if finest.reason == "finished" else {}
+    return (
+        {times: runs[times] for times in LEVELS[1:]} | {FINEST: finest}
+        if finest.reason == "finished"
+        else {}
+    )
 
 
 def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
@@ -406,10 +498,16 @@ def limit_probes(own: Result, case: Any, named: list[str]) -> list[str]:
     """
     rows = [row[PLACES_KEY] for rows in own.places for row in rows]
     texts = dict.fromkeys(
-        neighbours.probes[position] for neighbours in rows for position in selected_places(neighbours, len(rows))
+        neighbours.probes[position]
+        for neighbours in rows
+        for position in selected_places(neighbours, len(rows))
     )
     extra = [text for text in texts if text not in named]
-    return extra if accepts_probes(case, extra) else [text for text in extra if accepts_probes(case, [text])]
+    return (
+        extra
+        if accepts_probes(case, extra)
+        else [text for text in extra if accepts_probes(case, [text])]
+    )
 
 
 def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
@@ -419,10 +517,13 @@ def selected_places(neighbours: PlaceMargins, rows: int) -> list[int]:
     neighbours : margins at all places of the part; rows : number of pairs of a part and a bound in all limits of the
     case
     """
-    margins, most = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf), max(MAX_PLACES // rows, 1)
+    margins = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf)
+    most = max(MAX_PLACES // rows, 1)
     padded = np.pad(margins, 1, constant_values=np.inf)
     least = np.flatnonzero((margins <= padded[:-2]) & (margins <= padded[2:]))
-    least = least[np.argsort(margins[least], kind="stable")][: max(min(PLACES_PER_PART, most) // 2, 1)]
+    least = least[np.argsort(margins[least], kind="stable")][
+        : max(min(PLACES_PER_PART, most) // 2, 1)
+    ]
     count = max(min(PLACES_PER_PART, most) - len(least), 0)
     spaced = np.linspace(0, len(margins) - 1, count).astype(int)
     return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(spaced)]))
@@ -441,13 +542,19 @@ def peak_rows(
     result: Result, runs: dict[float, Result], references: dict[int, Result], unresolved: Unresolved
 ) -> dict[str, Any]:
     """Entry `peaks` of the summary of `result`, as in `peak_errors`: unit, extremes of each probe, and their errors."""
-    summary, largest, rows = result.summary, {"rad": 1.0}, {}
+    summary = result.summary
+    largest = {"rad": 1.0}
+    rows = {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     flows = {probe.text for probe in unresolved.case.probes if probe.quantity == "flow"}
     # where water is at rest, its flow is the remainder of the steady start, compared with a wave of 1 bar
-    admittances = (0.25 * math.pi * pipe.diameter**2 / unresolved.case.wave_speed(name)
-                   for name, pipe in pipes(unresolved.case).items())  # fmt: skip
-    flow_floor = RELATIVE_FLOOR * 1e5 * max(admittances, default=0.0) / unresolved.case.properties.density
+    admittances = (
+        0.25 * math.pi * pipe.diameter**2 / unresolved.case.wave_speed(name)
+        for name, pipe in pipes(unresolved.case).items()
+    )
+    flow_floor = (
+        RELATIVE_FLOOR * 1e5 * max(admittances, default=0.0) / unresolved.case.properties.density
+    )
     for extreme in summary["extremes"].values():
         values = [abs(extreme[side] or 0.0) for side in SIDES]
         largest[extreme["unit"]] = max(largest.get(extreme["unit"], 0.0), *values)
@@ -460,19 +567,28 @@ def peak_rows(
             unknown = parts[name] in unresolved.unknown
             places = [partial(signals, probe=name, rising=partial(np.multiply, sign))]
             ceiling = unresolved.ceiling(name) if side == "minimum" else math.inf
-            error = None if unknown else error_estimate(runs, references, value_of, sign, places, ceiling)
+            error = (
+                None
+                if unknown
+                else error_estimate(runs, references, value_of, sign, places, ceiling)
+            )
             difference = reference_difference(references, value_of, extreme[side])
             span = (extreme["maximum"] or 0.0) - (extreme["minimum"] or 0.0)
             if error is not None:
-                least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + RELATIVE_FLOOR * abs(extreme[side])
+                least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + RELATIVE_FLOOR * abs(
+                    extreme[side]
+                )
                 least += float(result.column(name).from_si(flow_floor)) if name in flows else 0.0
                 error += least + abs(sign * extreme[side] - triple[1]) + unresolved.tolerance * span
-                span += 2.0 * least / WIDE_ERROR  # so that the rounding error of a constant does not count as wide
+                # so that the rounding error of a constant does not count as wide
+                span += 2.0 * least / WIDE_ERROR
             rows[name][side] = {
                 "value": extreme[side],
                 "error": error,
                 "order": None if unknown else observed_order(triple, has_separation(runs)),
-                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"], difference),
+                "reason": unresolved.reason(
+                    parts[name], triple, error, span, extreme["unit"], difference
+                ),
             }
             if references and not is_pair(references):
                 rows[name][side]["first"] = first_of(places[0](references), sign, ceiling)
@@ -485,9 +601,13 @@ def extreme_of(run: Result, name: str, side: str) -> float | None:
 
 
 def error_estimate(
-    runs: dict[float, Result], references: dict, value_of: Callable, sign: float, places: Sequence,
+    runs: dict[float, Result],
+    references: dict,
+    value_of: Callable,
+    sign: float,
+    places: Sequence,
     ceiling: float = math.inf,
-) -> float | None:  # fmt: skip
+) -> float | None:
     """Error bound of the value of a run, from references if there are any, else from further resolutions.
 
     value_of(run) : value, which times `sign` is a maximum; places : for each place, a function that gives the signals
@@ -497,7 +617,8 @@ def error_estimate(
     if references and None not in triple[1:]:
         values = [value_of(references[times]) for times in sorted(references)]
         if all(value is not None and math.isfinite(value) for value in values):
-            values, found = [sign * value for value in values], [place(references) for place in places]
+            values = [sign * value for value in values]
+            found = [place(references) for place in places]
             if is_pair(references):
                 return reference_error(triple[1], values, found)
             maxima = [separate_maxima(signals, troughs)[0] for signals in found if usable(signals)]
@@ -505,7 +626,9 @@ def error_estimate(
     return error_bound(runs, triple, [place(runs) for place in places])
 
 
-def reference_difference(references: dict[int, Result], value_of: Callable, value: float | None) -> float | None:
+def reference_difference(
+    references: dict[int, Result], value_of: Callable, value: float | None
+) -> float | None:
     """Difference between a value and that of the finer reference; None without references or values."""
     finer = value_of(references[max(references)]) if references else None
     return None if finer is None or value is None else abs(finer - value)
@@ -521,11 +644,15 @@ def greatest_spread(references: dict[int, Result]) -> float:
             continue
         low, high, other_low, other_high = values
         if high - low > RELATIVE_FLOOR * max(abs(low), abs(high)):
-            spread = max(spread, abs(low - other_low) / (high - low), abs(high - other_high) / (high - low))
+            spread = max(
+                spread, abs(low - other_low) / (high - low), abs(high - other_high) / (high - low)
+            )
     return min(spread, MOST_SPREAD)
 
 
-def error_bound(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
+def error_bound(
+    runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()
+) -> float | None:
     """Error bound of the second of three values at increasing resolutions; None if it is not known.
 
     places : for each place, its signals at these resolutions, with a sign such that the peak is a maximum
@@ -540,19 +667,27 @@ def error_bound(runs: dict[float, Result], triple: Sequence[float | None], place
 
 def usable(signals_of_place: Sequence) -> bool:
     """True if a place has two or more signals (times, values) and all values are finite."""
-    return len(signals_of_place) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place)
+    return len(signals_of_place) > 1 and all(
+        len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place
+    )
 
 
-def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
+def signals(
+    runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]
+) -> list:
     """Signals (times [s], rising(values)) of a probe in finished runs, coarse first; `rising` turns peaks to maxima."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
 
 def limit_row(
-    runs: dict[float, Result], references: dict[int, Result], limit: int, k: int, row: dict[str, Any],
+    runs: dict[float, Result],
+    references: dict[int, Result],
+    limit: int,
+    k: int,
+    row: dict[str, Any],
     unresolved: Unresolved,
-) -> dict:  # fmt: skip
+) -> dict:
     """Row of a limit with its error. The state becomes open if the error is unknown or above the margin.
 
     limit, k : indices of the limit and of the row in these results; row : row of `run.verdicts.places`
@@ -576,7 +711,8 @@ def limit_row(
     size = abs(row["value"] or 0.0)
     if error is not None:
         spread = span if math.isfinite(span) else 0.0
-        error += RELATIVE_FLOOR * (size + spread) + unresolved.tolerance * spread  # gauge values have another zero
+        # gauge values have another zero
+        error += RELATIVE_FLOOR * (size + spread) + unresolved.tolerance * spread
         error += abs((row["margin"] or 0.0) + triple[1])  # other rows change steps
     doubtful = error is None or not abs(row["margin"] or 0.0) >= error
     span_and_floor = span + 2.0 * RELATIVE_FLOOR / WIDE_ERROR * size
@@ -596,9 +732,13 @@ def exceedance(values: np.ndarray, sign: float, allowed: float, magnitude: bool)
 
 
 def expectation_error(
-    runs: dict[float, Result], references: dict[int, Result], expect: Any, k: int, peak_rows: dict[str, Any],
+    runs: dict[float, Result],
+    references: dict[int, Result],
+    expect: Any,
+    k: int,
+    peak_rows: dict[str, Any],
     found: float,
-) -> float | None:  # fmt: skip
+) -> float | None:
     """Error of the value in an expectation: the error of the peak if it is a peak, else from the values of all runs.
 
     expect : expectation of the case; k : its index in the summaries; peak_rows : entry `peaks` of the summary
@@ -607,14 +747,21 @@ def expectation_error(
     side = {"min": "minimum", "max": "maximum"}.get(expect.function)
     if side is not None and expect.probe is not None and expect.probe.text in peak_rows:
         return peak_rows[expect.probe.text][side]["error"]
-    error = error_estimate(runs, references, lambda run: run.summary["expectations"][k]["found"], 1.0, [])
+    error = error_estimate(
+        runs, references, lambda run: run.summary["expectations"][k]["found"], 1.0, []
+    )
     own = runs[1.0].summary["expectations"][k]["found"]
     return None if error is None else error + RELATIVE_FLOOR * abs(own) + abs(found - own)
 
 
-def values_of_runs(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
+def values_of_runs(
+    runs: dict[float, Result], of: Callable, sign: float = 1.0
+) -> tuple[float | None, ...]:
     """Values of(run) at half, one and twice the resolution, times `sign`; None for a missing or unfinished run."""
-    results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
+    results = [
+        of(runs[times]) if times in runs and runs[times].reason == "finished" else None
+        for times in LEVELS
+    ]
     return tuple(None if value is None else sign * value for value in results)
 
 
@@ -640,7 +787,11 @@ def between_rows(result: Result, probe: str, side: str) -> float:
     """
     t, v = result.t, result[probe]
     position = int(np.argmin(v) if side == "minimum" else np.argmax(v))
-    if not 0 < position < len(v) - 1 or t[position - 1] == t[position] or t[position] == t[position + 1]:
+    if (
+        not 0 < position < len(v) - 1
+        or t[position - 1] == t[position]
+        or t[position] == t[position + 1]
+    ):
         return 0.0
     return abs(float(v[position - 1] - 2.0 * v[position] + v[position + 1])) / 8.0
 
@@ -653,20 +804,26 @@ def description(runs: dict[float, Result], case: Any) -> str:
         return f"errors are unknown: cells of {files} come from files, and there are no other cells"
     text = f"peaks compared with those at {others} times the resolution"
     if basins_from_files(case):
-        text += f"; cells of {', '.join(basins_from_files(case))} come from files and did not change"
+        text += (
+            f"; cells of {', '.join(basins_from_files(case))} come from files and did not change"
+        )
         text += ": their error is not included"
     if has_separation(runs):
         text += "; column separation, so no order of convergence is assumed"
     stopped = [f"{factor:g}" for factor in sorted(runs) if runs[factor].reason != "finished"]
     if stopped:
-        runs_text = f"run{'s' if len(stopped) > 1 else ''} at {' and '.join(stopped)} times the resolution"
+        runs_text = (
+            f"run{'s' if len(stopped) > 1 else ''} at {' and '.join(stopped)} times the resolution"
+        )
         text += f"; the {runs_text} did not finish"
     if 0.5 not in runs:
         text += "; half the resolution is not possible (patches would begin within cells), so no order is assumed"
     return text
 
 
-def reference_error(value: float, pair: Sequence[float], places: Sequence[Sequence[Signal]]) -> float:
+def reference_error(
+    value: float, pair: Sequence[float], places: Sequence[Sequence[Signal]]
+) -> float:
     """Error bound of a value from two references: its difference to the second, plus the error of the second itself.
 
     pair : values of both references; places : for each place, the signals of both references
@@ -679,7 +836,9 @@ def reference_error(value: float, pair: Sequence[float], places: Sequence[Sequen
         _, maxima = local_maxima(signals)
         maxima = maxima[np.isfinite(maxima).all(axis=1)]
         changes = np.abs(maxima[:, 2] - maxima[:, 1])
-        own = max(own, float(np.max(maxima[:, 2] + REFERENCE_SAFETY * changes, initial=second)) - second)
+        own = max(
+            own, float(np.max(maxima[:, 2] + REFERENCE_SAFETY * changes, initial=second)) - second
+        )
     return DIFFERENCE_SAFETY * abs(value - second) + own
 
 
@@ -691,32 +850,44 @@ GROWTH = 2.0  # greatest factor for differences that grow
 OTHER_PLACES = 0.6  # factor on remainders of places other than that of the greatest value
 MEAN_FRACTION = 0.2  # fraction of the mean difference of all maxima
 MAX_MOVED = 16.0  # limit of the two further terms, in differences of the greatest value
-CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)  # ratios of mean differences of signals -> factor on the bound
+# ratios of mean differences of signals -> factor on the bound
+CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)
 MINIMUM_SAFETY = 1.6  # factor on the remainder by that ratio
 RISE = 0.002  # drop between two separate maxima, as a fraction of the range of a signal
 
 
-def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True) -> float:
+def greatest_error(
+    places: Sequence[Sequence[Signal]], triple: Sequence[float], believed: bool = True
+) -> float:
     """Error bound of the greatest value of several signals at the middle of three resolutions, or the first of two.
 
     places : for each place in the network, its signals (times, values) at two or three increasing resolutions
     triple : greatest value over all places and steps at each resolution; believed : False if no order of convergence
     may be assumed
     """
-    own_maxima, maxima = three_values(np.array([triple], float)), [local_maxima(signals) for signals in places]
+    own_maxima = three_values(np.array([triple], float))
+    maxima = [local_maxima(signals) for signals in places]
     if not places:
         return error_of_maxima(own_maxima, remainders(own_maxima, believed))
     k = int(np.argmax([np.max(signals[-2][1]) for signals in places]))
     rows = [own_maxima, *(values[np.isfinite(values).all(axis=1)] for _, values in maxima)]
     factors = [1.0 if j in (0, k + 1) else OTHER_PLACES for j in range(len(rows))]
-    bounds = [remainders(values, believed) * factor for values, factor in zip(rows, factors, strict=True)]
+    bounds = [
+        remainders(values, believed) * factor for values, factor in zip(rows, factors, strict=True)
+    ]
     error = error_of_maxima(np.vstack(rows), np.concatenate(bounds))
-    (cuts, _), (middle, fine), most = maxima[k], places[k][-2:], float(np.max(np.abs(np.diff(own_maxima))))
+    (cuts, _), (middle, fine), most = (
+        maxima[k],
+        places[k][-2:],
+        float(np.max(np.abs(np.diff(own_maxima)))),
+    )
     moved = 0.0  # greatest difference of both signals at the times of their greatest values
     if greatest_segment(cuts, middle) == greatest_segment(cuts, fine):
         times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
         moved = float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))
-    mean = MEAN_FRACTION * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
+    mean = MEAN_FRACTION * float(
+        np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0))
+    )
     ratio = convergence_ratio(places[k])
     error *= float(np.interp(ratio, CONVERGED, TRUSTED))
     least = MINIMUM_SAFETY * remainder_by_ratio(ratio, own_maxima[0])
@@ -728,7 +899,11 @@ def three_values(maxima: np.ndarray) -> np.ndarray:
 
     maxima : float64[maxima, 2 or 3], values of local maxima at increasing resolutions
     """
-    return maxima if maxima.shape[1] == 3 else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
+    return (
+        maxima
+        if maxima.shape[1] == 3
+        else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
+    )
 
 
 def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
@@ -753,15 +928,21 @@ def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
 
 def troughs(values: np.ndarray, rise: float) -> list[int]:
     """Indices of the least values between successive maxima, both of which are higher by more than `rise`."""
-    turns = np.concatenate([[0], 1 + np.flatnonzero(np.diff(np.sign(np.diff(values)))), [len(values) - 1]])
-    positions, rising, high, low = [], True, 0, 0
+    turns = np.concatenate(
+        [[0], 1 + np.flatnonzero(np.diff(np.sign(np.diff(values)))), [len(values) - 1]]
+    )
+    positions = []
+    rising = True
+    high = 0
+    low = 0
     for i in turns.tolist():
         if rising and values[i] < values[high] - rise:
             rising, low = False, i
         elif not rising and values[i] > values[low] + rise:
             positions.append(low)
             rising, high = True, i
-        high, low = (i if values[i] > values[high] else high), (i if values[i] < values[low] else low)
+        high = i if values[i] > values[high] else high
+        low = i if values[i] < values[low] else low
     return positions
 
 
@@ -783,7 +964,9 @@ def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     triples : float64[values, 3]  at three resolutions; believed : False if no order of convergence may be assumed
     """
     first, second = np.diff(triples, axis=1).T
-    a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
+    a = np.abs(first)
+    b = np.abs(second)
+    sways = first * second < 0.0
     ratio = np.divide(b, a, out=np.where(b > 0.0, np.inf, 0.0), where=a > 0.0)
     r = np.clip(ratio, QUICK, SLOW) if believed else np.full(len(a), SLOW)
     rest = SAFETY * np.maximum(b, a * r) / (1.0 - np.where(sways, SLOW, r))

@@ -25,7 +25,14 @@ from fvsolve.studies.distance import (
     variable_size,
     wave_sums,
 )
-from fvsolve.studies.outcome import PROBE_STEPS, REFERENCE_CPU_LIMIT, Outcome, capped, outcome, study_model
+from fvsolve.studies.outcome import (
+    PROBE_STEPS,
+    REFERENCE_CPU_LIMIT,
+    Outcome,
+    capped,
+    outcome,
+    study_model,
+)
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.resolution import (
     basin_fields,
@@ -41,24 +48,30 @@ from fvsolve.studies.resolution import (
 from fvsolve.studies.resolution import delay_lines as delayed
 
 REFINEMENT = 4  # ratio of cells to those of the finest run under study
-CHARACTERISTICS_REFINEMENT = 16  # ratio of cells for characteristics at Courant number 1, whose steps are cheap
+# ratio of cells for characteristics at Courant number 1, whose steps are cheap
+CHARACTERISTICS_REFINEMENT = 16
 # (scheme, method, step control, its value, ratio of cells, limiter) for each kind of case, the best first.
 WAVES = (
     ("upwind5", "rk4", "courant", 0.8, REFINEMENT),
     ("weno5", "ssp-rk3", "courant", 0.9, REFINEMENT),
     ("upwind", "euler", "courant", 1.0, CHARACTERISTICS_REFINEMENT),
 )
-SEPARATION = (  # only one scheme is above first order with cavities, so the references differ by limiters
+# only one scheme is above first order with cavities, so the references differ by limiters
+SEPARATION = (
     ("muscl", "ssp-rk3", "courant", 0.5, REFINEMENT, "van-leer"),
     ("muscl", "rk4", "courant", 0.5, REFINEMENT, "minmod"),
 )
-STIFF = (("upwind5", "rodas-5p", "rtol", 1e-8, REFINEMENT), ("weno5", "radau-iia-5", "rtol", 1e-8, REFINEMENT))
+STIFF = (
+    ("upwind5", "rodas-5p", "rtol", 1e-8, REFINEMENT),
+    ("weno5", "radau-iia-5", "rtol", 1e-8, REFINEMENT),
+)
 LUMPED = ((None, "radau-iia-9", "rtol", 1e-12, 1), (None, "rodas-5p", "rtol", 1e-11, 1))
 # explicit -> methods of high order
 ALTERNATIVES = {True: ("dormand-prince", "tsitouras"), False: ("radau-iia-5", "esdirk-5")}
 TOLERANCE_FRACTION = 0.01  # greatest ratio of the tolerance of a reference to that under study
 LEAST_RTOL = 1e-13
-TOLERANCE_RATIO = 10.0**1.5  # ratio of tolerances of successive refinements, equal to halving steps at order 5
+# ratio of tolerances of successive refinements, equal to halving steps at order 5
+TOLERANCE_RATIO = 10.0**1.5
 ORDERS = 0.5, 5.0  # limits of the observed order
 SAFETY = 1.5  # safety factor on the extrapolated error
 MEASURES = ("trajectory", "greatest", "end", "overshoot")
@@ -100,10 +113,20 @@ def capped_outcome(case, keys: Mapping) -> Outcome:
 
 
 def find_reference(
-    case, finest: Mapping | None = None, *, opinions: int | None = None, exclude_own: bool = False, way: str = "both",
-    stiff: bool = False, exact: bool = True, lines: bool = False, run: Callable = capped_outcome,
-    progress: Callable[[str], None] = lambda text: None, queue: RunQueue | None = None, stages: tuple[dict, ...] = (),
-) -> Reference:  # fmt: skip
+    case,
+    finest: Mapping | None = None,
+    *,
+    opinions: int | None = None,
+    exclude_own: bool = False,
+    way: str = "both",
+    stiff: bool = False,
+    exact: bool = True,
+    lines: bool = False,
+    run: Callable = capped_outcome,
+    progress: Callable[[str], None] = lambda text: None,
+    queue: RunQueue | None = None,
+    stages: tuple[dict, ...] = (),
+) -> Reference:
     """Find the most accurate reference for runs of a case with the keys `finest` or coarser ones.
 
     finest : overrides with the resolution of the finest run under study
@@ -125,7 +148,9 @@ def find_reference(
     exact_result = exact_reference(case) if use_exact else None
     if exact_result is not None and opinions == 1:
         return exact_result
-    kinds, references, failures = candidates(case, exclude_own, way, stiff, lines), [], []
+    kinds = candidates(case, exclude_own, way, stiff, lines)
+    references = []
+    failures = []
     first = list(itertools.islice(kinds, opinions))
     if queue is not None:
         run = submit_ahead(queue, (*stages, dict(finest or {})), first, progress)
@@ -145,11 +170,15 @@ def find_reference(
         references.insert(0, replace(exact_result, spans=nearest_run.spans, run=nearest_run.run))
     if len(references) < min(2, opinions or 2):
         text = f"the reference run failed, so no error is known ({'; '.join(failures)})"
-        raise FvsolveError(f"{text}; try another method, an earlier end of the run, or [exact] in the case")
+        raise FvsolveError(
+            f"{text}; try another method, an earlier end of the run, or [exact] in the case"
+        )
     return best_reference(references, tuple(failures))
 
 
-def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]) -> Callable:
+def submit_ahead(
+    queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]
+) -> Callable:
     """Compute all runs of some kinds ahead (see `RunQueue.run_ahead`); returns run(case, keys), which gives outcomes.
 
     kinds : kinds of reference runs as from `candidates`; stages : overrides that turn the case of the queue into that
@@ -157,7 +186,9 @@ def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, rep
     """
     report(", ".join(name for name, _ in kinds))
     by_level = zip(*(trials for _, trials in kinds), strict=True)
-    for _ in queue.run_ahead([RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]):
+    for _ in queue.run_ahead(
+        [RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]
+    ):
         pass
     return lambda case, keys: queue(case, RunRequest(capped_outcome, keys, stages))
 
@@ -175,15 +206,30 @@ def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = 
     difference = asdict(distance(second_reference.run, first))
     difference["overshoot"] = extremes_distance(second_reference.run, first)
     doubt |= {key: float(np.nanmax([0.0, difference[key], doubt[key]])) for key in MEASURES}
-    own = {name: {norm: max(error, first.own_error.get(name, {}).get(norm, 0.0)) for norm, error in norms.items()}
-           for name, norms in error_norms(second_reference.run, first).items()}  # fmt: skip
+    own = {
+        name: {
+            norm: max(error, first.own_error.get(name, {}).get(norm, 0.0))
+            for norm, error in norms.items()
+        }
+        for name, norms in error_norms(second_reference.run, first).items()
+    }
     uncertainty = Distance(**doubt | {"worst": difference["worst"]})
-    return replace(first, own_error=own, uncertainty=uncertainty, second=second_reference.words, failures=failures)
+    return replace(
+        first,
+        own_error=own,
+        uncertainty=uncertainty,
+        second=second_reference.words,
+        failures=failures,
+    )
 
 
 def _uncertainty(reference: Reference) -> float:
     """Uncertainty of a reference for the trajectory error (mean over time, see `Distance`); infinite if not known."""
-    return reference.uncertainty.trajectory if math.isfinite(reference.uncertainty.trajectory) else math.inf
+    return (
+        reference.uncertainty.trajectory
+        if math.isfinite(reference.uncertainty.trajectory)
+        else math.inf
+    )
 
 
 # exact ------------------------------------------------------------------------------------------------------------
@@ -208,7 +254,9 @@ def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Ref
     def fields_of(model) -> dict:
         for pipe in model.pipes:
             if (pipe.name, pipe.cells) not in cells:
-                cells[pipe.name, pipe.cells] = solution.averages(pipe.name, pipe.edges, model.case.numerics.end)
+                cells[pipe.name, pipe.cells] = solution.averages(
+                    pipe.name, pipe.edges, model.case.numerics.end
+                )
         return {pipe.name: cells[pipe.name, pipe.cells] for pipe in model.pipes}
 
     def rows_of(run: Outcome) -> np.ndarray:
@@ -230,16 +278,22 @@ def initial_values(model) -> room.ExactStart:
     """Initial pressures of the nodes [Pa] and initial flows of the links [m3/s] of a model."""
     rho, tables = model.case.properties.density, model.tables
     flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables.pipes, strict=True)}
-    flows |= {name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)}
+    flows |= {
+        name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)
+    }
     flows |= {name: row["flow"] for name, row in zip(model.valve_names, tables.valves, strict=True)}
     pressures = zip(model.node_names, tables.nodes["pressure"], strict=True)
-    return room.ExactStart({n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()})
+    return room.ExactStart(
+        {n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()}
+    )
 
 
 # finer runs -------------------------------------------------------------------------------------------------------
 
 
-def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -> Iterator[tuple[str, list[dict]]]:
+def candidates(
+    case, judged: bool, way: str, stiff: bool, lines: bool = False
+) -> Iterator[tuple[str, list[dict]]]:
     """Kinds of reference runs, best first: (description, overrides of three runs from coarse to fine).
 
     judged : True if scheme and method of the case are under study; way, stiff, lines : as in `find_reference`
@@ -250,8 +304,11 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
         return
     has_all = {scheme for scheme, *_ in WAVES} <= {*case.schemes}
     table = LUMPED if not cells else SEPARATION if not has_all else STIFF if stiff else WAVES
-    if judged:  # prefer other schemes or methods; without characteristics, which may equal the scheme under study
-        is_own = [numerics.scheme == entry[0] if cells else numerics.method == entry[1] for entry in table]
+    # prefer other schemes or methods; without characteristics, which may equal the scheme under study
+    if judged:
+        is_own = [
+            numerics.scheme == entry[0] if cells else numerics.method == entry[1] for entry in table
+        ]
         ordered = sorted(zip(is_own, table, strict=True), key=lambda pair: pair[0])
         table = [entry for _, entry in ordered if entry[4] != CHARACTERISTICS_REFINEMENT]
     # in cells, only characteristics carry jumps without error
@@ -263,9 +320,15 @@ def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -
         if control == "rtol" and numerics.rtol is not None:
             size = max(LEAST_RTOL, min(size, TOLERANCE_FRACTION * numerics.rtol))
         fixed = {"numerics.scheme": scheme} if cells else {}
-        fixed |= {"numerics.method": method} | dict(zip(["numerics.limiter"], limiters, strict=False))
-        trials = [fixed | {f"numerics.{control}": size if cells else size * TOLERANCE_RATIO**k}
-                  | cell_keys_of(scaled(cells, factor / 2**k)) for k in (2, 1, 0)]  # fmt: skip
+        fixed |= {"numerics.method": method} | dict(
+            zip(["numerics.limiter"], limiters, strict=False)
+        )
+        trials = [
+            fixed
+            | {f"numerics.{control}": size if cells else size * TOLERANCE_RATIO**k}
+            | cell_keys_of(scaled(cells, factor / 2**k))
+            for k in (2, 1, 0)
+        ]
         if factor != CHARACTERISTICS_REFINEMENT or _is_characteristic(case, trials[0]):
             names = " ".join([scheme or "", *limiters])
             yield run_text(case, names, scaled(cells, factor), method, control, size), trials
@@ -320,12 +383,24 @@ def _is_characteristic(case, keys: dict) -> bool:
 def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
     """Reference `words` from the finest of three runs; its own error is extrapolated from their differences."""
     coarse, middle, fine = runs
-    fine_reference, middle_reference = reference_of_run(fine, words), reference_of_run(middle, words)
-    coarse_errors, fine_errors = error_norms(coarse, middle_reference), error_norms(middle, fine_reference)
-    own = {name: {norm: SAFETY * extrapolated_error(coarse_errors[name][norm], d, ROUNDING * variable_size(fine, name))
-                  for norm, d in norms.items()} for name, norms in fine_errors.items()}  # fmt: skip
-    coarse_errors, fine_errors = asdict(distance(coarse, middle_reference)), asdict(distance(middle, fine_reference))
-    doubt = {key: SAFETY * extrapolated_error(coarse_errors[key], fine_errors[key]) for key in MEASURES[:3]}
+    fine_reference = reference_of_run(fine, words)
+    middle_reference = reference_of_run(middle, words)
+    coarse_errors = error_norms(coarse, middle_reference)
+    fine_errors = error_norms(middle, fine_reference)
+    own = {
+        name: {
+            norm: SAFETY
+            * extrapolated_error(coarse_errors[name][norm], d, ROUNDING * variable_size(fine, name))
+            for norm, d in norms.items()
+        }
+        for name, norms in fine_errors.items()
+    }
+    coarse_errors = asdict(distance(coarse, middle_reference))
+    fine_errors = asdict(distance(middle, fine_reference))
+    doubt = {
+        key: SAFETY * extrapolated_error(coarse_errors[key], fine_errors[key])
+        for key in MEASURES[:3]
+    }
     uncertainty = Distance(**doubt, overshoot=SAFETY * extremes_distance(middle, fine_reference))
     return replace(fine_reference, own_error=own, uncertainty=uncertainty)
 
@@ -339,19 +414,30 @@ def reference_of_run(run: Outcome, words: str = "") -> Reference:
     def fields_of(model) -> dict:
         sums = wave_sums(run)
         cells = {pipe.name: pipe.cells for pipe in model.pipes}
-        averages = {name: tuple(cell_averages(entry, cells[name]) for entry in pair) for name, pair in sums.items()}
+        averages = {
+            name: tuple(cell_averages(entry, cells[name]) for entry in pair)
+            for name, pair in sums.items()
+        }
         by_pipe = fields(model, averages)
         pairs = zip(run.model.meshed, model.meshed, strict=True)
-        return by_pipe | {("basin", other.name): project_to(entry, [*basin_fields(entry, run.y).values()], other)
-                        for entry, other in pairs}  # fmt: skip
+        return by_pipe | {
+            ("basin", other.name): project_to(entry, [*basin_fields(entry, run.y).values()], other)
+            for entry, other in pairs
+        }
 
     def rows_of(other: Outcome) -> np.ndarray:
         t = run.rows[:, 0]
-        if other.rows.shape[0] != t.size or not np.allclose(other.rows[:, 0], t, rtol=1e-12, atol=1e-300):
-            raise FvsolveError("rows of two runs are at different times; set the key output.every in the case")
+        if other.rows.shape[0] != t.size or not np.allclose(
+            other.rows[:, 0], t, rtol=1e-12, atol=1e-300
+        ):
+            raise FvsolveError(
+                "rows of two runs are at different times; set the key output.every in the case"
+            )
         by_probe = {name: run.rows[:, 1 + k] for k, name in enumerate(run.probes)}
         missing = np.full(t.size, np.nan)
-        return np.column_stack([by_probe.get(name, missing) for name in other.probes] or [np.zeros((t.size, 0))])
+        return np.column_stack(
+            [by_probe.get(name, missing) for name in other.probes] or [np.zeros((t.size, 0))]
+        )
 
     return Reference("finer", words, fields_of, rows_of, pressure_ranges(run.envelope), run=run)
 

@@ -45,7 +45,9 @@ def fixed_choices(case) -> dict[str, str]:
     from fvsolve.core.run import model_of
 
     own = case.numerics.pipe_model
-    undecided = [name for name in delay_lines(case) if (case.links[name].pipe_model or own) == "auto"]
+    undecided = [
+        name for name in delay_lines(case) if (case.links[name].pipe_model or own) == "auto"
+    ]
     if not undecided:
         return {}
     model = model_of(case)
@@ -56,7 +58,9 @@ def fixed_choices(case) -> dict[str, str]:
 
 def as_cells(names: Iterable[str]) -> dict[str, str]:
     """Overrides with which all pipes of a case have cells; names : its delay lines."""
-    return {"numerics.pipe_model": "finite-volume"} | pipe_model_keys(dict.fromkeys(names, "finite-volume"))
+    return {"numerics.pipe_model": "finite-volume"} | pipe_model_keys(
+        dict.fromkeys(names, "finite-volume")
+    )
 
 
 def cells_for_lines(case, step: float) -> dict:
@@ -67,7 +71,9 @@ def cells_for_lines(case, step: float) -> dict:
     delayed = delay_lines(case)
     keys = as_cells(delayed)
     for name in delayed if step > 0.0 else ():
-        keys[f"links.{name}.cells"] = max(1, math.ceil(case.links[name].length / case.wave_speed(name) / step))
+        keys[f"links.{name}.cells"] = max(
+            1, math.ceil(case.links[name].length / case.wave_speed(name) / step)
+        )
     return keys
 
 
@@ -80,7 +86,8 @@ def pipe_model_keys(chosen: dict[str, str]) -> dict[str, str]:
 
 Counts = dict[str, tuple[int, ...]]  # dotted key -> numbers of cells: one of a pipe, two of a basin
 BASIN_ORDER = 2  # order of `muscl`, which replaces all schemes that a basin does not have
-JUMP_SHARE = 0.75  # a jump keeps at least this fraction of its greatest difference between neighbours on finer cells
+# a jump keeps at least this fraction of its greatest difference between neighbours on finer cells
+JUMP_SHARE = 0.75
 
 
 def pipes(case) -> dict[str, Pipe]:
@@ -104,9 +111,17 @@ def cell_counts(case) -> Counts:
 
     Returns dotted key, such as "links.main.cells" -> (cells,) of a pipe, or (cells along x, cells along y) of a basin.
     """
-    numbers: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes_with_cells(case).items()}
-    numbers |= {f"links.{name}.cells": (link.cells,) for name, link in case.links.items() if link.kind == "conduit"}
-    return numbers | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
+    numbers: Counts = {
+        f"links.{name}.cells": (pipe.cells,) for name, pipe in pipes_with_cells(case).items()
+    }
+    numbers |= {
+        f"links.{name}.cells": (link.cells,)
+        for name, link in case.links.items()
+        if link.kind == "conduit"
+    }
+    return numbers | {
+        f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells
+    }
 
 
 def basins_from_files(case) -> list[str]:
@@ -116,12 +131,18 @@ def basins_from_files(case) -> list[str]:
 
 def cell_keys_of(cells_by_key: Counts) -> dict[str, Any]:
     """Overrides of a case that set these numbers of cells: dotted key -> number, or list of two numbers."""
-    return {key: list(numbers) if len(numbers) > 1 else numbers[0] for key, numbers in cells_by_key.items()}
+    return {
+        key: list(numbers) if len(numbers) > 1 else numbers[0]
+        for key, numbers in cells_by_key.items()
+    }
 
 
 def scaled(cells_by_key: Counts, factor: float) -> Counts:
     """Numbers of cells multiplied by `factor` along every pipe and every side of a basin; at least 1."""
-    return {key: tuple(max(1, round(n * factor)) for n in numbers) for key, numbers in cells_by_key.items()}
+    return {
+        key: tuple(max(1, round(n * factor)) for n in numbers)
+        for key, numbers in cells_by_key.items()
+    }
 
 
 def total_cells(case, cells_by_key: Counts) -> int:
@@ -173,13 +194,20 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
     (`Model.wave_rate`), times the greatest factor by which one is refined. With delay lines it is at least the number
     of cells of the slowest line divided by the travel time of a wave along it.
     """
-    rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
-             for name, pipe in pipes_with_cells(case).items()]  # fmt: skip
-    rates += [method.rate for method in line_methods(case).values() if method.pipe_model == "delay-line"]
+    rates = [
+        case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
+        for name, pipe in pipes_with_cells(case).items()
+    ]
+    rates += [
+        method.rate for method in line_methods(case).values() if method.pipe_model == "delay-line"
+    ]
     if case.meshes:
         lines = {f"links.{name}.cells" for name in pipes_with_cells(case)}
         own_cells = {key: numbers for key, numbers in cell_counts(case).items() if key not in lines}
-        factor = max((max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()), default=1.0)
+        factor = max(
+            (max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()),
+            default=1.0,
+        )
         rates.append(factor * study_model(case).wave_rate)
     return max(rates)
 
@@ -187,8 +215,10 @@ def greatest_wave_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> flo
 def scheme_order(case) -> int:
     """Order of the scheme in smooth flow, the least of all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
-    of_basins = [scheme.for_basin(pool.physics_type.has_fifth_order(pool, is_grid(case.meshes[name])))
-                 for name, pool in basins(case).items()]  # fmt: skip
+    of_basins = [
+        scheme.for_basin(pool.physics_type.has_fifth_order(pool, is_grid(case.meshes[name])))
+        for name, pool in basins(case).items()
+    ]
     return min(entry.order for entry in (scheme, *of_basins))
 
 
@@ -217,7 +247,9 @@ def initial_steps(model) -> list[float]:
         inner = basin.mesh.inner
         left, right = basin.mesh.left[:inner], basin.mesh.right[:inner]
         values = basin_fields(basin, model.start).values()
-        greatest += [float(np.max(np.abs(field[left] - field[right]), initial=0.0)) for field in values]
+        greatest += [
+            float(np.max(np.abs(field[left] - field[right]), initial=0.0)) for field in values
+        ]
     return greatest
 
 
@@ -273,7 +305,8 @@ def refined_step_keys(case, times: float) -> dict[str, Any]:
 
 # quantities of basins ---------------------------------------------------------------------------------------------
 
-EDGE_TOLERANCE = 1e-9  # fraction of the length: edges of coarse and fine cells that lie nearer are equal
+# fraction of the length: edges of coarse and fine cells that lie nearer are equal
+EDGE_TOLERANCE = 1e-9
 SPLINE_DEGREE = 5  # degree of the spline through cumulative contents, for edges that are not equal
 
 
@@ -311,7 +344,9 @@ def project_to(fine, values, coarse) -> np.ndarray:
     fine_grid, coarse_grid = fine.mesh.grid, coarse.mesh.grid
     degree = SPLINE_DEGREE if fine.is_grid else 1  # higher splines would smooth across holes
     averages = []
-    fine_area, coarse_area = (np.outer(np.diff(grid.y), np.diff(grid.x)) for grid in (fine_grid, coarse_grid))
+    fine_area, coarse_area = (
+        np.outer(np.diff(grid.y), np.diff(grid.x)) for grid in (fine_grid, coarse_grid)
+    )
     for value in values:
         contents = np.where(fine_grid.index >= 0, value[fine_grid.index], 0.0) * fine_area
         contents = coarse_contents(contents, fine_grid.x, coarse_grid.x, degree, 1)
@@ -330,9 +365,14 @@ def coarse_contents(
     """
     first = np.zeros_like(np.take(fine_contents, [0], axis=axis))
     cumulative = np.concatenate([first, np.cumsum(fine_contents, axis=axis)], axis=axis)
-    edges = np.clip(np.searchsorted(fine, coarse - EDGE_TOLERANCE * (fine[-1] - fine[0])), 0, fine.size - 1)
+    edges = np.clip(
+        np.searchsorted(fine, coarse - EDGE_TOLERANCE * (fine[-1] - fine[0])), 0, fine.size - 1
+    )
     if np.all(np.abs(fine[edges] - coarse) <= EDGE_TOLERANCE * (fine[-1] - fine[0])):
         return np.diff(np.take(cumulative, edges, axis=axis), axis=axis)
     from scipy.interpolate import make_interp_spline
 
-    return np.diff(make_interp_spline(fine, cumulative, k=min(degree, fine.size - 1), axis=axis)(coarse), axis=axis)
+    return np.diff(
+        make_interp_spline(fine, cumulative, k=min(degree, fine.size - 1), axis=axis)(coarse),
+        axis=axis,
+    )

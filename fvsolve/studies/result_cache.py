@@ -41,7 +41,8 @@ class ResultCache:
 
     def _read(self) -> None:
         data = self.path.read_bytes()
-        complete = data.rfind(b"\n") + 1  # an incomplete line follows if a study was killed or the disk was full
+        # an incomplete line follows if a study was killed or the disk was full
+        complete = data.rfind(b"\n") + 1
         for line in data[:complete].decode("utf-8", errors="replace").splitlines():
             try:
                 point = json.loads(line)
@@ -93,7 +94,10 @@ class ResultCache:
         self.new_keys.add(key)
         if self.path is not None:
             seal = seal_of(key, result)
-            line = json.dumps({"key": key, "of": plain(settings), "found": result, "seal": seal}) + "\n"
+            line = (
+                json.dumps({"key": key, "of": plain(settings), "found": result, "seal": seal})
+                + "\n"
+            )
             with write_errors(self.path):
                 self.file = self.file or open(self.path, "ab", buffering=0)
                 if self.file.write(line.encode()) < len(line.encode()):
@@ -112,8 +116,10 @@ def write_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise RunError(f"{path}: cannot be written: {error.strerror or error}. Finished results are kept; remove the "
-                       "cause and repeat the command to resume") from None  # fmt: skip
+        raise RunError(
+            f"{path}: cannot be written: {error.strerror or error}. Finished results are kept; remove the "
+            "cause and repeat the command to resume"
+        ) from None
 
 
 def case_key(case, extra: dict) -> str:
@@ -137,10 +143,16 @@ def digest_of(who: dict) -> str:
     """
     who = who | {
         "package": package_hash(),
-        "outside": sorted(name for folder, name in EXTRA_FOLDERS.items() if PACKAGE not in folder.parents),
+        "outside": sorted(
+            name for folder, name in EXTRA_FOLDERS.items() if PACKAGE not in folder.parents
+        ),
     }
     text = json.dumps(who, sort_keys=True, default=str)
-    arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
+    arrays = [
+        method.text
+        for name, method in METHODS.items()
+        if name not in BUILT_IN and f'"{name}"' in text
+    ]
     arrays += [row.own.digest for name, row in LIMITERS.items() if row.own and f'"{name}"' in text]
     return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
 

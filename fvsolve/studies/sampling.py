@@ -31,7 +31,9 @@ def grid(vary: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(vary, values, strict=True)) for values in itertools.product(*vary.values())]
 
 
-def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, seed: int) -> list[dict[str, Any]]:
+def sample_points(
+    case: Case, vary: Mapping[str, Sequence[Any]], sample: str, seed: int
+) -> list[dict[str, Any]]:
     """Sample of points within the ranges of keys, each key -> value [SI], by `scipy.stats.qmc`.
 
     vary : key -> (low, high); sample : kind and number of points, such as "sobol:64" or "lhs:100" (Latin hypercube)
@@ -46,7 +48,8 @@ def sample_points(case: Case, vary: Mapping[str, Sequence[Any]], sample: str, se
 
     make = qmc.LatinHypercube if match[1] == "lhs" else qmc.Sobol
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
+        # warnings on sample sizes that are not powers of two
+        warnings.simplefilter("ignore", UserWarning)
         unit = make(len(vary), seed=np.random.default_rng(seed)).random(int(match[2]))
     return [dict(zip(vary, row, strict=True)) for row in (low + (high - low) * unit).tolist()]
 
@@ -73,13 +76,19 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
         raise ValueError(f"{show(list(given))} is not a range; expected two values, LOW,HIGH")
     quantity, setting = key_quantity(case.raw, key), ReadContext(ambient=case.ambient_pressure)
     if quantity is None:
-        raise ValueError("is not a continuous quantity, so it has no range; use a grid: --set KEY=a,b,c")
+        raise ValueError(
+            "is not a continuous quantity, so it has no range; use a grid: --set KEY=a,b,c"
+        )
     low, high = (quantity.read(parsed(end), setting) for end in given)
     if isinstance(low, units.Kinematic) or isinstance(high, units.Kinematic):
-        raise ValueError(f"{show(list(given))} is a kinematic viscosity; expected dynamic viscosities in Pa s or mPa s")
+        raise ValueError(
+            f"{show(list(given))} is a kinematic viscosity; expected dynamic viscosities in Pa s or mPa s"
+        )
     if not low < high:
         reason = "is empty" if low == high else "is reversed"
-        raise ValueError(f"the range from {show(given[0])} to {show(given[1])} {reason}; expected LOW below HIGH")
+        raise ValueError(
+            f"the range from {show(given[0])} to {show(given[1])} {reason}; expected LOW below HIGH"
+        )
     return float(low), float(high)
 
 
@@ -93,7 +102,10 @@ def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
     if isinstance(value, Scheduled):
         within = len(keys) > 1 and isinstance(declaration_of(raw, keys[:-1]), Scheduled)
         forms = value.forms.values() if within else ()
-        value = next((form[keys[-1]][0] for form in forms if keys[-1] in form), Quantity(value.dimension, value.range))
+        value = next(
+            (form[keys[-1]][0] for form in forms if keys[-1] in form),
+            Quantity(value.dimension, value.range),
+        )
     value = getattr(value, "number", value)  # of a value that is a number or a table
     return value if isinstance(value, Quantity) else None
 
@@ -101,12 +113,18 @@ def key_quantity(raw: dict[str, Any], key: str) -> Quantity | None:
 def si_unit_of(raw: dict[str, Any], key: str) -> str:
     """SI unit of the values of a key that are given without a unit; "" if they have no dimension."""
     quantity = key_quantity(raw, key)
-    return "" if quantity is None or quantity.dimension == "number" else units.DIMENSIONS[quantity.dimension].si
+    return (
+        ""
+        if quantity is None or quantity.dimension == "number"
+        else units.DIMENSIONS[quantity.dimension].si
+    )
 
 
 def key_with_unit(raw: dict[str, Any], key: str, values: Iterable[Any]) -> str:
     """Heading of the column of a key, with the SI unit if all values are bare numbers: `links.main.length [m]`."""
-    all_bare = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
+    all_bare = all(
+        isinstance(value, (int, float)) and not isinstance(value, bool) for value in values
+    )
     unit = si_unit_of(raw, key) if all_bare else ""
     return f"{key} [{unit}]" if unit else key
 
@@ -118,7 +136,9 @@ def refuse_unknown(source: Any, values: Mapping[str, Any], raw: dict[str, Any]) 
         if unknown:
             load(source, values)
     except CaseError as error:
-        faults = [fault for fault in error.faults if any(fault.place.startswith(key) for key in unknown)]
+        faults = [
+            fault for fault in error.faults if any(fault.place.startswith(key) for key in unknown)
+        ]
         if faults:
             raise CaseError(faults, error.file) from None
 
@@ -127,7 +147,8 @@ def is_known(raw: dict[str, Any], key: str) -> bool:
     """True if a case can have the key; raw : nested dicts of the case."""
     try:
         declaration_of(raw, split_key(key))
-    except (FvsolveError, KeyError, AttributeError, TypeError):  # other types if the case itself is invalid
+    except (FvsolveError, KeyError, AttributeError, TypeError):
+        # other types if the case itself is invalid
         return False
     return True
 
@@ -141,18 +162,31 @@ def points_from_file(path: Path, source: Any, raw: dict[str, Any]) -> list[dict[
         table = read_rows(path)
     except ValueError as error:
         raise FvsolveError(f"{error}; expected a header of keys and a row for each run") from None
-    faults = [f"two columns have the key {name}" for name in dict.fromkeys(table.names) if table.names.count(name) > 1]
+    faults = [
+        f"two columns have the key {name}"
+        for name in dict.fromkeys(table.names)
+        if table.names.count(name) > 1
+    ]
     keys = [Heading.of(header, raw, faults) for header in table.header]
-    rows = [{key.name: key.read(cell, f"line {line}, {key.name}", faults) for key, cell in zip(keys, row, strict=True)}
-            for line, row in zip(table.lines, table.cells, strict=True)]  # fmt: skip
+    rows = [
+        {
+            key.name: key.read(cell, f"line {line}, {key.name}", faults)
+            for key, cell in zip(keys, row, strict=True)
+        }
+        for line, row in zip(table.lines, table.cells, strict=True)
+    ]
     try:
         refuse_unknown(source, rows[0], raw)
     except CaseError as error:
-        faults = [f"{case_fault.place}: {case_fault.message}" for case_fault in error.faults] + faults
+        faults = [
+            f"{case_fault.place}: {case_fault.message}" for case_fault in error.faults
+        ] + faults
     if faults:
         rest = f"\n  and {len(faults) - MAX_FAULTS} more" * (len(faults) > MAX_FAULTS)
         lines_of_faults = "".join(f"\n  {fault}" for fault in faults[:MAX_FAULTS])
-        raise FvsolveError(f"{path.name}: {len(faults)} fault{'s' * (len(faults) > 1)}{lines_of_faults}{rest}")
+        raise FvsolveError(
+            f"{path.name}: {len(faults)} fault{'s' * (len(faults) > 1)}{lines_of_faults}{rest}"
+        )
     return rows
 
 

@@ -23,7 +23,8 @@ from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.units import show
 
 KEYS = ("case", "title", "estimate_error", "events", "protections")
-NAMED_TABLES = "nodes", "links", "limits", "routes", "scalars", "defaults"  # of parts: keys are set one by one
+# of parts: keys are set one by one
+NAMED_TABLES = "nodes", "links", "limits", "routes", "scalars", "defaults"
 AddFault = Callable[[tuple, str], None]
 
 
@@ -63,7 +64,9 @@ def read_scenarios(path: str | Path) -> Scenarios:
 
     def fault(keys: tuple, message: str) -> None:
         place = ".".join(keys)
-        line = next((lines[spelling] for spelling in possible_paths(keys) if spelling in lines), None)
+        line = next(
+            (lines[spelling] for spelling in possible_paths(keys) if spelling in lines), None
+        )
         faults.setdefault((place, message), Fault(place, message, line))
 
     if {"nodes", "fluid"} & data.keys():
@@ -71,18 +74,27 @@ def read_scenarios(path: str | Path) -> Scenarios:
         raise CaseError([Fault("", f"is a case, not a study. {text}")], path.name)
     for key in data:
         if key not in KEYS:
-            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; expected ' + ', '.join(KEYS)}")
+            fault(
+                (key,), f"unknown key{did_you_mean(key, KEYS) or '; expected ' + ', '.join(KEYS)}"
+            )
     for key, kind, kind_text in (("title", str, "text"), ("estimate_error", bool, "true or false")):
         if not isinstance(data.get(key, kind()), kind):
             fault((key,), f"{show(data[key])} is not {kind_text}")
-    sets = {group: read_overrides(data.get(group, {}), group, fault) for group in ("events", "protections")}
+    sets = {
+        group: read_overrides(data.get(group, {}), group, fault)
+        for group in ("events", "protections")
+    }
     if not faults and not any(sets.values()):
         fault((), "the study has no runs; expected [events.NAME], [protections.NAME] or both")
     for event, protection, key, other in all_conflicts(**sets):
-        text = f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
+        text = (
+            f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
+        )
         fault(("events", event, key), text)
     place = case_path(data.get("case"), path.parent, fault)
-    design = Scenarios(path.stem, path, data.get("title", ""), place, data.get("estimate_error", False), **sets)
+    design = Scenarios(
+        path.stem, path, data.get("title", ""), place, data.get("estimate_error", False), **sets
+    )
     if place is not None:
         run_faults(design, fault)
     if faults:
@@ -118,9 +130,14 @@ def case_path(case: Any, folder: Path, fault: AddFault) -> Path | None:
     if not place.is_file() and case in shipped.names():
         return shipped.find(case)
     if not place.is_file():
-        suggestion = [file.name for file in place.parent.glob("*.toml")] if place.parent.is_dir() else []
+        suggestion = (
+            [file.name for file in place.parent.glob("*.toml")] if place.parent.is_dir() else []
+        )
         suggestion = did_you_mean(place.name, [*suggestion, *shipped.names()])
-        fault(("case",), f"{show(case)}: there is no such file{suggestion}; a path is relative to the study")
+        fault(
+            ("case",),
+            f"{show(case)}: there is no such file{suggestion}; a path is relative to the study",
+        )
         return None
     return place
 
@@ -133,9 +150,15 @@ def read_overrides(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
     sets = {}
     for name, overrides in table.items():
         if not isinstance(overrides, dict):
-            fault((group, name), f'{show(overrides)} is not a table; expected keys such as links.pump.trip = "2 s"')
+            fault(
+                (group, name),
+                f'{show(overrides)} is not a table; expected keys such as links.pump.trip = "2 s"',
+            )
         elif not name.replace("-", "").replace("_", "").isalnum():
-            fault((group, name), f"{show(name)} is not a valid name; expected letters, digits, _ and -")
+            fault(
+                (group, name),
+                f"{show(name)} is not a valid name; expected letters, digits, _ and -",
+            )
         else:
             sets[name] = dict(dotted_keys(overrides))
     return sets
@@ -152,14 +175,18 @@ def dotted_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             continue
         for second, below in inner.items():
             if first in NAMED_TABLES and isinstance(below, dict):
-                yield from ((dotted_path(first, second, third), value) for third, value in below.items())
+                yield from (
+                    (dotted_path(first, second, third), value) for third, value in below.items()
+                )
             else:
                 yield dotted_path(first, second), below
 
 
 def dotted_path(*keys: str) -> str:
     """Join keys to a dotted TOML key, with quotes where necessary."""
-    return ".".join(key if key.replace("-", "").replace("_", "").isalnum() else json.dumps(key) for key in keys)
+    return ".".join(
+        key if key.replace("-", "").replace("_", "").isalnum() else json.dumps(key) for key in keys
+    )
 
 
 def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
@@ -167,10 +194,14 @@ def all_conflicts(events: dict, protections: dict) -> Iterator[tuple[str, str, s
 
     Keys are in conflict if they are equal with different values, or if one of them contains the other.
     """
-    for (event, of_event), (protection, of_protection) in itertools.product(events.items(), protections.items()):
+    for (event, of_event), (protection, of_protection) in itertools.product(
+        events.items(), protections.items()
+    ):
         for key, other_key in itertools.product(of_event, of_protection):
             a, b = split_key(key), split_key(other_key)
-            if a[: len(b)] == b[: len(a)] and not (a == b and of_event[key] == of_protection[other_key]):
+            if a[: len(b)] == b[: len(a)] and not (
+                a == b and of_event[key] == of_protection[other_key]
+            ):
                 yield event, protection, key, other_key
 
 
@@ -187,7 +218,10 @@ def run_faults(design: Scenarios, fault: AddFault) -> None:
         for case_fault in error.faults:
             fault(("case",), f"{error.file}: {case_fault}")
         return
-    clash = {(event, protection) for event, protection, *_ in all_conflicts(design.events, design.protections)}
+    clash = {
+        (event, protection)
+        for event, protection, *_ in all_conflicts(design.events, design.protections)
+    }
     runs = [(pair, keys) for *pair, keys in design.runs() if tuple(pair) not in clash]
     groups: dict[tuple[str, str], list] = {}  # (place, message) -> pairs of event and protection
     for pair, keys in runs:
@@ -216,7 +250,9 @@ def responsible_sets(design: Scenarios, place: str | None, pairs: list) -> Itera
         for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):
             if place is None:
                 yield group, name
-            elif any(within(place, key) or within(key, place) for key in getattr(design, group)[name]):
+            elif any(
+                within(place, key) or within(key, place) for key in getattr(design, group)[name]
+            ):
                 yield group, name, place
         if place is None and pairs[0][position] is not None:
             return
@@ -253,8 +289,11 @@ class ScenarioResults:
         by_protection: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
             by_protection.setdefault(row["protection"] or "", []).append(row)
-        return [name for name, rows in by_protection.items()
-                if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)]  # fmt: skip
+        return [
+            name
+            for name, rows in by_protection.items()
+            if all(map(run_passes, rows)) and any(row["verdicts"] for row in rows)
+        ]
 
     @property
     def limited(self) -> bool:
@@ -269,10 +308,20 @@ class ScenarioResults:
     def plain(self) -> dict[str, Any]:
         """Plain values for study.json, in which directories are then relative to the folder of the study."""
         design = self.design
-        return plain({"title": design.title, "study": design.name, "case": str(design.case), "ok": self.ok,
-                      "events": list(design.events), "protections": list(design.protections), "holds": self.holds,
-                      "changes": {"events": design.events, "protections": design.protections},
-                      "error": design.error, "runs": self.rows})  # fmt: skip
+        return plain(
+            {
+                "title": design.title,
+                "study": design.name,
+                "case": str(design.case),
+                "ok": self.ok,
+                "events": list(design.events),
+                "protections": list(design.protections),
+                "holds": self.holds,
+                "changes": {"events": design.events, "protections": design.protections},
+                "error": design.error,
+                "runs": self.rows,
+            }
+        )
 
 
 def run_passes(row: dict[str, Any]) -> bool:
@@ -281,8 +330,14 @@ def run_passes(row: dict[str, Any]) -> bool:
 
 
 @declared("study")
-def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None = None, force: bool = False,
-          progress=None) -> ScenarioResults:  # fmt: skip
+def study(
+    source,
+    out: str | Path | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
+    force: bool = False,
+    progress=None,
+) -> ScenarioResults:
     """Run all events with all protections of a study file, `jobs` runs at a time, each in its own run directory.
 
     source : path of the study file, or its content; out : folder of the runs (default runs/NAME of the study)
@@ -296,7 +351,9 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
     tasks = []
     for event, protection, keys in design.runs():
         place = folder / ".".join(name for name in (event, protection) if name is not None)
-        tasks.append({"event": event, "protection": protection, "keys": keys, "directory": str(place)})
+        tasks.append(
+            {"event": event, "protection": protection, "keys": keys, "directory": str(place)}
+        )
     folder.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any] | None] = [None] * len(tasks)
     with TaskPool(ScenarioRun(design.case, design.error, force), jobs, dask) as pool:
@@ -320,7 +377,11 @@ class ScenarioRun(Work):
         case: Case = load(self.sent.source, task["keys"])
         place.parent.mkdir(parents=True, exist_ok=True)
         resume = not self.force and place.exists()
-        if resume and (place / "case.toml").is_file() and load(place / "case.toml").step_keys != case.step_keys:
+        if (
+            resume
+            and (place / "case.toml").is_file()
+            and load(place / "case.toml").step_keys != case.step_keys
+        ):
             text = "holds a run with other time steps, and a study has no runs with mixed steps"
             raise RunError(f"{place} {text}; repeat the study with --force")
         result = run(case, out=place, force=self.force, resume=resume)
@@ -330,8 +391,22 @@ class ScenarioRun(Work):
             peak_errors(result, case)
             write_summary(place / "summary.json", result.summary)
         summary = result.summary
-        keys_shown = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks",
-                      "events", "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
+        keys_shown = (
+            "ok",
+            "reason",
+            "t",
+            "invalid_from",
+            "verdicts",
+            "extremes",
+            "peaks",
+            "resolution",
+            "marks",
+            "events",
+            "expectations",
+            "time_unit",
+            "envelope_units",
+            "warnings",
+        )
         row = {key: task[key] for key in ("event", "protection", "directory")}
         return row | {key: plain(summary[key]) for key in keys_shown if key in summary}
 
@@ -353,17 +428,27 @@ def write_study(results: ScenarioResults) -> None:
     for row in data["runs"]:
         row["directory"] = os.path.relpath(row["directory"], results.folder)
     clear_reports(results.folder)
-    limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
+    limits = list(
+        dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"])
+    )
     quantities = ("value", "margin", "unit", "state", "place", "time [s]")
     columns = [f"{name} {quantity}" for name in limits for quantity in quantities]
-    with replacing(results.folder / "study.csv") as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
+    with (
+        replacing(results.folder / "study.csv") as fresh,
+        open(fresh, "w", encoding="utf-8", newline="") as file,
+    ):
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])
         for row in results.rows:
             verdicts = {verdict["name"]: verdict for verdict in row["verdicts"]}
-            cells = [verdicts.get(name, {}).get(key) for name in limits
-                     for key in ("value", "margin", "unit", "state", "place", "time")]  # fmt: skip
-            table.writerow([row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells])
+            cells = [
+                verdicts.get(name, {}).get(key)
+                for name in limits
+                for key in ("value", "margin", "unit", "state", "place", "time")
+            ]
+            table.writerow(
+                [row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells]
+            )
     write_file(results.folder / STUDY, json.dumps(data, indent=1) + "\n")
 
 

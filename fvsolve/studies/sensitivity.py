@@ -58,7 +58,10 @@ class Sensitivity(Displayable, PlainData):
     @property
     def sheet(self) -> ResultTable:
         """Table with a row for each key and a column for each index."""
-        rows = [{"key": key, **{name: getattr(self, name)[k] for name in COLUMNS}} for k, key in enumerate(self.keys)]
+        rows = [
+            {"key": key, **{name: getattr(self, name)[k] for name in COLUMNS}}
+            for k, key in enumerate(self.keys)
+        ]
         return ResultTable([Column("key"), *(Column(name, words=".4g") for name in COLUMNS)], rows)
 
     def table_columns(self) -> dict[str, list]:
@@ -66,12 +69,21 @@ class Sensitivity(Displayable, PlainData):
 
 
 @declared("study")
-@validated(vary=VARY, quantity=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS)
+@validated(
+    vary=VARY, quantity=TEXT, samples=COUNT, seed=COUNT_FROM_ZERO, out=PATH, **STUDY_ARGUMENTS
+)
 def sensitivity(
-    case, vary: Mapping[str, Sequence[Any]], quantity: str | None = None, samples: int = 64, seed: int = 0,
-    set: Mapping[str, Any] | None = None, jobs: int = 1, dask: str | None = None, out: str | Path | None = None,
+    case,
+    vary: Mapping[str, Sequence[Any]],
+    quantity: str | None = None,
+    samples: int = 64,
+    seed: int = 0,
+    set: Mapping[str, Any] | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
+    out: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Sensitivity:  # fmt: skip
+) -> Sensitivity:
     """Compute Sobol and Morris indices of a quantity, such as "max(gate.pressure)", over the ranges of keys.
 
     case : as for `run`, or a function of a dict key -> number; vary : key -> (low, high)
@@ -81,25 +93,37 @@ def sensitivity(
     Raises FvsolveError if a run does not have the quantity, if the quantity is constant, and if SALib is not installed.
     """
     if samples < MIN_SAMPLES:
-        raise FvsolveError(f"samples = {samples} is too small; expected {MIN_SAMPLES} or more, a power of two")
+        raise FvsolveError(
+            f"samples = {samples} is too small; expected {MIN_SAMPLES} or more, a power of two"
+        )
     if callable(case):
         bounds = {key: (float(low), float(high)) for key, (low, high) in vary.items()}
     else:
         bounds = key_ranges(load(case, set), vary)
     if not bounds:
-        raise FvsolveError("no key varies; give at least one key and its range: links.main.length=900,1000")
+        raise FvsolveError(
+            "no key varies; give at least one key and its range: links.main.length=900,1000"
+        )
     sobol, morris = sample_points(bounds, samples, seed)
-    points = [dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()]
+    points = [
+        dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()
+    ]
     if callable(case):
         values = np.array([float(case(point)) for point in points])
         if not np.isfinite(values).all():
-            raise FvsolveError("the function is not finite at some points; expected ranges in which it is finite")
+            raise FvsolveError(
+                "the function is not finite at some points; expected ranges in which it is finite"
+            )
     else:
         if quantity is None:
             raise FvsolveError('no quantity; expected a quantity such as "max(gate.pressure)"')
-        sweep_result = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
+        sweep_result = sweep(
+            case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask
+        )
         quantity, values = sweep_result.quantity(quantity), values_of(sweep_result, quantity)
-    indices = analyse_values(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
+    indices = analyse_values(
+        bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed
+    )
     return Sensitivity(tuple(bounds), quantity or "the function", len(points), *indices)
 
 
@@ -110,12 +134,16 @@ def values_of(result, quantity: str) -> np.ndarray:
     if missing:
         values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
         verb = "has" if len(missing) == 1 else "have"
-        raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs {verb} no {name}, the first at {values}: "
-                           f"{missing[0]['reason']}; expected ranges in which all runs have {name}")  # fmt: skip
+        raise FvsolveError(
+            f"{len(missing)} of {len(result.rows)} runs {verb} no {name}, the first at {values}: "
+            f"{missing[0]['reason']}; expected ranges in which all runs have {name}"
+        )
     return np.array([float(row[name]) for row in result.rows])
 
 
-def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def sample_points(
+    bounds: Mapping[str, tuple[float, float]], samples: int, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Sample points of the Sobol and the Morris method : float64[points, keys] each.
 
     bounds : key -> (low, high); samples : base sample size of Sobol; seed : equal seeds give equal points
@@ -124,15 +152,22 @@ def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed:
     try:
         from SALib.sample import morris, sobol
     except ImportError:
-        raise FvsolveError('sensitivity needs the package SALib: pip install "fvsolve[study]"') from None
+        raise FvsolveError(
+            'sensitivity needs the package SALib: pip install "fvsolve[study]"'
+        ) from None
     problem = salib_problem(bounds)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
+        # warnings on sample sizes that are not powers of two
+        warnings.simplefilter("ignore", UserWarning)
         sobol_points = sobol.sample(problem, samples, calc_second_order=False, seed=seed)
-    return sobol_points, morris.sample(problem, max(MIN_PATHS, samples // 4), num_levels=LEVELS, seed=seed)
+    return sobol_points, morris.sample(
+        problem, max(MIN_PATHS, samples // 4), num_levels=LEVELS, seed=seed
+    )
 
 
-def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
+def analyse_values(
+    bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int
+) -> list[list[float]]:
     """Sensitivity indices from the values of a quantity : for each entry of `COLUMNS` a list over the keys.
 
     sobol_points, morris_points : sample points as from `sample_points`; sobol_values, morris_values : quantity at these
@@ -143,14 +178,26 @@ def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_val
 
     problem = salib_problem(bounds)
     if np.ptp(sobol_values) == 0.0:
-        raise FvsolveError(f"the quantity is {show(float(sobol_values[0]))} in all runs: no key changes it")
-    scale = float(np.std(sobol_values))  # scaled values keep their digits in the sums of squares of SALib
-    shares = sobol.analyze(problem, (sobol_values - sobol_values.mean()) / scale, calc_second_order=False, seed=seed)
+        raise FvsolveError(
+            f"the quantity is {show(float(sobol_values[0]))} in all runs: no key changes it"
+        )
+    # scaled values keep their digits in the sums of squares of SALib
+    scale = float(np.std(sobol_values))
+    shares = sobol.analyze(
+        problem, (sobol_values - sobol_values.mean()) / scale, calc_second_order=False, seed=seed
+    )
     effects = morris.analyze(problem, morris_points, morris_values, num_levels=LEVELS, seed=seed)
-    indices = {**{name: shares[name] for name in COLUMNS[:4]}, **{name: effects[name] for name in COLUMNS[4:]}}
+    indices = {
+        **{name: shares[name] for name in COLUMNS[:4]},
+        **{name: effects[name] for name in COLUMNS[4:]},
+    }
     return [np.asarray(indices[name], dtype=float).tolist() for name in COLUMNS]
 
 
 def salib_problem(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Problem definition for SALib; bounds : key -> (low, high)."""
-    return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
+    return {
+        "num_vars": len(bounds),
+        "names": [*bounds],
+        "bounds": [list(limits) for limits in bounds.values()],
+    }

@@ -21,7 +21,9 @@ FIRST_SHARE = 0.25  # rise of the first peak above the start, as a fraction of t
 Signal = tuple[np.ndarray, np.ndarray]  # times and values
 
 
-def separated_error(values: Sequence[float], maxima: np.ndarray, ceiling: float = math.inf) -> float:
+def separated_error(
+    values: Sequence[float], maxima: np.ndarray, ceiling: float = math.inf
+) -> float:
     """Error bound of the greatest value at the first of three resolutions.
 
     values : greatest values at one, two and four times the resolution; maxima : float64[maxima, 3]  local maxima at
@@ -40,7 +42,13 @@ def remainders_beyond(maxima: np.ndarray) -> np.ndarray:
     a, b = np.abs(first), np.abs(second)
     ratio = np.divide(b, a, out=np.where(b > 0.0, np.inf, 0.0), where=a > 0.0)
     r = np.where(first * second < 0.0, SLOW, np.clip(ratio, QUICK, SLOW))
-    return SAFETY * b * r / (1.0 - r) * np.clip(np.where(first * second < 0.0, 1.0, ratio), 1.0, GROWTH)
+    return (
+        SAFETY
+        * b
+        * r
+        / (1.0 - r)
+        * np.clip(np.where(first * second < 0.0, 1.0, ratio), 1.0, GROWTH)
+    )
 
 
 def separate_maxima(signals: Sequence[Signal], troughs: Callable) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +75,9 @@ def separate_maxima(signals: Sequence[Signal], troughs: Callable) -> tuple[np.nd
     return values[known], times[known]
 
 
-def first_peak(signals: Sequence[Signal], troughs: Callable, ceiling: float = math.inf) -> dict[str, float] | None:
+def first_peak(
+    signals: Sequence[Signal], troughs: Callable, ceiling: float = math.inf
+) -> dict[str, float] | None:
     """Value at the first resolution, time [s] and error of the first peak of a signal; None without a peak.
 
     The first peak is the first local maximum that is above the value at the start by a fraction `FIRST_SHARE` of the

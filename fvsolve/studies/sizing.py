@@ -25,8 +25,10 @@ GOALS = ("minimum", "maximum")
 INTERIOR_TRIALS = 8  # greatest number of trials between two ends if limits fail at both
 MOST_TRIALS = 30  # the same where the margins nearby allow a value with which all limits hold
 MAX_RUNS = 60
-GUESS_MARGIN = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
-_VALUE = re.compile(r"([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?)\s*+(.*+)")  # of a text without blanks at its ends
+# least distance of the next value from the ends of the bracket, as a fraction of its width
+GUESS_MARGIN = 0.1
+# of a text without blanks at its ends
+_VALUE = re.compile(r"([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?)\s*+(.*+)")
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,12 @@ def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
         raise FvsolveError(str(error)) from None
     if unit_a != unit_b:
         first, second = unit_of(unit_a), unit_of(unit_b)
-        if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
+        if (
+            first is None
+            or second is None
+            or first.dimension != second.dimension
+            or first.gauge != second.gauge
+        ):
             text = f"{show(low)} and {show(high)} have different kinds of units"
             raise FvsolveError(f"{text}; use the same unit for both")
         a = float(second.number(first.si(a)))
@@ -117,8 +124,15 @@ class SizeSearch:
     progress : called as progress(runs, text); estimate_error : as for `size`
     """
 
-    def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
-                 estimate_error: bool = False) -> None:  # fmt: skip
+    def __init__(
+        self,
+        case: Case,
+        key: str,
+        unit: str,
+        ties: Mapping[str, str],
+        progress: Callable | None,
+        estimate_error: bool = False,
+    ) -> None:
         self.case, self.key, self.unit, self.progress = case, key, unit, progress
         self.estimate_error = estimate_error
         self.runs: list[SizeRun] = []
@@ -127,13 +141,19 @@ class SizeSearch:
     def keys(self, value: float) -> dict[str, Any]:
         """Overrides for a value of the key, and for dependent keys. Raises CaseError if a formula has no value."""
         unit = unit_of(self.unit)
-        x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
+        x = (
+            value
+            if unit is None
+            else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
+        )
         overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
         for tied, rule in self.formulas.items():
             try:
                 overrides[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
             except ValueError as error:
-                raise CaseError([Fault(f"--dependent {tied}", str(error))], self.case.name) from None
+                raise CaseError(
+                    [Fault(f"--dependent {tied}", str(error))], self.case.name
+                ) from None
         return overrides
 
     def __call__(self, value: float) -> SizeRun:
@@ -160,7 +180,9 @@ class SizeSearch:
         self.runs.append(size_run(value, result))
         return self.runs[-1]
 
-    def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
+    def search(
+        self, low: float, high: float, goal: str, rtol: float
+    ) -> tuple[float | None, tuple | None]:
         """Search between `low` and `high`; returns (value, bracket) as in `Size`, or (None, None) if no value is found.
 
         goal : "minimum" or "maximum"; rtol : relative width of the bracket at which the search ends
@@ -172,8 +194,14 @@ class SizeSearch:
         good = opposite if self(opposite).ok else self.find_interior()
         if good is None:
             return None, None
-        bad = max((entry.value for entry in self.runs if not entry.ok and (entry.value - good) * (best - good) > 0.0),
-                  key=lambda x: -abs(x - good))  # fmt: skip
+        bad = max(
+            (
+                entry.value
+                for entry in self.runs
+                if not entry.ok and (entry.value - good) * (best - good) > 0.0
+            ),
+            key=lambda x: -abs(x - good),
+        )
         while abs(good - bad) > rtol * max(abs(good), abs(bad)) and len(self.runs) < MAX_RUNS:
             x = self.next_value(bad, good)
             good, bad = (x, bad) if self(x).ok else (good, x)
@@ -188,13 +216,17 @@ class SizeSearch:
         """
         for trial in range(MOST_TRIALS):
             runs = sorted(self.runs, key=lambda run: run.value)
-            position = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
+            position = max(
+                range(len(runs)),
+                key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin,
+            )
             adjacent = [k for k in (position - 1, position) if 0 <= k < len(runs) - 1]
             peaks = [peak for k in adjacent if (peak := peak_between(runs, k)) is not None]
             x, height = max(peaks, key=lambda peak: peak[1], default=(math.nan, -math.inf))
             if trial >= INTERIOR_TRIALS and not height > 0.0:
                 return None
-            if trial % 2 == 0 or not height > 0.0:  # peaks of a margin that is not concave may mislead
+            # peaks of a margin that is not concave may mislead
+            if trial % 2 == 0 or not height > 0.0:
                 k = max((runs[k + 1].value - runs[k].value, k) for k in adjacent)[1]
                 x = 0.5 * (runs[k].value + runs[k + 1].value)
             if self(x).ok:
@@ -210,7 +242,9 @@ class SizeSearch:
         margins = [self(x).margin for x in (bad, good)]
         share = 0.5
         if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
-            share = min(max(-margins[0] / (margins[1] - margins[0]), GUESS_MARGIN), 1.0 - GUESS_MARGIN)
+            share = min(
+                max(-margins[0] / (margins[1] - margins[0]), GUESS_MARGIN), 1.0 - GUESS_MARGIN
+            )
         return bad + share * (good - bad)
 
 
@@ -222,7 +256,9 @@ def peak_between(runs: list[SizeRun], k: int) -> tuple[float, float] | None:
     """
     if k < 1 or k + 2 >= len(runs) or any(run.margin is None for run in runs[k - 1 : k + 3]):
         return None
-    (a, b, c, d), (p, q, r, s) = zip(*((run.value, run.margin or 0.0) for run in runs[k - 1 : k + 3]), strict=True)
+    (a, b, c, d), (p, q, r, s) = zip(
+        *((run.value, run.margin or 0.0) for run in runs[k - 1 : k + 3]), strict=True
+    )
     rise, fall = (q - p) / (b - a), (s - r) / (d - c)
     if not rise > fall:
         return None
@@ -233,15 +269,28 @@ def peak_between(runs: list[SizeRun], k: int) -> tuple[float, float] | None:
 def size_run(value: float, result: Any) -> SizeRun:
     """`SizeRun` from the limit verdicts in the result of a run with this value of the key."""
     limits = result.verdicts
-    margin, name = min((relative_margin(row, limit.quantity), limit.name) for limit in limits for row in limit.worst)
+    margin, name = min(
+        (relative_margin(row, limit.quantity), limit.name)
+        for limit in limits
+        for row in limit.worst
+    )
     ok, failed = all(limit.ok for limit in limits), any(limit.state == FAILS for limit in limits)
-    doubts = [mark.text for mark in result.marks] + [text.text for text in result.warnings if text.kind == "end"]
-    doubts += [f"{limit.name}: its margin is smaller than its error" for limit in limits if limit.doubtful]
-    doubts += [f"{limit.name}: its {'value' if limit.margin is None else 'error'} is not known"
-               for limit in limits if limit.state == OPEN and not limit.doubtful]  # fmt: skip
+    doubts = [mark.text for mark in result.marks] + [
+        text.text for text in result.warnings if text.kind == "end"
+    ]
+    doubts += [
+        f"{limit.name}: its margin is smaller than its error" for limit in limits if limit.doubtful
+    ]
+    doubts += [
+        f"{limit.name}: its {'value' if limit.margin is None else 'error'} is not known"
+        for limit in limits
+        if limit.state == OPEN and not limit.doubtful
+    ]
     reason = "" if ok or failed or not result.ok else next(iter(doubts), "")
     is_known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
-    return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)
+    return SizeRun(
+        value, result.ok and ok, margin if is_known else None, name, result.reason, reason
+    )
 
 
 def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
@@ -255,15 +304,24 @@ def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
     unit = unit_of(row["unit"] or "")
     usual = SIZES.get(quantity, 0.0)
     least = usual / abs(float(unit.si(1.0) - unit.si(0.0))) if usual and unit is not None else usual
-    return (row["margin"] - (row["error"] or 0.0)) / (max(abs(row["limit"]), least) or abs(row["value"]) or 1.0)
+    return (row["margin"] - (row["error"] or 0.0)) / (
+        max(abs(row["limit"]), least) or abs(row["value"]) or 1.0
+    )
 
 
 @declared("study")
 def size(
-    case, key: str, low: Any, high: Any, goal: str = "minimum", ties: Mapping[str, str] | None = None,
-    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None,
+    case,
+    key: str,
+    low: Any,
+    high: Any,
+    goal: str = "minimum",
+    ties: Mapping[str, str] | None = None,
+    set: Mapping[str, Any] | None = None,
+    rtol: float = 0.01,
+    progress: Callable | None = None,
     estimate_error: bool = False,
-) -> Size:  # fmt: skip
+) -> Size:
     """Find the least (or greatest) value of a key between `low` and `high` at which all limits of a case hold.
 
     low, high : numbers, or texts with a unit; goal : "minimum" or "maximum"; set : key -> value for all runs
@@ -274,16 +332,25 @@ def size(
     If limits fail at both ends, values near the one with the greatest margin are tried. Raises CaseError for an invalid
     case, a case without limits, and wrong arguments.
     """
-    loaded = checked_case(case, set, lambda known: find_faults(known, key, (low, high), goal, ties or {}, rtol))
+    loaded = checked_case(
+        case, set, lambda known: find_faults(known, key, (low, high), goal, ties or {}, rtol)
+    )
     first, last, unit = parse_range(low, high)
     search = SizeSearch(loaded, key, unit, ties or {}, progress, estimate_error)
     value, bracket = search.search(first, last, goal, rtol)
     tie_texts = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit or si_unit_of(loaded.raw, key), goal, value, bracket, search.runs, tie_texts)
+    return Size(
+        key, unit or si_unit_of(loaded.raw, key), goal, value, bracket, search.runs, tie_texts
+    )
 
 
 def find_faults(
-    case: Case | None, key: str, span: Sequence[Any], goal: str, ties: Mapping[str, str], rtol: float
+    case: Case | None,
+    key: str,
+    span: Sequence[Any],
+    goal: str,
+    ties: Mapping[str, str],
+    rtol: float,
 ) -> list[Fault]:
     """Faults of the arguments of `size`, found before any run.
 
@@ -300,7 +367,9 @@ def find_faults(
     with collect_faults(faults, f"--vary {key}"):
         low, high, unit = parse_range(*span) if span else (0.0, 1.0, "")
         if case is not None and is_known(case.raw, key) and key_quantity(case.raw, key) is None:
-            raise ValueError("has words or whole numbers as values, so it has no range; use `fvsolve sweep`")
+            raise ValueError(
+                "has words or whole numbers as values, so it has no range; use `fvsolve sweep`"
+            )
     for name, text in ties.items():
         with collect_faults(faults, f"--dependent {name}"):
             Arithmetic(text)
@@ -312,11 +381,17 @@ def find_faults(
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []
         with collect_faults(run_faults):
-            load(case, SizeSearch(case, key, unit, ties, None).keys(high if goal == "maximum" else low))
+            load(
+                case,
+                SizeSearch(case, key, unit, ties, None).keys(high if goal == "maximum" else low),
+            )
         options = {key: "--vary", **dict.fromkeys(ties, "--dependent")}
-        faults += [Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)
-                   if run_fault.place in options else run_fault
-                   for run_fault in run_faults]  # fmt: skip
+        faults += [
+            Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)
+            if run_fault.place in options
+            else run_fault
+            for run_fault in run_faults
+        ]
     return faults
 
 
@@ -328,9 +403,18 @@ def parse_ties(texts: Sequence[str]) -> dict[str, str]:
         key, equals, rule = (part.strip() for part in text.partition("="))
         if not (equals and key and rule):
             example = '"nodes.vessel.gas_volume = x / 2"'
-            faults.append(Fault(f"--dependent {text}", f'expected "KEY = formula of x", for example {example}'))
+            faults.append(
+                Fault(
+                    f"--dependent {text}", f'expected "KEY = formula of x", for example {example}'
+                )
+            )
         elif key in ties:
-            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}; give each key once"))
+            faults.append(
+                Fault(
+                    f"--dependent {text}",
+                    f"{key} is given before as {ties[key]}; give each key once",
+                )
+            )
         ties.setdefault(key, rule)
     if faults:
         raise CaseError(faults)

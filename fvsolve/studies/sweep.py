@@ -33,7 +33,8 @@ REFUSED = "refused: "
 
 FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST_COLUMNS = ("expectations", "verdicts", "steps", "seconds")
-ROW_VERSION = {"row": 5}  # version of the content of rows: rows of older versions on disk are not reused
+# version of the content of rows: rows of older versions on disk are not reused
+ROW_VERSION = {"row": 5}
 TEXT_KEYS = ("title", "description", "source")  # keys of a case that do not change rows
 
 
@@ -69,7 +70,12 @@ class Sweep(Displayable):
         """Names of all columns; the columns of probes are in the order of their first appearance."""
         names = dict.fromkeys(name for row in self.rows for name in row)
         fixed = {*self.keys, *FIRST_COLUMNS, *LAST_COLUMNS}
-        return [*self.keys, *FIRST_COLUMNS, *(name for name in names if name not in fixed), *LAST_COLUMNS]
+        return [
+            *self.keys,
+            *FIRST_COLUMNS,
+            *(name for name in names if name not in fixed),
+            *LAST_COLUMNS,
+        ]
 
     @property
     def quantities(self) -> list[str]:
@@ -86,7 +92,12 @@ class Sweep(Displayable):
 
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return {"keys": list(self.keys), "columns": self.columns, "rows": self.rows, "reused": self.reused}
+        return {
+            "keys": list(self.keys),
+            "columns": self.columns,
+            "rows": self.rows,
+            "reused": self.reused,
+        }
 
     def write(self, path: Path) -> None:
         """Write the table as CSV, with values of keys in the format of `--set`. The file is replaced atomically."""
@@ -120,11 +131,16 @@ class Sweep(Displayable):
 
 
 VARY = Kind(
-    lambda given: TABLE.accepts(given) and all(ROW.accepts(row) or SERIES.accepts(row) for row in given.values()),
+    lambda given: (
+        TABLE.accepts(given)
+        and all(ROW.accepts(row) or SERIES.accepts(row) for row in given.values())
+    ),
     'a table of lists, for example {"links.main.cells": [100, 200]}',
 )
 POINTS = Kind(
-    lambda given: PATH.accepts(given) or (ROW.accepts(given) and all(TABLE.accepts(row) for row in given)),
+    lambda given: (
+        PATH.accepts(given) or (ROW.accepts(given) and all(TABLE.accepts(row) for row in given))
+    ),
     'the path of a CSV file, or a list of tables such as {"links.main.cells": 100}',
 )
 
@@ -132,11 +148,17 @@ POINTS = Kind(
 @declared("study")
 @validated(vary=VARY, out=PATH, points=POINTS, sample=TEXT, seed=COUNT_FROM_ZERO, **STUDY_ARGUMENTS)
 def sweep(
-    case, vary: Mapping[str, Sequence[Any]] | None = None, set: Mapping[str, Any] | None = None, jobs: int = 1,
-    out: str | Path | None = None, progress: Callable[[int, int, str], None] | None = None,
-    points: str | Path | Sequence[Mapping[str, Any]] | None = None, sample: str | None = None, seed: int = 0,
+    case,
+    vary: Mapping[str, Sequence[Any]] | None = None,
+    set: Mapping[str, Any] | None = None,
+    jobs: int = 1,
+    out: str | Path | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+    points: str | Path | Sequence[Mapping[str, Any]] | None = None,
+    sample: str | None = None,
+    seed: int = 0,
     dask: str | None = None,
-) -> Sweep:  # fmt: skip
+) -> Sweep:
     """Run a case once for every combination of the values of `vary`, `jobs` runs at a time.
 
     `case` is a path, a dict shaped like the file or a `Case`; `set` are overrides of all runs. With `sample`,
@@ -171,18 +193,30 @@ def planned_values(
     """
     if points is not None:
         if vary or sample:
-            raise FvsolveError("`points` has all values of every run; expected no `vary` and no `sample` in addition")
+            raise FvsolveError(
+                "`points` has all values of every run; expected no `vary` and no `sample` in addition"
+            )
         in_file = PATH.accepts(points)
-        runs = points_from_file(Path(points), source, raw) if in_file else [dict(point) for point in points]
+        runs = (
+            points_from_file(Path(points), source, raw)
+            if in_file
+            else [dict(point) for point in points]
+        )
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
-            raise FvsolveError("`points` is empty or has different keys; expected one or more keys, equal in every run")
+            raise FvsolveError(
+                "`points` is empty or has different keys; expected one or more keys, equal in every run"
+            )
         return runs
     if sample is not None:
         if not vary:
-            raise FvsolveError("no key varies; give at least one key and its range: links.main.length=900,1000")
+            raise FvsolveError(
+                "no key varies; give at least one key and its range: links.main.length=900,1000"
+            )
         return sample_points(load(source, base), vary, sample, seed)
     if not vary or all(len(values) < 2 for values in vary.values()):
-        raise FvsolveError("no key varies; give at least two values of a key, for example links.main.cells=100,200")
+        raise FvsolveError(
+            "no key varies; give at least two values of a key, for example links.main.cells=100,200"
+        )
     empty = [key for key, values in vary.items() if not len(values)]
     if empty:
         raise FvsolveError(f"{', '.join(empty)}: no values; expected at least one value")
@@ -195,8 +229,14 @@ class SweepRun:
     source : case as for `load`; raw : its nested dicts; base : overrides of all runs; runs : values of every run
     """
 
-    def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: ResultCache, progress) -> None:
-        self.runs, self.cache, self.progress = runs, cache, progress or (lambda done, total, text: None)
+    def __init__(
+        self, source, raw: dict, base: dict, runs: list[dict], cache: ResultCache, progress
+    ) -> None:
+        self.runs, self.cache, self.progress = (
+            runs,
+            cache,
+            progress or (lambda done, total, text: None),
+        )
         self.source, self.base, self.folder = source, base, folder_of(source)
         self.rows: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
@@ -218,7 +258,10 @@ class SweepRun:
 
     def fill(self, jobs: int, dask: str | None) -> None:
         """Read the rows of earlier sweeps, then run the remaining ones."""
-        identities = [{"who": self.identity, "set": values, "files": [*self.files(values)]} for values in self.runs]
+        identities = [
+            {"who": self.identity, "set": values, "files": [*self.files(values)]}
+            for values in self.runs
+        ]
         keys = [digest_of(identity) for identity in identities]
         for index, key in enumerate(keys):
             if (earlier := self.cache.lookup(key)) is not None:
@@ -229,7 +272,9 @@ class SweepRun:
         with TaskPool(BatchedRows(RowMaker(self.source, self.base)), jobs, dask) as pool:
             for number, row in pool.run(tasks):
                 index = waiting[number]
-                self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
+                self.rows[index] = self.runs[index] | self.cache.store(
+                    keys[index], ROW_VERSION, row
+                )
                 self.report_progress([index + 1] if index + 1 < len(keys) else [])
 
     def write(self, folder: Path | None) -> Sweep:
@@ -237,8 +282,14 @@ class SweepRun:
 
         Raises FvsolveError if all runs are refused for the same reason.
         """
-        result = Sweep(tuple(self.runs[0]), [self.rows[index] for index in sorted(self.rows)], self.cache.reused)
-        refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in result.rows}
+        result = Sweep(
+            tuple(self.runs[0]),
+            [self.rows[index] for index in sorted(self.rows)],
+            self.cache.reused,
+        )
+        refused = {
+            row["reason"] if row["reason"].startswith(REFUSED) else "" for row in result.rows
+        }
         if len(result.rows) == len(self.runs) and len(refused) == 1 and "" not in refused:
             raise FvsolveError(f"all {len(self.runs)} runs are {refused.pop()}")
         if folder is not None and result.rows:
@@ -252,7 +303,9 @@ class SweepRun:
         spent = time.perf_counter() - self.began
         text = f"{duration_text(spent / own * remaining)} left, " if own and remaining else ""
         for index in coming:
-            text += ", ".join(f"{key} = {as_option_text(value)}" for key, value in self.runs[index].items())
+            text += ", ".join(
+                f"{key} = {as_option_text(value)}" for key, value in self.runs[index].items()
+            )
         self.progress(len(self.rows), len(self.runs), text)
 
     def files(self, values: Any) -> Iterator[str]:
@@ -268,7 +321,9 @@ class SweepRun:
         if name not in self.digests:
             path = self.folder / name
             try:
-                self.digests[name] = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+                self.digests[name] = (
+                    hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+                )
             except (OSError, ValueError):
                 self.digests[name] = ""
         return [self.digests[name]] if self.digests[name] else []

@@ -18,7 +18,13 @@ import numpy as np
 from fvsolve.case import Case
 from fvsolve.core.assembly.model_draft import ModelDraft
 from fvsolve.core.assembly.schedule_tables import break_times
-from fvsolve.core.model.build import CHANGING_FIELDS, model_of, tables_before_start, tables_with_start, with_new_sizes
+from fvsolve.core.model.build import (
+    CHANGING_FIELDS,
+    model_of,
+    tables_before_start,
+    tables_with_start,
+    with_new_sizes,
+)
 from fvsolve.core.model.start_notices import start_notices
 from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.core.solve import initial_state, solve
@@ -33,11 +39,13 @@ from fvsolve.studies.sweep_row import RowMaker, row_of
 SIZE = 32  # number of copies in a batch
 LEAST = 8  # number of variants below which a batch takes more time than single runs
 MOST_FAILED = 2  # number of failed batches in a row after which variants run alone
-KINDS = {"nodes": {"reservoir", "junction"}, "links": {"pipe", "valve", "orifice"}}  # suited kinds of parts
+# suited kinds of parts
+KINDS = {"nodes": {"reservoir", "junction"}, "links": {"pipe", "valve", "orifice"}}
 UNSUITED = ("signals", "scalars", "controls", "reactions", "meshes", "lumped", "routes", "compare")
 KINKED = ("constant", "linear", "smooth", "ramp", "step")  # schedules that `break_times` describes
 UNCHANGED = [field.name for field in fields(Case) if field.name not in CHANGING_FIELDS]
-COPY = re.compile(r"~\d+~")  # ending of the names of the parts of a copy; names in a case file have no ~
+# ending of the names of the parts of a copy; names in a case file have no ~
+COPY = re.compile(r"~\d+~")
 
 
 def ending(k: int) -> str:
@@ -48,16 +56,28 @@ def ending(k: int) -> str:
 def is_suited(model: Any) -> bool:
     """True if variants of the case of a model can be run in batches."""
     case, numerics = model.case, model.case.numerics
-    if numerics.rtol is not None or numerics.method == "auto" or not method_named(numerics.method).explicit:
+    if (
+        numerics.rtol is not None
+        or numerics.method == "auto"
+        or not method_named(numerics.method).explicit
+    ):
         return False
-    others = any(getattr(case, name) for name in UNSUITED) or case.exact or case.validation or case.needs_equilibrium
+    others = (
+        any(getattr(case, name) for name in UNSUITED)
+        or case.exact
+        or case.validation
+        or case.needs_equilibrium
+    )
     if others or numerics.below_vapor == "stop" or not case.law.linear:
         return False
     parts = [(group, name, part) for group in KINDS for name, part in getattr(case, group).items()]
     names = {name for _, name, _ in parts}
     kinds = all(part.kind in KINDS[group] for group, _, part in parts)
     kinds = kinds and all(probe.name in names for probe in case.probes)
-    kinds = kinds and "auto" not in {numerics.pipe_model, *(getattr(part, "pipe_model", "") for _, _, part in parts)}
+    kinds = kinds and "auto" not in {
+        numerics.pipe_model,
+        *(getattr(part, "pipe_model", "") for _, _, part in parts),
+    }
     return kinds and steps_without_states(model)
 
 
@@ -74,7 +94,8 @@ def steps_alike(case: Case, other: Case) -> bool:
     pairs = [(getattr(case, name), getattr(other, name)) for name in UNCHANGED]
     same = all(before is now or before == now for before, now in pairs)
     return same and all(
-        before.keys() == now.keys() and all(only_numbers_differ(part, now[name]) for name, part in before.items())
+        before.keys() == now.keys()
+        and all(only_numbers_differ(part, now[name]) for name, part in before.items())
         for before, now in ((case.nodes, other.nodes), (case.links, other.links))
     )
 
@@ -89,7 +110,10 @@ def only_numbers_differ(before: Any, now: Any) -> bool:
         kinked = before.kind == now.kind and before.kind in KINKED
         return before == now or (kinked and break_times(before) == break_times(now))
     if isinstance(before, Table):
-        return all(only_numbers_differ(getattr(before, name), getattr(now, name)) for name in type(before).model_fields)
+        return all(
+            only_numbers_differ(getattr(before, name), getattr(now, name))
+            for name in type(before).model_fields
+        )
     return isinstance(before, float) or (not isinstance(before, np.ndarray) and bool(before == now))
 
 
@@ -150,13 +174,23 @@ class Batch:
         self.case, self.breaks = model.case, (model.breaks, model.step_max)
         case, self.expect, self.computed, self.functions = model.case, {}, {}, None
         self.pipes, self.watched = [pipe.name for pipe in model.pipes], case.extreme_probes
-        self.nodes = [{name: copied(part, k) for name, part in case.nodes.items()} for k in range(SIZE)]
-        self.links = [{name: copied(part, k) for name, part in case.links.items()} for k in range(SIZE)]
-        probes = [replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
-                  for k in range(SIZE) for probe in case.probes]  # fmt: skip
+        self.nodes = [
+            {name: copied(part, k) for name, part in case.nodes.items()} for k in range(SIZE)
+        ]
+        self.links = [
+            {name: copied(part, k) for name, part in case.links.items()} for k in range(SIZE)
+        ]
+        probes = [
+            replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
+            for k in range(SIZE)
+            for probe in case.probes
+        ]
         self.output = case.output.model_copy(update={"probes": probes, "fields": 0})
-        self.extreme_probes = [replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
-                               for k in range(SIZE) for probe in self.watched]  # fmt: skip
+        self.extreme_probes = [
+            replace(probe, text=probe_text(probe, k), name=probe.name + ending(k))
+            for k in range(SIZE)
+            for probe in self.watched
+        ]
         self.tables = tables_before_start(self.joined([case] * SIZE))
 
     def joined(self, cases: Sequence[Case]) -> Case:
@@ -166,11 +200,15 @@ class Batch:
         """
         nodes, links = {}, {}
         for k, case in enumerate(cases):
-            for found, own, base, parts in ((nodes, case.nodes, self.case.nodes, self.nodes[k]),
-                                            (links, case.links, self.case.links, self.links[k])):  # fmt: skip
+            for found, own, base, parts in (
+                (nodes, case.nodes, self.case.nodes, self.nodes[k]),
+                (links, case.links, self.case.links, self.links[k]),
+            ):
                 for name, part in own.items():
                     found[name + ending(k)] = parts[name] if part is base[name] else copied(part, k)
-        case = replace(self.case, nodes=nodes, links=links, output=self.output, expect=self.expect, limits={})
+        case = replace(
+            self.case, nodes=nodes, links=links, output=self.output, expect=self.expect, limits={}
+        )
         case.__dict__.update(notices=[], extreme_probes=self.extreme_probes)
         return case
 
@@ -188,14 +226,21 @@ class Batch:
         summary = solve(model, initial_state(model), sink)
         end_if_interrupted(summary.reason)
         lists = [notices_of_copies(given) for given in (model.warnings, summary.marks)]
-        if not summary.ok or summary.warnings or None in lists:  # notices of a run name the worst part only
+        # notices of a run name the worst part only
+        if not summary.ok or summary.warnings or None in lists:
             return None
-        lists[0] = [[*lists[0][k], *self.start_notices(case, k, draft)] for k, case in enumerate(cases)]
+        lists[0] = [
+            [*lists[0][k], *self.start_notices(case, k, draft)] for k, case in enumerate(cases)
+        ]
         texts = [probe.text for probe in self.case.probes]
-        self.columns = [column._replace(name=text) for column, text in zip(sink.columns, texts, strict=False)]
+        self.columns = [
+            column._replace(name=text) for column, text in zip(sink.columns, texts, strict=False)
+        ]
         values = np.ascontiguousarray(sink.table().T)
-        return [self.row(case, k, model, summary, sink.time, values, [given[k] for given in lists])
-                for k, case in enumerate(cases)]  # fmt: skip
+        return [
+            self.row(case, k, model, summary, sink.time, values, [given[k] for given in lists])
+            for k, case in enumerate(cases)
+        ]
 
     def model(self, joined: Case) -> tuple[ModelDraft, Any]:
         """Draft and model of `SIZE` variants; the model is None if their steps could differ.
@@ -207,7 +252,11 @@ class Batch:
         model = model_of(draft, notices=lambda draft: [])
         rates = model.wave_rates.reshape(SIZE, -1)
         same = (model.breaks, model.step_max) == self.breaks and (rates == rates[0]).all()
-        if not same or not steps_without_states(model) or (resized is not None and draft is not resized):
+        if (
+            not same
+            or not steps_without_states(model)
+            or (resized is not None and draft is not resized)
+        ):
             return draft, None
         if resized is not None:  # the compiled functions are those of the batch before
             if self.functions is not None and self.functions[0] == model.unsteady:
@@ -220,9 +269,20 @@ class Batch:
         count = len(self.pipes)
         own = slice(k * count, (k + 1) * count)
         columns = draft.column_table[:0]
-        return start_notices(DraftOfCopy(case, self.pipes, draft.pipe_table[own], [], columns, draft.fluid, []))
+        return start_notices(
+            DraftOfCopy(case, self.pipes, draft.pipe_table[own], [], columns, draft.fluid, [])
+        )
 
-    def row(self, case: Case, k: int, joined: Any, summary: Any, time: Any, values: np.ndarray, notices: list) -> dict:
+    def row(
+        self,
+        case: Case,
+        k: int,
+        joined: Any,
+        summary: Any,
+        time: Any,
+        values: np.ndarray,
+        notices: list,
+    ) -> dict:
         """Row of results of copy k.
 
         joined, summary : model of all copies, and the summary of its run; time : column of the time
@@ -232,13 +292,17 @@ class Batch:
         probes = self.case.probes
         extremes = {probe.text: summary.extremes[probe_text(probe, k)] for probe in probes}
         own = replace(summary, extremes=extremes, seconds=summary.seconds / SIZE, marks=notices[1])
-        model = VariantModel(case, probes, self.computed, [*case.notices, *notices[0]], self.watched)
+        model = VariantModel(
+            case, probes, self.computed, [*case.notices, *notices[0]], self.watched
+        )
         if self.watched:
             self.set_extents(model, own, k, joined, summary)
         model.isolated = frozenset(
-            f"{group}.{name}" for group in ("nodes", "links") for name in getattr(case, group)
+            f"{group}.{name}"
+            for group in ("nodes", "links")
+            for name in getattr(case, group)
             if f"{group}.{name}{ending(k)}" in joined.isolated
-        )  # fmt: skip
+        )
         rows = np.concatenate((values[:1], values[1 + k * len(probes) :][: len(probes)])).T
         return row_of(model, own, VariantSink(self.columns, time, rows))
 
@@ -248,11 +312,17 @@ class Batch:
         model, own : model and summary of the copy; joined, summary : those of all copies
         """
         first = k * len(self.pipes)
-        model.pipes = [replace(joined.pipes[first + i], name=name) for i, name in enumerate(self.pipes)]
+        model.pipes = [
+            replace(joined.pipes[first + i], name=name) for i, name in enumerate(self.pipes)
+        ]
         model.elevation = {name: joined.elevation[name + ending(k)] for name in self.case.nodes}
         own.watched = {probe.text: summary.watched[probe_text(probe, k)] for probe in self.watched}
         own.envelope = {name: summary.envelope[name + ending(k)] for name in self.pipes}
-        own.points = {name: summary.points[key] for name in self.pipes if (key := name + ending(k)) in summary.points}
+        own.points = {
+            name: summary.points[key]
+            for name in self.pipes
+            if (key := name + ending(k)) in summary.points
+        }
 
 
 def copied(part: Any, k: int) -> Any:
@@ -274,7 +344,11 @@ def notices_of_copies(notices: Sequence[Any]) -> list[list] | None:
         places, copies = COPY.findall(notice.place), {*COPY.findall(notice.place + notice.text)}
         if len(places) != 1 or len(copies) != 1:
             return None
-        own = replace(notice, place=notice.place.replace(places[0], ""), text=notice.text.replace(places[0], ""))
+        own = replace(
+            notice,
+            place=notice.place.replace(places[0], ""),
+            text=notice.text.replace(places[0], ""),
+        )
         found[int(places[0][1:-1])].append(own)
     return found
 

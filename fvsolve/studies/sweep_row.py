@@ -49,7 +49,11 @@ class RowMaker:
             return self.case
         # keys of a table may conflict: overrides of `base` in the tables that change, and in [exact], are set again
         tables = {("exact",), *(split_key(key)[:2] for key in values)}
-        base = {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
+        base = {
+            key: value
+            for key, value in self.base.items()
+            if {split_key(key)[:1], split_key(key)[:2]} & tables
+        }
         return load(self.case, {**base, **values})
 
     def __getstate__(self) -> dict[str, Any]:
@@ -76,7 +80,8 @@ def row_of(model, summary, sink) -> dict[str, Any]:
     row["marks"] = min(summary.marks, key=lambda mark: mark.time).text if summary.marks else ""
     row["warnings"] = [plain(column.plain()) for column in (*model.warnings, *summary.warnings)]
     row["fluid"] = plain(model.case.properties.plain())
-    blown, last = has_diverged(summary.reason), sink.last  # values of a diverged run are meaningless
+    # values of a diverged run are meaningless
+    blown, last = has_diverged(summary.reason), sink.last
     for k, column in enumerate(sink.columns):
         least, t_min, greatest, t_max = summary.extremes[column.name]
         name, unit = column.name, f"[{column.unit}]"
@@ -86,7 +91,9 @@ def row_of(model, summary, sink) -> dict[str, Any]:
         row |= {key: None if blown else plain(float(x)) for key, x in entries.items()}
     expectations = expectations_of(model, summary, sink)
     row["expectations"] = all(claim["ok"] for claim in expectations) if expectations else None
-    row["verdicts"] = all(column["ok"] for column in verdicts(model, summary)) if model.case.limits else None
+    row["verdicts"] = (
+        all(column["ok"] for column in verdicts(model, summary)) if model.case.limits else None
+    )
     return row | {"steps": summary.steps, "seconds": plain(float(summary.seconds))}
 
 
@@ -96,7 +103,14 @@ def expectations_of(model, summary, sink) -> list[dict[str, Any]]:
     from fvsolve.core.run.verdicts import expectations
 
     columns = {column.name: column for column in sink.columns}
-    probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}
-    summary_data = {"probes": probes, "time_unit": sink.time.unit, "ambient_pressure": model.case.ambient_pressure}
+    probes = {
+        name: {"dimension": column.dimension, "unit": column.unit}
+        for name, column in columns.items()
+    }
+    summary_data = {
+        "probes": probes,
+        "time_unit": sink.time.unit,
+        "ambient_pressure": model.case.ambient_pressure,
+    }
     result = Result(summary_data, sink.table, sink.envelope)
     return expectations(model, summary, result)

@@ -26,7 +26,9 @@ class WorkLimit:
     def check(self, seconds: float) -> None:
         """Raise TooLarge if the next operations, of this estimated time [s], exceed the limit."""
         if self.spent + seconds > TIME_LIMIT:
-            raise TooLarge(f"{self.what} take longer than {TIME_LIMIT:g} s of CPU time: {self.remedy}")
+            raise TooLarge(
+                f"{self.what} take longer than {TIME_LIMIT:g} s of CPU time: {self.remedy}"
+            )
 
     def spend(self, seconds: float) -> None:
         """Add the estimated time of the next operations [s]; raises TooLarge as `check`."""

@@ -80,9 +80,12 @@ def test_both_forms_of_an_acceleration_are_the_same_65_66(t):
 
 def test_both_forms_follow_from_55_in_symbols_65_66():
     """(65) and (66) are (55) of (55) of the position, for any motion, term by term in axes b."""
-    sympy = pytest.importorskip("sympy", reason="symbols are a second proof of what differences show")
+    sympy = pytest.importorskip(
+        "sympy", reason="symbols are a second proof of what differences show"
+    )
     t = sympy.symbols("t")
-    w, v, r = (sympy.Matrix([sympy.Function(f"{name}{k}")(t) for k in "xyz"]) for name in "wvr")  # v of the origin
+    # v of the origin
+    w, v, r = (sympy.Matrix([sympy.Function(f"{name}{k}")(t) for k in "xyz"]) for name in "wvr")
 
     def seen_from_i(u):
         return u.diff(t) + w.cross(u)
@@ -105,7 +108,8 @@ def test_angular_acceleration_is_the_first_derivative_from_either_axes_64(t):
 
 @pytest.mark.parametrize("t", TIMES)
 def test_torque_turns_the_moment_of_momentum_68(t):
-    inertia = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.3], [-0.2, 0.3, 4.0]])  # of a body, in its axes
+    # of a body, in its axes
+    inertia = np.array([[2.0, 0.1, -0.2], [0.1, 3.0, 0.3], [-0.2, 0.3, 4.0]])
 
     def moment(s):
         return rotation(s) @ inertia @ rotation(s).T @ spin(s)

@@ -17,7 +17,13 @@ from fvsolve import build, integrate, load
 
 STEP = 1e-5
 RANDOM = [*np.random.default_rng(15).uniform(-3.0, 3.0, (20, 3))]
-TURNS = [*RANDOM, np.zeros(3), *np.pi * np.eye(3), *(np.pi - 1e-9) * np.eye(3), np.array([1e-9, -2e-9, 1e-10])]
+TURNS = [
+    *RANDOM,
+    np.zeros(3),
+    *np.pi * np.eye(3),
+    *(np.pi - 1e-9) * np.eye(3),
+    np.array([1e-9, -2e-9, 1e-10]),
+]
 
 
 def same(found, expected, far=1e-14):
@@ -172,7 +178,10 @@ def test_a_deviation_turns_by_w_less_the_turned_w_d_56_to_58():
     def second_attitude(t):
         return at.of_zyz(*path(RANDOM[1], -2.0 * t))
 
-    w, w_d = (at.angular_velocity(of(0.0), derivative(of, 0.0)) for of in (first_attitude, second_attitude))
+    w, w_d = (
+        at.angular_velocity(of(0.0), derivative(of, 0.0))
+        for of in (first_attitude, second_attitude)
+    )
     turn = at.deviation(first_attitude(0.0), second_attitude(0.0))
     rate = derivative(lambda t: at.deviation(first_attitude(t), second_attitude(t)), 0.0)
     same(turn @ second_attitude(0.0), first_attitude(0.0))
@@ -246,7 +255,10 @@ def test_gauss_methods_keep_squares_and_rk4_does_not():
     for method in ("rk4", "gauss-4"):
         end = integrate(free, [*START, 0.3, 0.05, 1.2], [0.0, 40.0], method, step=0.1)[-1]
         begun = np.array([0.3, 0.05, 1.2])
-        pairs = [(end[:4] @ end[:4], 1.0), (end[4:] @ (INERTIA * end[4:]), begun @ (INERTIA * begun))]
+        pairs = [
+            (end[:4] @ end[:4], 1.0),
+            (end[4:] @ (INERTIA * end[4:]), begun @ (INERTIA * begun)),
+        ]
         pairs.append((np.linalg.norm(INERTIA * end[4:]), np.linalg.norm(INERTIA * begun)))
         off[method] = max(abs(value / other - 1.0) for value, other in pairs)
     assert off["gauss-4"] < 1e-11 and off["rk4"] > 1e-8
@@ -264,7 +276,9 @@ def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_no
         exact = at.about_x(delta) @ at.about_y(end)
         e = at.euler_parameters(at.about_x(delta))
         by_angles = integrate(angles, [delta, 0.0, 0.0], [0.0, end], "rk4", step=h)[-1]
-        by_parameters = integrate(lambda t, y: at.euler_parameters_rate(y, turn), e, [0.0, end], "rk4", step=h)[-1]
+        by_parameters = integrate(
+            lambda t, y: at.euler_parameters_rate(y, turn), e, [0.0, end], "rk4", step=h
+        )[-1]
         found = at.of_roll_pitch_yaw(*by_angles), at.of_euler_parameters(by_parameters)
         return [np.abs(value - exact).max() for value in found]
 
@@ -276,17 +290,30 @@ def test_angles_lose_their_order_next_to_their_pole_and_euler_parameters_know_no
 
 ANGLES, PARAMETERS = ("roll", "pitch", "yaw"), ("eta", "eps_x", "eps_y", "eps_z")
 KINDS = ("free", "fixed", "ball")
-PITCHES = [0.3, -1.2, pi / 2 - 1e-6, pi / 2 - 1e-9, pi / 2 - 1e-14, pi / 2, -pi / 2, -pi / 2 + 1e-10]
+PITCHES = [
+    0.3,
+    -1.2,
+    pi / 2 - 1e-6,
+    pi / 2 - 1e-9,
+    pi / 2 - 1e-14,
+    pi / 2,
+    -pi / 2,
+    -pi / 2 + 1e-10,
+]
 
 
 def probed_attitudes(*attitudes: dict) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Name, angles and Euler parameters that probes of bodies read at the start, for each attitude and joint kind."""
     bodies = {
         f"b{k}_{kind}": {
-            "type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": kind, "attitude": given}
+            "type": "body",
+            "mass": 1.0,
+            "inertia": [1.0, 1.0, 1.0],
+            "joint": {"kind": kind, "attitude": given},
         }
-        for k, given in enumerate(attitudes) for kind in KINDS
-    }  # fmt: skip
+        for k, given in enumerate(attitudes)
+        for kind in KINDS
+    }
     probes = [f"{name}.{value}" for name in bodies for value in ANGLES + PARAMETERS]
     model = build(load(scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.1}, probes)))
     read = model.observe(0.0, model.start).reshape(len(bodies), 7)

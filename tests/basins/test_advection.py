@@ -31,7 +31,9 @@ def returned(scheme, cells, velocity, start, factor=lambda t: 1.0, **more) -> fl
     """Difference from the start at 1 s, when the exact solution has returned to the start."""
     case = carried(scheme, cells, velocity, **more)
     s = means(case.mesh, start)
-    return difference(case, case.run(s, 1.0, 0.4, "rk4" if scheme in FIFTH else "ssp-rk2", factor), s)
+    return difference(
+        case, case.run(s, 1.0, 0.4, "rk4" if scheme in FIFTH else "ssp-rk2", factor), s
+    )
 
 
 def mound(x, y):
@@ -48,8 +50,22 @@ def forth_and_back(t):
 
 
 # Observed orders on 64 and 128 cells per side; upwind and limiters that flatten maxima are pre-asymptotic there.
-TURNED = {"upwind": 0.54, "minmod": 1.75, "van-leer": 1.86, "monotonized-central": 1.76, "upwind5": 4.82, "weno5": 4.44}
-SWIRLED = {"upwind": 0.80, "minmod": 1.77, "van-leer": 2.51, "monotonized-central": 2.76, "upwind5": 4.89, "weno5": 5.1}
+TURNED = {
+    "upwind": 0.54,
+    "minmod": 1.75,
+    "van-leer": 1.86,
+    "monotonized-central": 1.76,
+    "upwind5": 4.82,
+    "weno5": 4.44,
+}
+SWIRLED = {
+    "upwind": 0.80,
+    "minmod": 1.77,
+    "van-leer": 2.51,
+    "monotonized-central": 2.76,
+    "upwind5": 4.89,
+    "weno5": 5.1,
+}
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -66,16 +82,26 @@ def test_a_bump_swirled_forth_and_back_returns_to_the_order_of_the_scheme(scheme
 
 @pytest.mark.parametrize("scheme", ["van-leer", "monotonized-central", "upwind5", "weno5"])
 def test_on_a_graded_grid_the_order_is_two_at_least(scheme):
-    errors = [returned(scheme, n, SWIRL, bump, forth_and_back, grading=(3.0, 0.5)) for n in (64, 128)]
+    errors = [
+        returned(scheme, n, SWIRL, bump, forth_and_back, grading=(3.0, 0.5)) for n in (64, 128)
+    ]
     assert order(errors) > 2.0
 
 
 def slotted(x, y):
     """Zalesak's disk (1979), of radius 0.15 at (0.5, 0.75) with a slot 0.05 wide."""
-    return np.where((np.hypot(x - 0.5, y - 0.75) < 0.15) & ((np.abs(x - 0.5) > 0.025) | (y > 0.85)), 1.0, 0.0)
+    return np.where(
+        (np.hypot(x - 0.5, y - 0.75) < 0.15) & ((np.abs(x - 0.5) > 0.025) | (y > 0.85)), 1.0, 0.0
+    )
 
 
-DISK = {"upwind": 1.116, "minmod": 0.667, "van-leer": 0.480, "monotonized-central": 0.405, "upwind5": 0.211}
+DISK = {
+    "upwind": 1.116,
+    "minmod": 0.667,
+    "van-leer": 0.480,
+    "monotonized-central": 0.405,
+    "upwind5": 0.211,
+}
 DISK |= {"weno5": 0.222}  # difference after a turn over the area of the disk, 100 cells per side
 
 
@@ -104,7 +130,9 @@ def random_case(scheme, seed, through=False, deep=False, **more) -> tuple[Carrie
         stream[(x == 0.0) | (x == 1.0) | (y == 0.0) | (y == 0.7)] = 0.0
     flows = grid_flows(mesh, face_flows(mesh, {"stream": stream}))
     depth = random.uniform(0.5, 2.0, len(mesh.cells)) if deep else NONE
-    values = random.choice([0.0, 1.0], len(mesh.cells)) + 0.1 * random.random(len(mesh.cells)) * (seed % 2)
+    values = random.choice([0.0, 1.0], len(mesh.cells)) + 0.1 * random.random(len(mesh.cells)) * (
+        seed % 2
+    )
     case = Carried(scheme, mesh, *flows, outside=random.random(2 * (11 + 9)), depth=depth, **more)
     return case, values * (depth if deep else 1.0)
 
@@ -145,8 +173,22 @@ def ogata_banks(x, t, u, spread):
     return 0.5 * (erfc((x - u * t) / wide) + np.exp(u * x / spread) * erfc((x + u * t) / wide))
 
 
-INLET = {"upwind": 0.89, "minmod": 1.55, "van-leer": 1.63, "monotonized-central": 1.75, "upwind5": 1.89, "weno5": 1.88}
-CLOUD = {"upwind": 0.78, "minmod": 1.99, "van-leer": 2.08, "monotonized-central": 2.05, "upwind5": 1.84, "weno5": 1.91}
+INLET = {
+    "upwind": 0.89,
+    "minmod": 1.55,
+    "van-leer": 1.63,
+    "monotonized-central": 1.75,
+    "upwind5": 1.89,
+    "weno5": 1.88,
+}
+CLOUD = {
+    "upwind": 0.78,
+    "minmod": 1.99,
+    "van-leer": 2.08,
+    "monotonized-central": 2.05,
+    "upwind5": 1.84,
+    "weno5": 1.91,
+}
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -157,8 +199,12 @@ def test_an_inlet_with_diffusion_is_that_of_ogata_and_banks(scheme):
         case = carried(scheme, (n, 2), along, (3.0, 0.1), outside=1.0, diffusivity=0.1)
         end = case.run(np.zeros(2 * n), 0.8, 0.4)
         assert end[:n] == approx(end[n:], abs=1e-12)
-        errors.append(difference(case, end, means(case.mesh, lambda x, y: ogata_banks(x, 0.8, 1.0, 0.1))))
-    assert order(errors) == approx(INLET[scheme], abs=0.1) and errors[1] < (0.01 if scheme == "upwind" else 7e-4)
+        errors.append(
+            difference(case, end, means(case.mesh, lambda x, y: ogata_banks(x, 0.8, 1.0, 0.1)))
+        )
+    assert order(errors) == approx(INLET[scheme], abs=0.1) and errors[1] < (
+        0.01 if scheme == "upwind" else 7e-4
+    )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -167,7 +213,11 @@ def test_a_cloud_that_moves_and_spreads_stays_gaussian(scheme):
 
     def cloud(x, y, t):
         wide = 0.05**2 + 2.0 * d * t
-        return 0.05**2 / wide * np.exp(-((x - 0.3 - u * t) ** 2 + (y - 0.3 - v * t) ** 2) / (2.0 * wide))
+        return (
+            0.05**2
+            / wide
+            * np.exp(-((x - 0.3 - u * t) ** 2 + (y - 0.3 - v * t) ** 2) / (2.0 * wide))
+        )
 
     errors = []
     for n in (64, 128):
@@ -175,14 +225,18 @@ def test_a_cloud_that_moves_and_spreads_stays_gaussian(scheme):
         case = carried(scheme, n, across, diffusivity=d, grading=(2.0, 1.0))
         end = case.run(means(case.mesh, lambda x, y: cloud(x, y, 0.0)), 0.5, 0.4)
         errors.append(difference(case, end, means(case.mesh, lambda x, y: cloud(x, y, 0.5))))
-    assert order(errors) == approx(CLOUD[scheme], abs=0.1) and errors[1] < (4e-3 if scheme == "upwind" else 4e-4)
+    assert order(errors) == approx(CLOUD[scheme], abs=0.1) and errors[1] < (
+        4e-3 if scheme == "upwind" else 4e-4
+    )
 
 
 @pytest.mark.parametrize("deep", [False, True])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_uniform_value_stays_uniform_to_the_bit_in_any_flow_without_divergence(scheme, deep):
     for seed in range(5):
-        case, s = random_case(scheme, seed, through=True, deep=deep, bounds=(0.0, 1.0), diffusivity=0.01)
+        case, s = random_case(
+            scheme, seed, through=True, deep=deep, bounds=(0.0, 1.0), diffusivity=0.01
+        )
         case.outside[:] = 0.5
         assert np.all(case.rates(np.full(s.size, 0.5) * (case.depth if deep else 1.0), 0.7) == 0.0)
         if not deep:
@@ -213,12 +267,21 @@ def test_an_advected_and_diffused_amount_is_conserved(scheme, deep):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_inflow_through_the_boundary_is_the_gain_of_the_content(scheme, deep):
     for seed in range(5):
-        case, s = random_case(scheme, seed, through=True, deep=deep, bounds=(0.0, 1.1), diffusivity=0.01)
-        share, ring, excesses = case.rates(s, -0.7) * case.mesh.area, np.empty_like(case.outside), (NONE, NONE)
+        case, s = random_case(
+            scheme, seed, through=True, deep=deep, bounds=(0.0, 1.1), diffusivity=0.01
+        )
+        share, ring, excesses = (
+            case.rates(s, -0.7) * case.mesh.area,
+            np.empty_like(case.outside),
+            (NONE, NONE),
+        )
         if scheme in FIFTH:
             first, last = s.size + np.cumsum([0, case.flow_x.size])
             excesses = case.work[first:last], case.work[last : last + case.flow_y.size]
-        size, flows = (case.nx, case.ny, case.kx, case.ky), (-0.7, case.flow_x, case.flow_y, case.depth, case.outside)
+        size, flows = (
+            (case.nx, case.ny, case.kx, case.ky),
+            (-0.7, case.flow_x, case.flow_y, case.depth, case.outside),
+        )
         ring_rates(*size, 0.01, *flows, *excesses, s, ring)
         assert share.sum() == approx(ring.sum(), abs=1e-13 * np.abs(share).sum())
 
@@ -248,7 +311,9 @@ def test_mirrored_and_turned_grids_have_mirrored_and_turned_rates_to_the_bit(sch
         west, east, south, north = np.split(case.outside, np.cumsum([ny, ny, nx]))
 
         ring = np.concatenate([east, west, south[::-1], north[::-1]])
-        mirrored = twin(case, (case.kx[::-1], case.ky), (-x[:, ::-1], y[:, ::-1]), ring)(s, lambda f: f[:, ::-1])
+        mirrored = twin(case, (case.kx[::-1], case.ky), (-x[:, ::-1], y[:, ::-1]), ring)(
+            s, lambda f: f[:, ::-1]
+        )
         assert np.array_equal(mirrored.reshape(ny, nx), rate[:, ::-1])
         ring = np.concatenate([south, north, west, east])
         turned = twin(case, (case.ky, case.kx), (y.T, x.T), ring)(s, lambda f: f.T)
@@ -276,7 +341,9 @@ def test_a_step_of_euler_as_long_as_diffusion_allows_stays_within_bounds():
     for seed in range(20):
         case, s = random_case("upwind", seed, through=True, deep=True)
         rate = np.zeros_like(s)
-        most = advection.grid_diffusion(case.grid, 0.01, case.flows(), case.depth, s, case.other, rate)
+        most = advection.grid_diffusion(
+            case.grid, 0.01, case.flows(), case.depth, s, case.other, rate
+        )
         low, high = surroundings(case, s / case.depth)
         after = (s + rate / most) / case.depth
         assert np.all(after > low - 1e-14) and np.all(after < high + 1e-14)

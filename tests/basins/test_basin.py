@@ -5,8 +5,28 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from reference.basins import PLANE, alone, assert_equal_files, basin, ended, model_of, run_in_two_parts
-from reference.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.basins import (
+    PLANE,
+    alone,
+    assert_equal_files,
+    basin,
+    ended,
+    model_of,
+    run_in_two_parts,
+)
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    WATER,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 from scipy.optimize import brentq
 
 import fvsolve
@@ -27,9 +47,12 @@ def dam(x, t, high, low):
     """Depth of Stoker's dam break (1957), or of Ritter's (1892) for low = 0, at the distance x from the dam."""
     c = math.sqrt(GRAVITY * high)
     if low == 0.0:
-        return np.where(x < -c * t, high, np.where(x < 2 * c * t, (2 * c - x / t) ** 2 / (9 * GRAVITY), 0.0))
+        return np.where(
+            x < -c * t, high, np.where(x < 2 * c * t, (2 * c - x / t) ** 2 / (9 * GRAVITY), 0.0)
+        )
     a, b = low, high
-    for _ in range(200):  # bisection on the middle depth: rarefaction on the left, shock on the right
+    # bisection on the middle depth: rarefaction on the left, shock on the right
+    for _ in range(200):
         h = 0.5 * (a + b)
         u = 2 * (c - math.sqrt(GRAVITY * h))
         if u > (h - low) * math.sqrt(0.5 * GRAVITY * (h + low) / (h * low)):
@@ -47,7 +70,11 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
     """The L1 error of the depth falls at first order, the limit at a front, and mass is constant."""
     errors = []
     for nx in (100, 200, 400):
-        h, _ = depths(alone(basin((20.0, 1.0), (nx, 3), 1.0, start={"level": f"where(x < 10, 1, {low})"}), 1.2))
+        h, _ = depths(
+            alone(
+                basin((20.0, 1.0), (nx, 3), 1.0, start={"level": f"where(x < 10, 1, {low})"}), 1.2
+            )
+        )
         x = (np.arange(nx) + 0.5) * 20.0 / nx - 10.0
         errors.append(np.abs(h[1] - dam(x, 1.2, 1.0, low)).mean() * 20.0)
         assert h.min() >= 0.0 and np.array_equal(h[0], h[2])
@@ -58,7 +85,10 @@ def test_a_dam_breaks_as_in_the_exact_solution(low):
 def test_a_lake_at_rest_does_not_change_any_bit_on_a_bank_and_behind_a_shut_valve():
     case = alone(basin((20.0, 10.0), (40, 20), 1.0, bed="0.13*x + 0.07*y"), 20.0)
     model = model_of(case)
-    assert (model.fields(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0).sum() > 100  # dry bank
+    # dry bank
+    assert (
+        model.fields(np.zeros(model.y_size), model.new_out())["pool"]["depth"] == 0.0
+    ).sum() > 100
     state = fvsolve.advance(model, fvsolve.initial_state(model), 20.0)
     assert not state.y.any()
 
@@ -77,7 +107,10 @@ def test_small_waves_slosh_at_the_periods_of_long_waves(mode):
         shape = 1e-5 * np.cos(mode * math.pi * x / size)
         state.y[: 2 * nx] = np.tile(shape, 2)
         period = 2.0 * size / (mode * math.sqrt(GRAVITY))
-        after = [fvsolve.advance(model, state, n * period).y[:nx] @ shape / (shape @ shape) for n in (2.0, 1.25)]
+        after = [
+            fvsolve.advance(model, state, n * period).y[:nx] @ shape / (shape @ shape)
+            for n in (2.0, 1.25)
+        ]
         lost.append(abs(after[0] - 1.0))
         late.append(abs(after[1]))
     assert lost[1] < 3e-4 and lost[0] / lost[1] > 2.0**2.8
@@ -94,7 +127,11 @@ def test_a_dam_over_a_step_of_the_bed_has_the_error_that_the_page_states():
     def level_excess(h):
         u = 2.0 * (math.sqrt(GRAVITY * left) - math.sqrt(GRAVITY * h))
         flow, head = h * u, h + u * u / (2.0 * GRAVITY) - rise
-        over = brentq(lambda d: d + flow**2 / (2.0 * GRAVITY * d * d) - head, (flow**2 / GRAVITY) ** (1 / 3), left)
+        over = brentq(
+            lambda d: d + flow**2 / (2.0 * GRAVITY * d * d) - head,
+            (flow**2 / GRAVITY) ** (1 / 3),
+            left,
+        )
         return h, u, over, flow / over
 
     def amiss(h):
@@ -103,8 +140,13 @@ def test_a_dam_over_a_step_of_the_bed_has_the_error_that_the_page_states():
 
     exact, off = np.array(level_excess(brentq(amiss, 0.75, 0.999))), []
     for cells in (200, 400):
-        bed, start = f"where(x < 20, 0, {rise})", {"level": f"where(x < 20, {left}, {right + rise})"}
-        depth, velocity = depths(alone(basin((40.0, 0.4), (cells, 2), 1.0, bed=bed, start=start), 3.0))
+        bed, start = (
+            f"where(x < 20, 0, {rise})",
+            {"level": f"where(x < 20, {left}, {right + rise})"},
+        )
+        depth, velocity = depths(
+            alone(basin((40.0, 0.4), (cells, 2), 1.0, bed=bed, start=start), 3.0)
+        )
         x = (np.arange(cells) + 0.5) * 40.0 / cells
         west, east = (x > 18.8) & (x < 19.4), (x > 20.6) & (x < 21.5)
         found = [f[0, side].mean() for side in (west, east) for f in (depth, velocity[..., 0])]
@@ -125,8 +167,12 @@ def test_a_mirrored_and_a_turned_basin_have_the_same_bits():
     rates = model.rhs(0.0, y).reshape(3, 12, 24)
     up = np.concatenate([h[::-1].ravel(), u[::-1].ravel(), -v[::-1].ravel()])
     mirrored = model.rhs(0.0, up).reshape(3, 12, 24)
-    assert np.array_equal(mirrored[:2, ::-1], rates[:2]) and np.array_equal(mirrored[2, ::-1], -rates[2])
-    turned = standing.rhs(0.0, np.concatenate([h.T.ravel(), v.T.ravel(), u.T.ravel()])).reshape(3, 24, 12)
+    assert np.array_equal(mirrored[:2, ::-1], rates[:2]) and np.array_equal(
+        mirrored[2, ::-1], -rates[2]
+    )
+    turned = standing.rhs(0.0, np.concatenate([h.T.ravel(), v.T.ravel(), u.T.ravel()])).reshape(
+        3, 24, 12
+    )
     scale = np.abs(rates).max()
     assert np.abs(turned[0].T - rates[0]).max() < 1e-13 * scale  # sums in another order
     assert np.abs(turned[1].T - rates[2]).max() < 1e-13 * scale
@@ -138,12 +184,15 @@ def drained(place: str, nodes: dict, end: float) -> dict:
 
 
 def test_a_deep_and_quiet_basin_drains_as_its_tank_and_as_torricelli():
-    pool = basin((10.0, 4.0), (20, 8), 2.0, patches={"outlet": {"side": "east", "span": [1.0, 3.0]}})
+    pool = basin(
+        (10.0, 4.0), (20, 8), 2.0, patches={"outlet": {"side": "east", "span": [1.0, 3.0]}}
+    )
     case = drained("pool.outlet", {"pool": pool}, 200.0)
     case["numerics"] |= PLANE
     found = fvsolve.run(case)
     twin = fvsolve.run(drained("pool", {"pool": tank(40.0, 2.0)}, 200.0))
-    assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], abs=5e-5)  # of 0.075: waves of the start
+    # of 0.075: waves of the start
+    assert found.ok and found["tap.flow"] == approx(twin["tap.flow"], abs=5e-5)
     assert abs(found.ledger["mass"]["relative"]) < 1e-13
     # the ramp counts for half of its 20 s
     level = (math.sqrt(2.0) - 0.012 * math.sqrt(2 * GRAVITY) / 80.0 * 190.0) ** 2
@@ -166,16 +215,37 @@ def test_a_patch_that_falls_dry_stops_the_outflow_and_no_depth_falls_below_zero(
 
 
 def test_a_pipe_that_discharges_into_two_joined_basins_conserves_mass(tmp_path):
-    west = basin((6.0, 3.0), (12, 6), 1.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}}, elevation=0.0)
+    west = basin(
+        (6.0, 3.0),
+        (12, 6),
+        1.0,
+        patches={"in": {"side": "west"}, "gate": {"side": "east"}},
+        elevation=0.0,
+    )
     east = basin((3.0, 3.0), (6, 6), 1.0, patches={"gate": {"side": "west"}}, elevation=0.0)
-    nodes = {"west": west, "east": east, "lake": lake(3.0, elevation=0.0), "end": junction(elevation=0.0)}
+    nodes = {
+        "west": west,
+        "east": east,
+        "lake": lake(3.0, elevation=0.0),
+        "end": junction(elevation=0.0),
+    }
     links = {
-        "main": pipe("lake", "end", 200.0, 0.3, 1000.0, 20, friction={"model": "steady", "factor": 0.02}),
+        "main": pipe(
+            "lake", "end", 200.0, 0.3, 1000.0, 20, friction={"model": "steady", "factor": 0.02}
+        ),
         "tap": valve("end", "west.in", 0.02, ramp(1.0, 2.0, 0.0, 1.0)),
         "hole": valve("west.gate", "east.gate", 0.05),
     }
     numerics = PLANE | {"scheme": "muscl"}
-    case = scene(nodes, links, 20.0, numerics, ["west.gate.head", "east.gate.head", "hole.flow"], 0.5, fluid=WATER)
+    case = scene(
+        nodes,
+        links,
+        20.0,
+        numerics,
+        ["west.gate.head", "east.gate.head", "hole.flow"],
+        0.5,
+        fluid=WATER,
+    )
     case["output"]["fields"] = 3
     result = fvsolve.run(case, out=tmp_path / "run", pictures=False)
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13
@@ -203,14 +273,26 @@ def patches(east: dict, **more) -> dict:
 
 
 FAULTS = {
-    "cut": (patches({"span": [0.3, 1.4]}), "not consist of whole faces .*; nearest is 0.5 to 1.5 m"),
+    "cut": (
+        patches({"span": [0.3, 1.4]}),
+        "not consist of whole faces .*; nearest is 0.5 to 1.5 m",
+    ),
     "span": (patches({"span": [1.0, 9.0]}), "not consist of whole faces of the east side"),
-    "side": (patches({"side": "wst"}), r'patches.east.side: no side named "wst"; did you mean "west"'),
+    "side": (
+        patches({"side": "wst"}),
+        r'patches.east.side: no side named "wst"; did you mean "west"',
+    ),
     "shared": (patches({}, b={"side": "east", "span": [0.0, 1.0]}), 'overlaps "east"'),
     "cells": ({"cells": [4.5, 3]}, "not a pair of numbers of cells"),
-    "physics": ({"pressure": "1 bar"}, 'is not a key of physics "free-surface"; it belongs to liquid'),
+    "physics": (
+        {"pressure": "1 bar"},
+        'is not a key of physics "free-surface"; it belongs to liquid',
+    ),
     "needs": ({"physics": "liquid"}, "thickness is missing"),
-    "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: does not apply to physics "free-surface"'),
+    "start": (
+        {"start": {"pressure": "1 bar"}},
+        'start.pressure: does not apply to physics "free-surface"',
+    ),
     "formula": ({"bed": "0.1*z"}, "z is unknown"),
     "number": ({"bed": "sqrt(x - 1)"}, "is not a number at x = 0.25 m"),
     "holes": ({"holes": [[0.1, 0.0, 1.0, 1.0]]}, "holes.0.: x0 = 0.1 m is on no grid line"),
@@ -236,10 +318,14 @@ def test_features_that_basins_do_not_support_are_refused():
 
 
 def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_with_its_frames(tmp_path):
-    case = alone(basin((40.0, 20.0), (160, 80), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 60.0)
+    case = alone(
+        basin((40.0, 20.0), (160, 80), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 60.0
+    )
     case["output"] |= {"fields": 12, "every": 1.0}
     run_in_two_parts(case, tmp_path, 5.0)
-    assert_equal_files(tmp_path, ["history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"])
+    assert_equal_files(
+        tmp_path, ["history.csv", *(f"fields/pool-{k:06d}.vtu" for k in range(13)), "fields.pvd"]
+    )
 
 
 def test_faults_of_a_mesh_file_name_the_file_and_no_key(tmp_path):
@@ -249,16 +335,27 @@ def test_faults_of_a_mesh_file_name_the_file_and_no_key(tmp_path):
 
     def mesh_message(cells, **keys) -> list:
         meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("quad", np.array([cells]))]))
-        basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0, **keys}
+        basin = {
+            "type": "basin",
+            "mesh": {"file": str(tmp_path / "square.vtu")},
+            "level": 1.0,
+            **keys,
+        }
         with pytest.raises(CaseError) as caught:
             fvsolve.load(scene({"pool": basin}, {}, 1.0, {}))
         return [(fault.place, fault.message) for fault in caught.value.faults]
 
     ((place, message),) = mesh_message([0, 1, 3, 2])
-    assert place == "nodes.pool.mesh" and message.startswith("square.vtu: cells: ") and "cross themselves" in message
+    assert (
+        place == "nodes.pool.mesh"
+        and message.startswith("square.vtu: cells: ")
+        and "cross themselves" in message
+    )
     ((place, message),) = mesh_message([0, 1, 2, 3], patches={"west": {}})
     assert place == "nodes.pool.patches.west"
-    assert "square.vtu has no named groups of lines; in Gmsh name the lines of this patch" in message
+    assert (
+        "square.vtu has no named groups of lines; in Gmsh name the lines of this patch" in message
+    )
     assert message.endswith('Physical Curve("west") = {1, 2};')
 
 
@@ -297,7 +394,8 @@ def test_the_initial_volume_is_the_integral_of_depths_above_the_bed():
     """Exact for a film and for a column on a slope; order 2 for a bowl, a cap of volume pi h^2 / (2 k)."""
     depth, area = at_start(f"{PARABOLOID} + 0.01")
     assert depth == approx(np.full(depth.size, 0.01), rel=1e-12)
-    depth, area = at_start("where(x < 1.0625, 1, 0.2*x)", "0.2*x", rest=-1.0)  # the edge is the middle of a cell
+    # the edge is the middle of a cell
+    depth, area = at_start("where(x < 1.0625, 1, 0.2*x)", "0.2*x", rest=-1.0)
     x = 0.0625 + 0.125 * np.arange(24)
     means = np.where(x < 1.0, 1.0 - 0.2 * x, 0.0)
     assert depth.reshape(24, 24)[:, np.abs(x - 1.0625) > 0.1] == approx(

@@ -34,7 +34,14 @@ SIZE, CELLS = (10.0, 4.0), (20, 8)
 
 def pool(**more) -> dict:
     outlet = {"outlet": {"side": "east", "span": [1.0, 3.0]}}
-    return {"type": "basin", "size": list(SIZE), "cells": list(CELLS), "level": 2.0, "patches": outlet, **more}
+    return {
+        "type": "basin",
+        "size": list(SIZE),
+        "cells": list(CELLS),
+        "level": 2.0,
+        "patches": outlet,
+        **more,
+    }
 
 
 def draining(probes, end=2.0, output=None, **more) -> dict:
@@ -86,7 +93,11 @@ def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_t
 
 def test_the_nearest_point_inside_is_nearest_and_inside():
     points = MeshPoints(rectangle((4.0, 4.0), (16, 16), holes=[(1.0, 1.0, 2.0, 2.5)]))
-    for outside, inside in (((-1.0, 2.0), (0.0, 2.0)), ((1.2, 1.6), (1.0, 1.6)), ((9.0, 9.0), (4.0, 4.0))):
+    for outside, inside in (
+        ((-1.0, 2.0), (0.0, 2.0)),
+        ((1.2, 1.6), (1.0, 1.6)),
+        ((9.0, 9.0), (4.0, 4.0)),
+    ):
         assert points.cell(*outside) == -1
         near = points.nearest(*outside)
         assert points.cell(*near) >= 0 and near == approx(inside, abs=1e-3)
@@ -119,11 +130,16 @@ def test_probes_between_centres_are_bilinear_in_values_of_frames():
     assert (frame["depth"] == 0.0).sum() > 20
     u, v, _ = frame["velocity"].T
     for x, y in places:
-        want = {name: float(bilinear(values)((y, x)))
-                for name, values in {**frame, "u": u, "v": v}.items() if name != "velocity"}  # fmt: skip
+        want = {
+            name: float(bilinear(values)((y, x)))
+            for name, values in {**frame, "u": u, "v": v}.items()
+            if name != "velocity"
+        }
         want["speed"] = np.hypot(want["u"], want["v"])
         for field in FIELDS:
-            assert found[f"pool.{field}@{x},{y}"] == approx(want[field], rel=1e-12, abs=1e-13), field
+            assert found[f"pool.{field}@{x},{y}"] == approx(want[field], rel=1e-12, abs=1e-13), (
+                field
+            )
 
 
 def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
@@ -131,8 +147,11 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     path = write(tmp_path / "block.msh", *shaken())
     mesh = read(path)
     cells = (3, 17, len(mesh.cells) - 1)
-    probes = [f"block.{field}@{float(mesh.centre[k, 0])!r},{float(mesh.centre[k, 1])!r}"
-              for k in cells for field in ("pressure", "u", "v", "speed")]  # fmt: skip
+    probes = [
+        f"block.{field}@{float(mesh.centre[k, 0])!r},{float(mesh.centre[k, 1])!r}"
+        for k in cells
+        for field in ("pressure", "u", "v", "speed")
+    ]
     model = model_of(liquid(probes, mesh={"file": str(path)}))
     y = random_state(model, 1e-3)
     found = np.zeros(len(probes))
@@ -162,7 +181,9 @@ def test_the_flow_of_a_patch_is_the_gain_of_the_basin():
 
 def test_the_flow_of_a_patch_has_the_density_of_its_place():
     """If density follows pressure, the flow is the mass flow over the density at the pressure of the patch."""
-    case = liquid(["block.hole.flow", "block.hole.pressure"], size=[1.0, 1.0], cells=[4, 4], pressure=2e7)
+    case = liquid(
+        ["block.hole.flow", "block.hole.pressure"], size=[1.0, 1.0], cells=[4, 4], pressure=2e7
+    )
     case["nodes"]["block"]["patches"] = {"hole": {"side": "west"}}
     case["nodes"]["out"] = reservoir(AMBIENT)
     case["links"]["leak"] = valve("block.hole", "out", 1e-4)
@@ -187,8 +208,12 @@ def test_a_run_records_points_and_patches_and_claims_about_them():
     }
     run = fvsolve.run(case)
     assert [claim.ok for claim in run.expectations] == [True, True]
-    assert run.units["pool.depth@5,2"] == "cm" and run["pool.depth@5,2"][0] == approx(200.0, rel=1e-12)
-    whole = 0.5 * float(np.sum((run["pool.outlet.flow"][1:] + run["pool.outlet.flow"][:-1]) * np.diff(run.t)))
+    assert run.units["pool.depth@5,2"] == "cm" and run["pool.depth@5,2"][0] == approx(
+        200.0, rel=1e-12
+    )
+    whole = 0.5 * float(
+        np.sum((run["pool.outlet.flow"][1:] + run["pool.outlet.flow"][:-1]) * np.diff(run.t))
+    )
     mass = run.ledger["mass"]
     assert whole == approx((mass["final"] - mass["initial"]) / RHO, rel=1e-3)
     assert 0.0 < run.extremes["pool.u@9.9,2"].maximum < 0.06
@@ -217,7 +242,9 @@ def test_the_point_that_a_fault_names_is_taken():
     with pytest.raises(CaseError) as error:
         fvsolve.load(draining(["pool.depth@11,-3"]))
     near = str(error.value).rpartition(" ")[2]
-    assert fvsolve.load(draining([f"pool.depth@{near}"])).probes[0].point == approx((10.0, 0.0), abs=1e-3)
+    assert fvsolve.load(draining([f"pool.depth@{near}"])).probes[0].point == approx(
+        (10.0, 0.0), abs=1e-3
+    )
 
 
 # lines ------------------------------------------------------------------------------------------------------
@@ -252,18 +279,24 @@ def test_lines_have_the_values_of_frames_at_their_points(tmp_path):
 def test_lines_of_a_resumed_run_equal_those_of_the_uninterrupted_run(tmp_path):
     case = draining([], 30.0, {"fields": 12, "lines": {"cut": LINE}}, cells=[80, 40])
     late = "lines/cut-000012.csv"
-    run_in_two_parts(case, tmp_path, 3.0, lambda run: (run / late).write_text("after the checkpoint"))
+    run_in_two_parts(
+        case, tmp_path, 3.0, lambda run: (run / late).write_text("after the checkpoint")
+    )
     assert_equal_files(tmp_path, [f"lines/cut-{k:06d}.csv" for k in range(13)])
     case["output"]["lines"] = {}
-    assert fvsolve.run(case | {"numerics": case["numerics"] | {"end": 1.0}}, out=tmp_path / "run", force=True).ok
+    assert fvsolve.run(
+        case | {"numerics": case["numerics"] | {"end": 1.0}}, out=tmp_path / "run", force=True
+    ).ok
     assert not list((tmp_path / "run").glob("lines/*"))
 
 
 def test_a_line_that_lies_in_no_basin_is_refused():
     lines = {
-        "a": LINE | {"basin": "pol"}, "b": LINE | {"to": [12, 2]}, "c": LINE | {"to": LINE["from"]},
+        "a": LINE | {"basin": "pol"},
+        "b": LINE | {"to": [12, 2]},
+        "c": LINE | {"to": LINE["from"]},
         "d d": LINE,
-    }  # fmt: skip
+    }
     with pytest.raises(CaseError) as error:
         fvsolve.load(draining([], output={"fields": 0, "lines": lines}))
     for says in (
@@ -279,13 +312,20 @@ def test_a_line_that_lies_in_no_basin_is_refused():
 def test_a_line_across_a_hole_has_nothing_there(tmp_path):
     from fvsolve.core.output.csv_files import LineSampler
 
-    case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
-        "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}
-    })  # fmt: skip
+    case = fvsolve.load(
+        liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]])
+        | {
+            "output": {
+                "every": 1e-4,
+                "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}},
+            }
+        }
+    )
     model = fvsolve.build(case)
     line = LineSampler(case.output.lines["cut"], model.meshed[0], case)
     rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
-    found = [float(row.split(",")[3]) for row in rows[1:]]  # points at 1 m and 2 m are on the outline
+    # points at 1 m and 2 m are on the outline
+    found = [float(row.split(",")[3]) for row in rows[1:]]
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
 
 
@@ -310,14 +350,18 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     assert np.array_equal(np.concatenate(found.cell_data["pressure"]), fields["pressure"])
     assert np.array_equal(drawn.cell_data["velocity"], fields["velocity"])
     assert np.allclose(drawn.compute_cell_sizes().cell_data["Area"], basin.mesh.area, rtol=1e-12)
-    units = {name: drawn.GetCellData().GetArray(name).GetInformation().Get(vtkDataArray.UNITS_LABEL())
-             for name in fields}  # fmt: skip
+    units = {
+        name: drawn.GetCellData().GetArray(name).GetInformation().Get(vtkDataArray.UNITS_LABEL())
+        for name in fields
+    }
     assert units == {"pressure": "Pa", "velocity": "m/s"}
     case["output"]["units"] = {"pressure": "barg", "length": "ft"}
     asked = fvsolve.load(case)
     scene = DrawnScene("", unit_of(asked, "pressure"), *lengths_of(asked), [])
     shown = of_view.read_frame(tmp_path / "block.vtu", scene)
-    assert shown["pressure"] == approx(1e-5 * (fields["pressure"] - asked.ambient_pressure), abs=1e-9)
+    assert shown["pressure"] == approx(
+        1e-5 * (fields["pressure"] - asked.ambient_pressure), abs=1e-9
+    )
     assert (scene.quantity.unit, scene.length.unit) == ("barg", "ft")
     assert np.asarray(shown.points)[:, :2] == approx(points[:, :2] / 0.3048, rel=1e-6)
 
@@ -372,7 +416,9 @@ def test_view_draws_contours_and_magnitudes(dam, fvs):
     named = drawn(fvs, dam, "--field", "velocity")
     assert named.endswith("velocity.png")
     plain = open(named, "rb").read()
-    lines = open(drawn(fvs, dam, "--field", "velocity", "--contours", "5", "--out", "b.png"), "rb").read()
+    lines = open(
+        drawn(fvs, dam, "--field", "velocity", "--contours", "5", "--out", "b.png"), "rb"
+    ).read()
     assert plain != lines and plain.startswith(b"\x89PNG")
     code, _, err = fvs("view", dam, "--field", "dept")
     assert code == 2 and "unknown field 'dept'; did you mean \"depth\"" in err
@@ -425,8 +471,14 @@ def test_check_describes_basins(tmp_path, monkeypatch, fvs):
     assert (one["physics"], one["path"], one["area"]) == ("free-surface", "grid", approx(40.0))
     assert one["depth"] == approx([2.0 - 0.975, 2.0 - 0.025])
     assert one["wave_speed"] == approx(np.sqrt(GRAVITY * np.array(one["depth"])))
-    assert one["patches"]["outlet"] == {"faces": 4, "length": approx(2.0), "area": approx(1.0), "reflects": 1.0}
-    assert one["memory"] >= 8 * 160 * (3 + 2)  # at least its state, and depth and bed of the profile
+    assert one["patches"]["outlet"] == {
+        "faces": 4,
+        "length": approx(2.0),
+        "area": approx(1.0),
+        "reflects": 1.0,
+    }
+    # at least its state, and depth and bed of the profile
+    assert one["memory"] >= 8 * 160 * (3 + 2)
     code, out, _ = fvs("check", "run/case.toml")
     assert code == 0 and "pool.outlet" in out and "free-surface" in out and "1.025 to 1.975" in out
 
@@ -435,7 +487,10 @@ def test_keys_that_a_mesh_leaves_out_are_noted(tmp_path):
     points, cells = shaken()
     path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
     model = model_of(liquid([], mesh={"file": str(path)}))
-    assert any("basin block: the mesh is" in note.text and 'unit = "mm"' in note.text for note in model.warnings)
+    assert any(
+        "basin block: the mesh is" in note.text and 'unit = "mm"' in note.text
+        for note in model.warnings
+    )
     assert any("the file contains no named group of lines" in note.text for note in model.warnings)
 
 
@@ -451,10 +506,18 @@ def test_rows_contain_the_flow_through_an_open_side(physics, tmp_path):
     """The flow through the open side, integrated over the rows, is the gain of the content."""
     sea = {"sea": {"side": "west", "boundary": "open"}}
     if physics == "liquid":
-        case = liquid(["block.sea.flow"], size=[1.0, 0.2], cells=[20, 2], patches=sea, start={"pressure": "1e5*x"})
+        case = liquid(
+            ["block.sea.flow"],
+            size=[1.0, 0.2],
+            cells=[20, 2],
+            patches=sea,
+            start={"pressure": "1e5*x"},
+        )
         case["output"]["every"] = 2e-6
     else:
-        case = draining(["pool.sea.flow"], 2.0, {"every": 0.01}, patches=sea, start={"level": "2 - 0.01*x"})
+        case = draining(
+            ["pool.sea.flow"], 2.0, {"every": 0.01}, patches=sea, start={"level": "2 - 0.01*x"}
+        )
         case["links"], case["nodes"] = {}, {"pool": case["nodes"]["pool"]}
     found = fvsolve.run(case)
     flow = found["pool.sea.flow" if physics == "free-surface" else "block.sea.flow"]
@@ -465,8 +528,15 @@ def test_rows_contain_the_flow_through_an_open_side(physics, tmp_path):
 
 def sheet(**more) -> dict:
     """Return a case of a uniform stream that carries a dye."""
-    one = {"type": "basin", "physics": "transport", "size": [2.0, 1.0], "cells": [16, 8], "scalars": {"dye": "x"},
-           "velocity": {"expression": "constant", "u": "40 cm/s", "v": 0.0}, **more}  # fmt: skip
+    one = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [2.0, 1.0],
+        "cells": [16, 8],
+        "scalars": {"dye": "x"},
+        "velocity": {"expression": "constant", "u": "40 cm/s", "v": 0.0},
+        **more,
+    }
     ends = {"in": {"side": "west", "scalars": {"dye": 0.0}}, "out": {"side": "east"}}
     case = scene({"sheet": one | {"patches": ends}}, {}, 0.5, PLANE, ["sheet.dye@1,0.5"], 0.1)
     case["scalars"] = {"dye": {"unit": "g/l", "decay": "1800 1/h"}}
@@ -487,10 +557,24 @@ def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
 
 
 NO_VELOCITIES = {
-    'nodes.sheet.velocity.speed: "fast" is not a number with a unit': {"expression": "swirl", "speed": "fast"},
-    'velocity "shear" has no parameter y1; expected rate, u, y0': {"expression": "shear", "rate": 1, "y1": 0},
-    "nodes.sheet.velocity: has stream, u; expected velocity field: { u, v } or { stream }": {"stream": "y", "u": 1},
-    "nodes.sheet.velocity.centre: [0] has 1 values": {"expression": "rotation", "centre": [0], "angular_velocity": 1},
+    'nodes.sheet.velocity.speed: "fast" is not a number with a unit': {
+        "expression": "swirl",
+        "speed": "fast",
+    },
+    'velocity "shear" has no parameter y1; expected rate, u, y0': {
+        "expression": "shear",
+        "rate": 1,
+        "y1": 0,
+    },
+    "nodes.sheet.velocity: has stream, u; expected velocity field: { u, v } or { stream }": {
+        "stream": "y",
+        "u": 1,
+    },
+    "nodes.sheet.velocity.centre: [0] has 1 values": {
+        "expression": "rotation",
+        "centre": [0],
+        "angular_velocity": 1,
+    },
 }
 
 
@@ -502,16 +586,25 @@ def test_a_velocity_that_is_none(said):
 
 
 def test_quantities_of_a_basin():
-    plain = liquid([], size=[1.0, 1.0], cells=[2, 2], start={"pressure": 1e5, "u": 0.5, "v": "2*x"},
-                   patches={"soft": {"side": "west", "impedance": 2e6}})  # fmt: skip
+    plain = liquid(
+        [],
+        size=[1.0, 1.0],
+        cells=[2, 2],
+        start={"pressure": 1e5, "u": 0.5, "v": "2*x"},
+        patches={"soft": {"side": "west", "impedance": 2e6}},
+    )
     named = json.loads(json.dumps(plain))
-    named["nodes"]["block"] |= {"start": {"pressure": "1 bar", "u": "50 cm/s", "v": "2*x"},
-                                "patches": {"soft": {"side": "west", "impedance": "2 MPa s/m"}}}  # fmt: skip
+    named["nodes"]["block"] |= {
+        "start": {"pressure": "1 bar", "u": "50 cm/s", "v": "2*x"},
+        "patches": {"soft": {"side": "west", "impedance": "2 MPa s/m"}},
+    }
     one, other = (fvsolve.load(case).nodes["block"] for case in (plain, named))
     assert one.patches["soft"].impedance == other.patches["soft"].impedance == 2e6
     at = np.array([0.3]), np.array([0.4])
     for field in ("pressure", "u", "v"):
-        assert getattr(one.start, field).at(*at) == approx(getattr(other.start, field).at(*at), rel=1e-14)
+        assert getattr(one.start, field).at(*at) == approx(
+            getattr(other.start, field).at(*at), rel=1e-14
+        )
 
 
 @pytest.mark.parametrize(
@@ -519,10 +612,16 @@ def test_quantities_of_a_basin():
     [
         ({"level": "two"}, "nodes.pool.level"),
         ({"holes": "none"}, "nodes.pool.holes"),
-        ({"bed": "0.5*(y"}, 'nodes.pool.bed: "0.5*(y" is not a formula of x and y: a bracket is not closed'),
+        (
+            {"bed": "0.5*(y"},
+            'nodes.pool.bed: "0.5*(y" is not a formula of x and y: a bracket is not closed',
+        ),
         ({"bed": "0.5*y)"}, "a closing bracket has no opening bracket"),
         ({"bed": "2*x y"}, '"2*x y" is not a formula of x and y: invalid syntax'),
-        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "deep" is not a number in column "z"'),
+        (
+            {"bed": {"file": "bed.csv"}},
+            'nodes.pool.bed.file: bed.csv, line 4: "deep" is not a number in column "z"',
+        ),
     ],
 )
 def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):
@@ -546,7 +645,10 @@ def test_check_names_the_valve_that_sets_the_step():
     case = scene(nodes, {"sluice": valve("pool.outlet", "pond", 0.5)}, 1.0, PLANE, [], 0.1)
     checks = model_of(case).checks
     assert checks["step_set_by"] == "one of pond, pool"
-    case["nodes"]["pool"]["patches"] = {**case["nodes"]["pool"]["patches"], "paddle": {"side": "west", "travel": 0.0}}
+    case["nodes"]["pool"]["patches"] = {
+        **case["nodes"]["pool"]["patches"],
+        "paddle": {"side": "west", "travel": 0.0},
+    }
     checks = model_of(case).checks
     assert checks["step_set_by"].startswith("links.sluice: ") and checks["step"] < 1e-4
     case["links"]["sluice"]["area"] = 1e-5

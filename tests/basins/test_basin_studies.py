@@ -32,7 +32,14 @@ SLOSH = "1 + 0.05*cos(0.3141592653589793*x) + 0.03*cos(0.6283185307179586*y)"  #
 
 def pool(cells, level: str | None = None, size=(10.0, 5.0), depth: float = 1.0, **more) -> dict:
     start = {} if level is None else {"start": {"level": level}}
-    return {"type": "basin", "size": list(size), "cells": list(cells), "level": depth, **start, **more}
+    return {
+        "type": "basin",
+        "size": list(size),
+        "cells": list(cells),
+        "level": depth,
+        **start,
+        **more,
+    }
 
 
 def alone(basin: dict, end: float, **numerics) -> dict:
@@ -44,7 +51,12 @@ def alone(basin: dict, end: float, **numerics) -> dict:
 
 def test_errors_of_a_smooth_slosh_fall_at_the_order_of_the_scheme():
     found = order(alone(pool((24, 12), SLOSH), 1.2), levels=4)
-    assert found.kind == "richardson" and [row.level.cells for row in found.rows] == [288, 1152, 4608, 18432]
+    assert found.kind == "richardson" and [row.level.cells for row in found.rows] == [
+        288,
+        1152,
+        4608,
+        18432,
+    ]
     fit = found.fits["pool at the end: depth"]
     assert fit["L1"].order == approx(2.0, abs=0.25) and fit["L2"].order == approx(2.0, abs=0.25)
     first = order(alone(pool((24, 12), SLOSH), 1.2, scheme="upwind", method="euler"), levels=4)
@@ -57,7 +69,9 @@ def test_a_finer_run_judges_as_rows_judge_each_other():
     by_rows, finer = order(case, levels=5), order(case, levels=2, reference="finer")
     for k in range(2):
         name = "pool at the end: flow_y"
-        assert finer.rows[k].errors[name]["L1"] == approx(by_rows.rows[k].errors[name]["L1"], rel=0.1)
+        assert finer.rows[k].errors[name]["L1"] == approx(
+            by_rows.rows[k].errors[name]["L1"], rel=0.1
+        )
 
 
 def test_a_broken_dam_is_of_first_order_in_the_mean_with_the_reason_in_the_note():
@@ -75,14 +89,21 @@ def test_only_steps_are_refined_on_a_fixed_mesh():
 def test_cells_of_pipes_and_basins_double_together_in_both_directions():
     still = PLANE | {"initial": "rest"}
     nodes = {"lake": reservoir(2e5), "pool": pool((4, 6), patches={"in": {"side": "west"}})}
-    case = fvsolve.load(scene(nodes, {"main": pipe("lake", "pool.in", 50.0, 0.1, 1000.0, 10)}, 0.1, still))
+    case = fvsolve.load(
+        scene(nodes, {"main": pipe("lake", "pool.in", 50.0, 0.1, 1000.0, 10)}, 0.1, still)
+    )
     assert resolutions(case)["nodes.pool.cells"] == "both"
     rows = refinement_plan(case, levels=3).levels
     assert [row.set["nodes.pool.cells"] for row in rows] == [[4, 6], [8, 12], [16, 24]]
-    assert [row.set["links.main.cells"] for row in rows] == [10, 20, 40] and rows[2].cells == 16 * 24 + 40
+    assert [row.set["links.main.cells"] for row in rows] == [10, 20, 40] and rows[
+        2
+    ].cells == 16 * 24 + 40
     one = refinement_plan(case, key="nodes.pool.cells", levels=2).levels[1]
     assert one.set["nodes.pool.cells"] == [8, 12] and one.set["links.main.cells"] == 10
-    assert cell_keys_of(scaled(cell_counts(case), 0.5)) == {"links.main.cells": 5, "nodes.pool.cells": [2, 3]}
+    assert cell_keys_of(scaled(cell_counts(case), 0.5)) == {
+        "links.main.cells": 5,
+        "nodes.pool.cells": [2, 3],
+    }
 
 
 def test_the_content_of_a_basin_is_equal_on_coarser_cells():
@@ -101,10 +122,15 @@ def test_a_mesh_from_a_file_has_no_finer_mesh(tmp_path):
     import meshio
 
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
-    meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
+    meshio.write(
+        tmp_path / "square.vtu",
+        meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]),
+    )
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
-    assert description({1.0: None}, case).startswith("errors are unknown: cells of pool come from files")
+    assert description({1.0: None}, case).startswith(
+        "errors are unknown: cells of pool come from files"
+    )
     with pytest.raises(FvsolveError, match=r"meshes from files cannot be refined \(pool\)"):
         refinement_plan(case, "both")
 
@@ -114,10 +140,21 @@ def test_a_mesh_from_a_file_has_no_finer_mesh(tmp_path):
 
 def fed(scheme: str, end: float = 1.0, **numerics) -> dict:
     """Return a case of a sloshing basin between a pipe with a valve that opens and a valve to a shallower basin."""
-    west = pool((6, 4), SLOSH, elevation=0.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}})
-    east = pool((4, 3), size=(4.0, 3.0), depth=0.5, elevation=0.0, patches={"gate": {"side": "west"}}, bed="0.2*x")
+    west = pool(
+        (6, 4), SLOSH, elevation=0.0, patches={"in": {"side": "west"}, "gate": {"side": "east"}}
+    )
+    east = pool(
+        (4, 3),
+        size=(4.0, 3.0),
+        depth=0.5,
+        elevation=0.0,
+        patches={"gate": {"side": "west"}},
+        bed="0.2*x",
+    )
     links = {
-        "main": pipe("lake", "end", 50.0, 0.3, 1000.0, 6, friction={"model": "steady", "factor": 0.02}),
+        "main": pipe(
+            "lake", "end", 50.0, 0.3, 1000.0, 6, friction={"model": "steady", "factor": 0.02}
+        ),
         "tap": valve("end", "west.in", 0.02, ramp(0.0, 0.2, 0.0, 1.0)),
         "hole": valve("west.gate", "east.gate", 0.05),
     }
@@ -172,7 +209,12 @@ def test_outflow_through_an_open_side_is_in_the_ledger_of_implicit_steps(physics
     basin["patches"] = {"east": {"side": "east", "boundary": "open"}}
     model = model_of(case)
     assert (
-        stray(model, 0.0, model.start + 0.05 * model.scale * np.random.default_rng(0).normal(size=model.y_size)) < 1e-9
+        stray(
+            model,
+            0.0,
+            model.start + 0.05 * model.scale * np.random.default_rng(0).normal(size=model.y_size),
+        )
+        < 1e-9
     )
     del case["numerics"]["courant"]
     case["numerics"] |= {"method": "radau-iia-5", "rtol": 1e-4}
@@ -186,7 +228,8 @@ def test_a_slosh_blows_up_at_the_predicted_step():
     """Prediction and runs agree to 3e-4 for 16 by 4 cells at rest, and to 1e-2 about a moving slosh."""
     still = stability(alone(pool((16, 4), size=(10.0, 4.0)), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
     assert still.difference == approx(0.0, abs=3e-4)
-    assert still.rate * still.predicted > 2.0  # Courant number 1, which counts half cells, is stable
+    # Courant number 1, which counts half cells, is stable
+    assert still.rate * still.predicted > 2.0
     moving = stability(alone(pool((16, 4), SLOSH), 1.0), ["upwind"], ["ssp-rk2"]).rows[0]
     assert moving.difference == approx(0.0, abs=1e-2)
     assert any("the state is not steady" in note for note in moving.notes)
@@ -260,7 +303,14 @@ def test_a_basin_that_drains_supplies_the_valve_as_its_tank_does():
     ):
         links = {"tap": valve(place, "out", 0.002, ramp(0.0, 10.0, 0.0, 1.0))}
         numerics = PLANE if kind == "basin" else {}
-        case = scene({"pool": node, "out": reservoir(AMBIENT, elevation=0.0)}, links, 40.0, numerics, ["tap.flow"], 1.0)
+        case = scene(
+            {"pool": node, "out": reservoir(AMBIENT, elevation=0.0)},
+            links,
+            40.0,
+            numerics,
+            ["tap.flow"],
+            1.0,
+        )
         shown[kind] = energy(case)
     basin, twin = shown["basin"], shown["tank"]
     assert basin.dissipated["tap"][-1] == approx(twin.dissipated["tap"][-1], rel=2e-4)
@@ -268,7 +318,9 @@ def test_a_basin_that_drains_supplies_the_valve_as_its_tank_does():
     assert 0.0 < basin.numerical_remainder[-1] < 1e-4 * basin.throughput
 
 
-@pytest.mark.parametrize("patch", [{"side": "west"}, {"at": [5.0, 1.5], "area": 8.0}], ids=["side", "interior"])
+@pytest.mark.parametrize(
+    "patch", [{"side": "west"}, {"at": [5.0, 1.5], "area": 8.0}], ids=["side", "interior"]
+)
 @pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
 def test_flow_through_a_patch_is_no_loss_of_the_scheme(head, patch):
     """The power lost by the scheme in a state is equal to rounding with the valve at the patch open and closed."""
@@ -281,7 +333,10 @@ def test_flow_through_a_patch_is_no_loss_of_the_scheme(head, patch):
         y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
         accounts = Accounts(RunData(model))
         power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())
-        kinds = {(one.category, one.place): value for one, value in zip(accounts.accounts, power, strict=True)}
+        kinds = {
+            (one.category, one.place): value
+            for one, value in zip(accounts.accounts, power, strict=True)
+        }
         found.append(kinds)
     shut, open_ = found
     assert open_["scheme", "pool"] == approx(shut["scheme", "pool"], rel=1e-9)
@@ -305,8 +360,9 @@ def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
         basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
         said = [one for one in model_of(alone(basin, 1.0)).warnings if "slower" in one.text]
         assert len(said) == (1 if depth > 1.0 else 0)
-    assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real waves are {slower(k, 1.8):.2g} %" in (
-        said[0].text
+    assert (
+        f"waves about 20 m long in 1.8 m of water (k h = 0.57): real waves are {slower(k, 1.8):.2g} %"
+        in (said[0].text)
     )
 
 
@@ -318,7 +374,9 @@ def test_wavenumbers_are_those_of_the_waves_that_there_are():
     (basin,), y = model.meshed, model.start
     assert surface_waves(basin, basin.deviations(y)).k == approx(k, rel=1e-12)
     surface = basin.deviations(y)[0]
-    assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
+    assert on_mesh(basin, surface) == approx(
+        on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0
+    )
     dam = model_of(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
     assert surface_waves(dam.meshed[0], dam.meshed[0].deviations(dam.start)).k == approx(
         math.sqrt(12.0) / 10.0, rel=1e-3
@@ -331,11 +389,24 @@ def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
         "pool": pool((20, 4), depth=3.0, patches={"in": {"side": "west"}}),
         "lake": {"type": "reservoir", "head": 9},
     }
-    case = scene(nodes, {"tap": valve("lake", "pool.in", 0.3, ramp(0.0, 0.2, 0.0, 1.0))}, 3.0, PLANE, ["tap.flow"], 0.1)
+    case = scene(
+        nodes,
+        {"tap": valve("lake", "pool.in", 0.3, ramp(0.0, 0.2, 0.0, 1.0))},
+        3.0,
+        PLANE,
+        ["tap.flow"],
+        0.1,
+    )
     case["output"]["fields"] = 4
     assert not model_of(case).warnings
-    said = [one["text"] for one in fvsolve.run(case).summary["warnings"] if one["kind"] == "dispersion"]
-    assert len(said) == 1 and said[0].startswith("pool: waves about") and " s" in said[0].rsplit("at", 1)[1]
+    said = [
+        one["text"] for one in fvsolve.run(case).summary["warnings"] if one["kind"] == "dispersion"
+    ]
+    assert (
+        len(said) == 1
+        and said[0].startswith("pool: waves about")
+        and " s" in said[0].rsplit("at", 1)[1]
+    )
 
 
 # liquids and scalars ---------------------------------------------------------------------------------------------
@@ -344,24 +415,40 @@ def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):
 def block(cells, end: float, **numerics) -> dict:
     """Return a case of a pressure pulse in a liquid between walls."""
     start = {"pressure": "1e5*exp(-150*((x - 0.4)**2 + (y - 0.2)**2))"}
-    given = {"size": [1.0, 0.5], "cells": list(cells), "pressure": 1e6, "thickness": 0.1, "wave_speed": 1000.0}
-    return scene({"block": {"type": "basin", "physics": "liquid", "start": start, **given}}, {}, end, PLANE | numerics)
+    given = {
+        "size": [1.0, 0.5],
+        "cells": list(cells),
+        "pressure": 1e6,
+        "thickness": 0.1,
+        "wave_speed": 1000.0,
+    }
+    return scene(
+        {"block": {"type": "basin", "physics": "liquid", "start": start, **given}},
+        {},
+        end,
+        PLANE | numerics,
+    )
 
 
 def test_fifth_order_shows_on_grids_for_cells_start_from_their_means():
     """A start from averages of cells shows order 5 in a liquid and in a slosh; values at centres show order 2."""
     found = order(block((32, 16), 1e-4, scheme="upwind5", method="rk4", courant=0.4), levels=4)
     assert min(found.fits["block at the end: density"]["L1"].pairwise[:2]) > 3.8
-    slosh = alone(pool((20, 2), "1 + 0.02*cos(0.3141592653589793*x)"), 1.0, scheme="upwind5", method="rk4")
+    slosh = alone(
+        pool((20, 2), "1 + 0.02*cos(0.3141592653589793*x)"), 1.0, scheme="upwind5", method="rk4"
+    )
     assert order(slosh, levels=4).fits["pool at the end: depth"]["L1"].order == approx(5.0, abs=0.2)
 
 
 def test_energy_of_a_liquid_falls_by_the_loss_of_the_scheme():
     """The loss falls at third order with limited slopes; the energy at the start is that of the pulse."""
-    loss = [energy(block((n, n // 2), 5e-4, courant=0.5)).scheme["block"][-1] for n in (32, 64, 128)]
+    loss = [
+        energy(block((n, n // 2), 5e-4, courant=0.5)).scheme["block"][-1] for n in (32, 64, 128)
+    ]
     assert loss[0] > loss[1] > loss[2] > 0.0 and np.log2(loss[1] / loss[2]) == approx(3.0, abs=0.6)
     found = energy(block((128, 64), 1e-6, courant=0.5))
-    pulse = 0.1 * 1e10 * math.pi / 300.0 / (2.0 * RHO * 1e6)  # thickness p^2 / (2 rho a^2), of exp(-300 r^2)
+    # thickness p^2 / (2 rho a^2), of exp(-300 r^2)
+    pulse = 0.1 * 1e10 * math.pi / 300.0 / (2.0 * RHO * 1e6)
     still = 0.1 * 0.5 * (1e6 - AMBIENT) ** 2 / (2.0 * RHO * 1e6)
     rise = 0.1 * (1e6 - AMBIENT) * 1e5 * math.pi / 150.0 / (RHO * 1e6)
     assert found.at_start["block"] == approx(still + rise + pulse, rel=1e-3)
@@ -375,9 +462,13 @@ def test_a_liquid_blows_up_at_the_predicted_step(scheme):
 
 def test_friction_of_the_bed_is_accounted_with_its_exact_loss():
     """Manning's friction dissipates what the stored energy loses besides the loss of the scheme, to 1 %."""
-    smooth, rough = (energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05}))
+    smooth, rough = (
+        energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05})
+    )
     (taken,) = rough.dissipated.values()
-    assert taken[-1] > 0.0 and rough.numerical_remainder[-1] == approx(smooth.numerical_remainder[-1], rel=0.01)
+    assert taken[-1] > 0.0 and rough.numerical_remainder[-1] == approx(
+        smooth.numerical_remainder[-1], rel=0.01
+    )
     left = rough.stored["pool"][-1] - smooth.stored["pool"][-1]
     assert left == approx(-taken[-1], rel=0.01)
 
@@ -385,9 +476,22 @@ def test_friction_of_the_bed_is_accounted_with_its_exact_loss():
 def swirl(**numerics) -> dict:
     """Return a case of a dye in a vortex that reverses (LeVeque 1996)."""
     dye = "exp(-60*((x - 0.35)**2 + (y - 0.5)**2))"
-    sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [16, 16], "scalars": {"dye": dye}}
+    sheet = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [1.0, 1.0],
+        "cells": [16, 16],
+        "scalars": {"dye": dye},
+    }
     sheet["velocity"] = {"expression": "swirl", "period": 1.5}
-    return scene({"sheet": sheet}, {}, 1.5, PLANE | {"courant": 0.5} | numerics, every=0.5, scalars={"dye": {}})
+    return scene(
+        {"sheet": sheet},
+        {},
+        1.5,
+        PLANE | {"courant": 0.5} | numerics,
+        every=0.5,
+        scalars={"dye": {}},
+    )
 
 
 def test_a_dye_in_a_vortex_that_turns_back_stays_within_bounds_and_shows_its_order():
@@ -395,10 +499,14 @@ def test_a_dye_in_a_vortex_that_turns_back_stays_within_bounds_and_shows_its_ord
     found = order(swirl(), levels=4, cells=32)
     assert found.fits["sheet at the end: dye"]["L1"].order == approx(2.1, abs=0.3)
     for cells in (32, 64):
-        model = model_of(swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}})
+        model = model_of(
+            swirl() | {"nodes": {"sheet": swirl()["nodes"]["sheet"] | {"cells": [cells, cells]}}}
+        )
         basin, start = model.meshed[0], model.start
         y = fvsolve.advance(model, fvsolve.initial_state(model), 1.5).y
-        assert basin.amounts(y).max() <= basin.amounts(start).max() and basin.amounts(y).min() >= 0.0
+        assert (
+            basin.amounts(y).max() <= basin.amounts(start).max() and basin.amounts(y).min() >= 0.0
+        )
 
 
 def test_a_vortex_stands_still_where_it_is_linearised():
@@ -416,20 +524,34 @@ def test_a_chart_of_a_slosh_lays_error_against_cost():
     for name in ("upwind ssp-rk2", "muscl ssp-rk2"):
         errors = [(point.trajectory, point.end) for point in curves[name]]
         assert all(point.ok for point in curves[name]) and len(errors) == 3
-        assert errors[0][0] > errors[1][0] > errors[2][0] and errors[0][1] > errors[1][1] > errors[2][1]
+        assert (
+            errors[0][0] > errors[1][0] > errors[2][0]
+            and errors[0][1] > errors[1][1] > errors[2][1]
+        )
     assert curves["muscl ssp-rk2"][2].end < 0.3 * curves["upwind ssp-rk2"][2].end
-    assert [point.setting.keys["nodes.pool.cells"] for point in curves["muscl ssp-rk2"]] == [[8, 4], [16, 8], [32, 16]]
+    assert [point.setting.keys["nodes.pool.cells"] for point in curves["muscl ssp-rk2"]] == [
+        [8, 4],
+        [16, 8],
+        [32, 16],
+    ]
 
 
 def test_studies_run_cases_with_lines_and_grids_of_frames():
     case = alone(pool((16, 8), SLOSH), 1.0)
     grid = {"basin": "pool", "fields": ["depth", "max_depth"], "format": "netcdf", "cell": 1.0}
-    case["output"] |= {"fields": 2, "probes": ["pool.depth@0.3,0.3"], "grids": {"water": grid},
-                       "lines": {"axis": {"basin": "pool", "from": [1, 2], "to": [9, 2]}}}  # fmt: skip
+    case["output"] |= {
+        "fields": 2,
+        "probes": ["pool.depth@0.3,0.3"],
+        "grids": {"water": grid},
+        "lines": {"axis": {"basin": "pool", "from": [1, 2], "to": [9, 2]}},
+    }
     rows = sweep(case, {"numerics.courant": [0.5, 0.9]}).rows
     assert [row["reason"] for row in rows] == ["finished"] * 2
     assert len(order(case, levels=2).rows) == 2
-    assert all(point.ok for point in chart(case, schemes=["muscl"], methods=["ssp-rk2"], cells=[8, 16]).points)
+    assert all(
+        point.ok
+        for point in chart(case, schemes=["muscl"], methods=["ssp-rk2"], cells=[8, 16]).points
+    )
 
 
 def test_a_chart_states_that_cells_of_a_file_are_not_refined():

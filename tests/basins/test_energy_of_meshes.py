@@ -24,7 +24,9 @@ def lake(field: Field, bed: np.ndarray, ripple: float, wide: float, end: float) 
     found = []
 
     def store(y):
-        found.append(0.5 * field.area @ (G * y[0] ** 2 + (y[1] ** 2 + y[2] ** 2) / (plan[0] + y[0])))
+        found.append(
+            0.5 * field.area @ (G * y[0] ** 2 + (y[1] ** 2 + y[2] ** 2) / (plan[0] + y[0]))
+        )
 
     store(y)
     march(lambda y: field.shallow(MUSCL, plan, y, wide=wide), y, end, 0.45, store)
@@ -39,8 +41,11 @@ def test_ripples_on_a_lake_over_a_rough_bed_die_away(shape, wide, tmp_path):
     if shape == "mixed":
         mesh = field.mesh
         grid = rectangle((6.0, 3.0), (12, 6))
-        cells = [c for k, (p, q, r, s) in enumerate(corner_lists(grid))
-                 for c in ([[p, q, r, s]] if k % 3 == 0 else [[p, q, r], [p, r, s]])]  # fmt: skip
+        cells = [
+            c
+            for k, (p, q, r, s) in enumerate(corner_lists(grid))
+            for c in ([[p, q, r, s]] if k % 3 == 0 else [[p, q, r], [p, r, s]])
+        ]
         points = grid.points + 0.05 * np.sin(7.0 * grid.points[:, ::-1]) * (
             (grid.points > 0.1) & (grid.points < (5.9, 2.9))
         ).all(axis=1, keepdims=True)
@@ -79,13 +84,17 @@ def test_the_gradient_in_a_cell_extrapolates_to_its_sides_with_a_bounded_norm(tm
         blocks = -(-mesh.area.size // cell_sides.BLOCK)
         size = blocks * integers[0] * cell_sides.MEASURES * cell_sides.BLOCK
         sides = floats[:size].reshape(blocks, integers[0], cell_sides.MEASURES, cell_sides.BLOCK)
-        sides = np.moveaxis(sides, 3, 1).reshape(-1, integers[0], cell_sides.MEASURES)[: mesh.area.size]
+        sides = np.moveaxis(sides, 3, 1).reshape(-1, integers[0], cell_sides.MEASURES)[
+            : mesh.area.size
+        ]
         to_side, weights = (sides[:, :, k : k + 2] for k in (cell_sides.DX, cell_sides.WX))
         norms = np.linalg.norm(to_side @ weights.swapaxes(1, 2), 2, axis=(1, 2))
         assert norms.max() == approx(cell_sides.STEEPEST, rel=1e-9) and norms.min() < 0.5
 
 
-@pytest.mark.parametrize("numerics", [{"limiter": "van-leer"}, {"limiter": "minmod"}, {"law": "log"}], ids=str)
+@pytest.mark.parametrize(
+    "numerics", [{"limiter": "van-leer"}, {"limiter": "minmod"}, {"law": "log"}], ids=str
+)
 def test_flow_through_a_liquid_on_triangles_is_that_of_its_orifices(numerics, tmp_path):
     """Two equal orifices between heads of 23 and 17 m: 20 m in the pool, flow Cd A sqrt(2 g 3 m) to 0.1 %.
 
@@ -95,8 +104,11 @@ def test_flow_through_a_liquid_on_triangles_is_that_of_its_orifices(numerics, tm
     points = mesh.points.copy()
     inside = ((points > 1e-9) & (points < np.array([2.0, 0.5]) - 1e-9)).all(axis=1)
     points[inside] += np.random.default_rng(4).uniform(-0.03, 0.03, (inside.sum(), 2))
-    cells = [c for k, (p, q, r, s) in enumerate(corner_lists(mesh))
-             for c in ([[p, q, r, s]] if k % 5 == 0 else [[p, q, r], [p, r, s]])]  # fmt: skip
+    cells = [
+        c
+        for k, (p, q, r, s) in enumerate(corner_lists(mesh))
+        for c in ([[p, q, r, s]] if k % 5 == 0 else [[p, q, r], [p, r, s]])
+    ]
     ends = mesh.points
     groups = {}
     for name, x in (("west", 0.0), ("east", 2.0)):
@@ -109,15 +121,28 @@ def test_flow_through_a_liquid_on_triangles_is_that_of_its_orifices(numerics, tm
     case = {
         "fluid": {"name": "Water", "law": law},
         "nodes": {
-            "a": {"type": "reservoir", "head": 23.0}, "b": {"type": "reservoir", "head": 17.0},
-            "pool": {"type": "basin", "physics": "liquid", "mesh": {"file": str(tmp_path / "pool.msh")},
-                     "pressure": "2.97 bar", "thickness": 0.05, "wave_speed": 1000.0},
+            "a": {"type": "reservoir", "head": 23.0},
+            "b": {"type": "reservoir", "head": 17.0},
+            "pool": {
+                "type": "basin",
+                "physics": "liquid",
+                "mesh": {"file": str(tmp_path / "pool.msh")},
+                "pressure": "2.97 bar",
+                "thickness": 0.05,
+                "wave_speed": 1000.0,
+            },
         },
-        "links": {"in": orifice | {"from": "a", "to": "pool.west"}, "out": orifice | {"from": "pool.east", "to": "b"}},
-        "numerics": {"end": 1.0, "scheme": "muscl", "method": "ssp-rk2", "courant": 0.8} | {
-            k: v for k, v in numerics.items() if k != "law"},
-        "output": {"every": 0.01, "probes": ["in.flow", "out.flow", "pool.west.head", "pool.east.head"]},
-    }  # fmt: skip
+        "links": {
+            "in": orifice | {"from": "a", "to": "pool.west"},
+            "out": orifice | {"from": "pool.east", "to": "b"},
+        },
+        "numerics": {"end": 1.0, "scheme": "muscl", "method": "ssp-rk2", "courant": 0.8}
+        | {k: v for k, v in numerics.items() if k != "law"},
+        "output": {
+            "every": 0.01,
+            "probes": ["in.flow", "out.flow", "pool.west.head", "pool.east.head"],
+        },
+    }
     found = fvsolve.run(case)
     flow = 0.6 * 0.001 * math.sqrt(2.0 * 9.80665 * 3.0)
     late = found.t > 0.5

@@ -19,18 +19,36 @@ SIZE, CREST, C = (24.0, 6.0), 1.5, 0.577
 ACROSS = [[12.05, 0.0], [12.05, 6.0]]  # the nearest grid line is x = 12
 NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
 METHODS = {
-    "explicit": {}, "implicit": {"method": "radau-iia-5", "courant": None, "rtol": 1e-6},
+    "explicit": {},
+    "implicit": {"method": "radau-iia-5", "courant": None, "rtol": 1e-6},
     "rosenbrock": {"method": "rodas-5p", "courant": None, "rtol": 1e-6},
-}  # fmt: skip
+}
 
 
-def pool(line=ACROSS, patches=None, cells=(24, 6), end=60.0, numerics=None, probes=(), sections=None, **basin) -> dict:
+def pool(
+    line=ACROSS,
+    patches=None,
+    cells=(24, 6),
+    end=60.0,
+    numerics=None,
+    probes=(),
+    sections=None,
+    **basin,
+) -> dict:
     """Basin with a wall, open to patches in the west ("up") and in the east ("down")."""
-    own = {"type": "basin", "size": list(SIZE), "cells": list(cells), "level": 1.0, "elevation": 0.0}
+    own = {
+        "type": "basin",
+        "size": list(SIZE),
+        "cells": list(cells),
+        "level": 1.0,
+        "elevation": 0.0,
+    }
     own["walls"] = {"levee": {"line": line, "crest": CREST}}
     sides = {"up": "west", "down": "east"}
     own["patches"] = {name: {"side": sides[name], **keys} for name, keys in (patches or {}).items()}
-    given = {key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None}
+    given = {
+        key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None
+    }
     case = scene({"reach": own | basin}, {}, end, given, probes, end / 30)
     case["output"] |= {"sections": sections} if sections else {}
     return case
@@ -41,13 +59,23 @@ def on_triangles(case: dict, folder, spacing=1.0) -> dict:
     points, cells = triangles(SIZE, spacing)
     groups = on_sides(points, boundary(cells), SIZE, ["west", "east"])
     names = {"west": "up", "east": "down"}
-    write(folder / "t.msh", points, cells.tolist(), {names[name]: ends for name, ends in groups.items()})
+    write(
+        folder / "t.msh",
+        points,
+        cells.tolist(),
+        {names[name]: ends for name, ends in groups.items()},
+    )
     return with_mesh(case, folder / "t.msh")
 
 
 def with_mesh(case: dict, path) -> dict:
-    basin = {key: value for key, value in case["nodes"]["reach"].items() if key not in ("size", "cells")}
-    patches = {name: {k: v for k, v in one.items() if k != "side"} for name, one in basin["patches"].items()}
+    basin = {
+        key: value for key, value in case["nodes"]["reach"].items() if key not in ("size", "cells")
+    }
+    patches = {
+        name: {k: v for k, v in one.items() if k != "side"}
+        for name, one in basin["patches"].items()
+    }
     return case | {"nodes": {"reach": basin | {"mesh": {"file": str(path)}, "patches": patches}}}
 
 
@@ -61,20 +89,33 @@ def depth(model, state) -> np.ndarray:
     return model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]
 
 
-LINES = {"across": ACROSS, "oblique": [[9.0, 0.0], [15.0, 6.0]], "steep": [[10.5, 6.0], [13.5, 0.0]]}
+LINES = {
+    "across": ACROSS,
+    "oblique": [[9.0, 0.0], [15.0, 6.0]],
+    "steep": [[10.5, 6.0], [13.5, 0.0]],
+}
 
 
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
 @pytest.mark.parametrize("line", LINES)
 @pytest.mark.parametrize(("tail", "turned"), [(1.0, False), (1.0, True), (1.8, False)])
-def test_steady_flow_over_a_wall_has_the_levels_of_villemonte(line, tail, turned, triangular, tmp_path):
+def test_steady_flow_over_a_wall_has_the_levels_of_villemonte(
+    line, tail, turned, triangular, tmp_path
+):
     ends = {"discharge": 3.6}, {"stage": f"{tail} m"}
     patches = dict(zip(("down", "up") if turned else ("up", "down"), ends, strict=True))
     case = pool(
-        LINES[line], patches, (48, 12), 150.0, start={"level": 1.9}, probes=["reach.depth@3,3", "reach.depth@21,3"]
+        LINES[line],
+        patches,
+        (48, 12),
+        150.0,
+        start={"level": 1.9},
+        probes=["reach.depth@3,3", "reach.depth@21,3"],
     )
     result = fvsolve.run(on_triangles(case, tmp_path, 0.8) if triangular else case)
-    upper, lower = sorted((result["reach.depth@3,3"][-1], result["reach.depth@21,3"][-1]), reverse=True)
+    upper, lower = sorted(
+        (result["reach.depth@3,3"][-1], result["reach.depth@21,3"][-1]), reverse=True
+    )
     length = math.dist(*LINES[line])
     assert villemonte(upper, lower) * length == approx(3.6, rel=0.02)
     if line == "across" and not triangular:
@@ -88,7 +129,8 @@ def test_steady_flow_over_a_wall_has_the_levels_of_villemonte(line, tail, turned
 @pytest.mark.parametrize("beyond", ["1.25", "0"], ids=["wet", "dry"])
 def test_water_at_rest_next_to_a_wall_does_not_move(beyond, triangular, scheme, numerics, tmp_path):
     start = {"level": f"where(x < 12.05, 1, {beyond})"}
-    bed = "where(x < 12.05, 0.3*sin(x) + x*y/50, 0)"  # with dry islands; west of the wall at the level of rest
+    # with dry islands; west of the wall at the level of rest
+    bed = "where(x < 12.05, 0.3*sin(x) + x*y/50, 0)"
     case = pool(bed=bed, start=start, numerics={"scheme": scheme} | numerics, end=3.0)
     case = on_triangles(case, tmp_path) if triangular else case
     model, state = ended(case)
@@ -100,7 +142,11 @@ def test_water_at_rest_next_to_a_wall_does_not_move(beyond, triangular, scheme, 
 def test_water_between_a_wall_and_a_patch_with_a_link_does_not_move(triangular, tmp_path):
     """The level at the patch is extrapolated from two cells, but not across the wall."""
     case = pool(
-        [[23.0, -1.0], [23.0, 7.0]], {"down": {}}, level=1.2, start={"level": "where(x < 23, 0.7, 1.2)"}, end=3.0
+        [[23.0, -1.0], [23.0, 7.0]],
+        {"down": {}},
+        level=1.2,
+        start={"level": "where(x < 23, 0.7, 1.2)"},
+        end=3.0,
     )
     case = on_triangles(case, tmp_path) if triangular else case
     case["nodes"]["tank"] = {"type": "tank", "area": 5.0, "elevation": 0.0, "level": 1.2}
@@ -110,7 +156,12 @@ def test_water_between_a_wall_and_a_patch_with_a_link_does_not_move(triangular, 
 
 
 def test_a_wall_that_ends_in_the_basin_lets_water_around(tmp_path):
-    case = pool([[12.0, 0.0], [12.0, 4.0]], start={"level": "where(x < 12, 1.4, 1)"}, end=200.0, manning=0.05)
+    case = pool(
+        [[12.0, 0.0], [12.0, 4.0]],
+        start={"level": "where(x < 12, 1.4, 1)"},
+        end=200.0,
+        manning=0.05,
+    )
     model, state = ended(case)
     assert depth(model, state) == approx(1.2, abs=0.01)
 
@@ -120,7 +171,8 @@ def test_deep_flow_over_a_wall_is_as_without_it(triangular, tmp_path):
     patches = {"up": {"discharge": 6.0}, "down": {"stage": "2 m"}}
     probes = ["reach.depth@3,3", "reach.depth@11.5,3", "reach.u@12.5,3"]
     case = pool(ACROSS, patches, start={"level": 2.0}, manning=0.03, probes=probes)
-    case["nodes"]["reach"]["walls"]["levee"]["crest"] = 0.5  # the lower depth over it is 3 times its height
+    # the lower depth over it is 3 times its height
+    case["nodes"]["reach"]["walls"]["levee"]["crest"] = 0.5
     case = on_triangles(case, tmp_path) if triangular else case
     without = case | {"nodes": {"reach": case["nodes"]["reach"] | {"walls": {}}}}
     one, other = fvsolve.run(case), fvsolve.run(without)
@@ -136,14 +188,20 @@ def dam(scheme: str, **more) -> dict:
 
 def mirrored(case: dict) -> dict:
     walls = {"levee": {"line": [[24.0 - x, y] for x, y in LINES["steep"]], "crest": CREST}}
-    basin = case["nodes"]["reach"] | {"walls": walls, "start": {"level": "where(x > 18, 2.2, 1)", "v": 0.1}}
+    basin = case["nodes"]["reach"] | {
+        "walls": walls,
+        "start": {"level": "where(x > 18, 2.2, 1)", "v": 0.1},
+    }
     return case | {"nodes": {"reach": basin}}
 
 
 def turned(case: dict) -> dict:
     """Turned by 90 degrees: x, y become -y + 6, x."""
     walls = {"levee": {"line": [[6.0 - y, x] for x, y in LINES["steep"]], "crest": CREST}}
-    basin = case["nodes"]["reach"] | {"walls": walls, "start": {"level": "where(y < 6, 2.2, 1)", "u": -0.1}}
+    basin = case["nodes"]["reach"] | {
+        "walls": walls,
+        "start": {"level": "where(y < 6, 2.2, 1)", "u": -0.1},
+    }
     return case | {"nodes": {"reach": basin | {"size": [6.0, 24.0], "cells": [6, 24]}}}
 
 
@@ -195,14 +253,20 @@ def test_all_methods_spill_the_same_volume(triangular, numerics, tmp_path):
     end = (
         60.0 if not triangular or numerics.get("method") != "radau-iia-5" else 25.0
     )  # there it takes a second a second
-    case = pool(start={"level": "where(x < 12.05, 1.52, 0)"}, end=end, numerics=numerics, probes=["reach.volume"])
+    case = pool(
+        start={"level": "where(x < 12.05, 1.52, 0)"},
+        end=end,
+        numerics=numerics,
+        probes=["reach.volume"],
+    )
     case = on_triangles(case, tmp_path) if triangular else case
     assert abs(fvsolve.run(case, {"numerics.end": 5.0}).ledger["mass"]["relative"]) < 1e-12
     model, state = ended(case)
     found, start = depth(model, state), depth(model, fvsolve.initial_state(model))
     behind, cells = model.meshed[0].x > 12.05, model.meshed[0].mesh.area
     spilled, area = float(found[behind] @ cells[behind]), cells[~behind].sum()
-    rate = villemonte(CREST + 1.0, 0.0) * SIZE[1] / area  # of a pool with one level: dh/dt = -rate h^1.5
+    # of a pool with one level: dh/dt = -rate h^1.5
+    rate = villemonte(CREST + 1.0, 0.0) * SIZE[1] / area
     assert spilled == approx(area * (0.02 - (0.02**-0.5 + 0.5 * rate * end) ** -2), rel=0.03)
     assert found.min() >= 0.0 and found @ cells == approx(start @ cells, rel=1e-12)
 
@@ -222,13 +286,21 @@ BRIDGE = {"bridge": {"basin": "reach", "from": [6.0, 0.0], "to": [6.0, 6.0]}}
 
 
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
-@pytest.mark.parametrize("line", [[[6.0, 0.0], [6.0, 6.0]], [[4.0, 6.0], [9.0, 0.0]]], ids=["across", "oblique"])
+@pytest.mark.parametrize(
+    "line", [[[6.0, 0.0], [6.0, 6.0]], [[4.0, 6.0], [9.0, 0.0]]], ids=["across", "oblique"]
+)
 def test_a_section_of_steady_flow_passes_the_discharge(line, triangular, tmp_path):
     patches = {"up": {"discharge": 3.6}, "down": {"stage": "2 m"}}
     section = {"bridge": {"basin": "reach", "from": line[0], "to": line[1]}}
     steps = {"scheme": "upwind", "method": "radau-iia-3", "courant": None, "step": 20.0}
-    case = pool(patches=patches, start={"level": 2.0, "u": 0.3}, sections=section, probes=["bridge.flow"], end=2000.0,
-                numerics=steps)  # fmt: skip
+    case = pool(
+        patches=patches,
+        start={"level": 2.0, "u": 0.3},
+        sections=section,
+        probes=["bridge.flow"],
+        end=2000.0,
+        numerics=steps,
+    )
     case["nodes"]["reach"]["walls"] = {}
     case["nodes"]["reach"]["manning"] = 0.2
     result = fvsolve.run(on_triangles(case, tmp_path) if triangular else case)
@@ -239,15 +311,22 @@ def test_a_section_of_steady_flow_passes_the_discharge(line, triangular, tmp_pat
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_the_integral_of_a_section_is_the_change_of_the_volume_beyond(scheme):
     start = {"level": "1 + 0.3*exp(-(x - 8)^2/4)"}
-    case = pool(start=start, sections=BRIDGE, probes=["bridge.flow"], end=3.0,
-                numerics={"scheme": scheme, "courant": None})  # fmt: skip
+    case = pool(
+        start=start,
+        sections=BRIDGE,
+        probes=["bridge.flow"],
+        end=3.0,
+        numerics={"scheme": scheme, "courant": None},
+    )
     case["nodes"]["reach"]["walls"] = {}
     case["output"]["every"] = case["numerics"]["step"] = 0.005
     result, (model, state) = fvsolve.run(case), ended(case)
     t, flow = result.seconds, result["bridge.flow"]
     integral = float(np.sum(0.5 * (flow[1:] + flow[:-1]) * np.diff(t)))
     west = model.meshed[0].x < 6.0
-    gain = (depth(model, state) - depth(model, fvsolve.initial_state(model)))[west] @ model.meshed[0].mesh.area[west]
+    gain = (depth(model, state) - depth(model, fvsolve.initial_state(model)))[west] @ model.meshed[
+        0
+    ].mesh.area[west]
     assert abs(gain) > 0.5 and integral == approx(gain, rel=4.0 * case["numerics"]["step"] ** 2)
     back = {"bridge": {"basin": "reach", "from": [6.0, 6.0], "to": [6.0, 0.0]}}
     again = fvsolve.run(case | {"output": case["output"] | {"sections": back}})
@@ -257,15 +336,22 @@ def test_the_integral_of_a_section_is_the_change_of_the_volume_beyond(scheme):
 @pytest.mark.parametrize("triangular", [False, True], ids=["grid", "triangles"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 def test_a_section_changes_no_bit(scheme, triangular, tmp_path):
-    case = pool(start={"level": "where(x < 12, 1.5, 1)", "v": 0.1}, end=3.0, numerics={"scheme": scheme})
+    case = pool(
+        start={"level": "where(x < 12, 1.5, 1)", "v": 0.1}, end=3.0, numerics={"scheme": scheme}
+    )
     case["nodes"]["reach"]["walls"] = {}
     case = on_triangles(case, tmp_path) if triangular else case
     plain = ended(case)[1].y
-    assert np.array_equal(ended(case | {"output": case["output"] | {"sections": BRIDGE}})[1].y, plain)
+    assert np.array_equal(
+        ended(case | {"output": case["output"] | {"sections": BRIDGE}})[1].y, plain
+    )
 
 
 FAULTS = {
-    "outside": ({"line": [[30, 0], [30, 6]], "crest": 2}, "levee.line: cuts no face between two cells.*24, 6"),
+    "outside": (
+        {"line": [[30, 0], [30, 6]], "crest": 2},
+        "levee.line: cuts no face between two cells.*24, 6",
+    ),
     "point": ({"line": [[3, 0]], "crest": 2}, "is not a list of 2 or more points"),
     "equal": ({"line": [[3, 0], [3, 0]], "crest": 2}, "two equal points"),
     "both": ({"line": ACROSS, "group": "a", "crest": 2}, "line.*group"),
@@ -283,19 +369,36 @@ def test_faulty_walls_are_named(fault):
 
 
 def test_walls_that_cannot_be_are_named(tmp_path):
-    refused(pool(patches={"up": {}}, walls={"up": {"line": ACROSS, "crest": 2}}), "up is also the name of a patch")
+    refused(
+        pool(patches={"up": {}}, walls={"up": {"line": ACROSS, "crest": 2}}),
+        "up is also the name of a patch",
+    )
     refused(pool(walls={"a b": {"line": ACROSS, "crest": 2}}), "not a valid name")
     moving = pool(patches={"up": {"travel": 0.0}})
     refused(moving, "walls: is not supported for a basin with a moving wall")
     mesh = on_triangles(pool(patches={"up": {}, "down": {}}), tmp_path)
     mesh["nodes"]["reach"]["walls"] = {"levee": {"group": "leve", "crest": 2}}
-    refused(mesh, "no such group in t.msh; groups of its outline are down and up|no such group in t.msh")
+    refused(
+        mesh, "no such group in t.msh; groups of its outline are down and up|no such group in t.msh"
+    )
     mesh["nodes"]["reach"] |= {"walls": {"levee": {"group": "up", "crest": 2}}, "patches": {}}
     refused(mesh, "levee.group: cuts no face")
-    liquid = {"type": "basin", "physics": "liquid", "size": [1, 1], "cells": [2, 2], "pressure": 1e5, "thickness": 1}
-    refused(scene({"a": liquid | {"walls": {}}}, {}, 1.0, NUMERICS), "walls: is not a key of physics")
+    liquid = {
+        "type": "basin",
+        "physics": "liquid",
+        "size": [1, 1],
+        "cells": [2, 2],
+        "pressure": 1e5,
+        "thickness": 1,
+    }
+    refused(
+        scene({"a": liquid | {"walls": {}}}, {}, 1.0, NUMERICS), "walls: is not a key of physics"
+    )
     sections = {"s": {"basin": "a", "from": [0.5, 0], "to": [0.5, 1]}}
-    refused(scene({"a": liquid}, {}, 1.0, NUMERICS, output={"sections": sections}), "a has the physics .liquid.; exp")
+    refused(
+        scene({"a": liquid}, {}, 1.0, NUMERICS, output={"sections": sections}),
+        "a has the physics .liquid.; exp",
+    )
 
 
 def test_a_wall_below_the_bed_is_noted_and_changes_no_bit():
@@ -303,17 +406,28 @@ def test_a_wall_below_the_bed_is_noted_and_changes_no_bit():
     case["nodes"]["reach"]["walls"]["levee"]["crest"] = 0.1
     model, state = ended(case)
     assert ["levee has no effect" in note.text for note in model.warnings] == [True]
-    assert np.array_equal(state.y, ended(case | {"nodes": {"reach": case["nodes"]["reach"] | {"walls": {}}}})[1].y)
+    assert np.array_equal(
+        state.y, ended(case | {"nodes": {"reach": case["nodes"]["reach"] | {"walls": {}}}})[1].y
+    )
 
 
 SECTIONS = {
-    "outside": ({"basin": "reach", "from": [3, -1], "to": [3, 6]}, "bridge.from: 3,-1 m lies outside the mesh"),
+    "outside": (
+        {"basin": "reach", "from": [3, -1], "to": [3, 6]},
+        "bridge.from: 3,-1 m lies outside the mesh",
+    ),
     "in a hole": (
         {"basin": "reach", "from": [8.5, 2.5], "to": [3, 6]},
         "bridge.from: 8.5,2.5 m lies outside the mesh or",
     ),
-    "short": ({"basin": "reach", "from": [3.1, 1.1], "to": [3.2, 1.2]}, "cuts no face between two cells"),
-    "nowhere": ({"basin": "reech", "from": [3, 0], "to": [3, 6]}, "no basin named .reech.; did you mean .reach"),
+    "short": (
+        {"basin": "reach", "from": [3.1, 1.1], "to": [3.2, 1.2]},
+        "cuts no face between two cells",
+    ),
+    "nowhere": (
+        {"basin": "reech", "from": [3, 0], "to": [3, 6]},
+        "no basin named .reech.; did you mean .reach",
+    ),
     "point": ({"basin": "reach", "from": [3, 0], "to": [3, 0]}, "also the start of the line"),
 }
 
@@ -326,9 +440,17 @@ def test_faulty_sections_are_named(fault):
 
 def test_names_of_sections_differ_from_those_of_parts_and_their_probes_are_known():
     section = {"basin": "reach", "from": [3, 0], "to": [3, 6]}
-    refused(pool(sections={"reach": section}), "reach is also a name in `nodes`; expected another name")
-    refused(pool(sections={"bridge": section}, probes=["brige.flow"]), "no part named .brige.*did you mean .bridge")
-    refused(pool(sections={"bridge": section}, probes=["bridge.depth"]), "section, which has no .depth.; it has flow")
+    refused(
+        pool(sections={"reach": section}), "reach is also a name in `nodes`; expected another name"
+    )
+    refused(
+        pool(sections={"bridge": section}, probes=["brige.flow"]),
+        "no part named .brige.*did you mean .bridge",
+    )
+    refused(
+        pool(sections={"bridge": section}, probes=["bridge.depth"]),
+        "section, which has no .depth.; it has flow",
+    )
     case = pool(sections={"bridge": section}, end=0.1)
     assert "bridge.flow" in fvsolve.run(case).probes  # by default
 
@@ -336,13 +458,34 @@ def test_names_of_sections_differ_from_those_of_parts_and_their_probes_are_known
 def test_a_basin_has_walls_and_interior_patches_together():
     """Water behind a wall drains through a gully; the other side keeps its level, at rest to the bit."""
     gully = {"at": [1.5, 1.5], "area": 1.0}
-    basin = {"type": "basin", "size": [10.0, 4.0], "cells": [20, 8], "level": 0.5, "elevation": 0.0,
-             "walls": {"bund": {"line": [[5, -1], [5, 5]], "crest": 0.8}}, "patches": {"gully": gully}}  # fmt: skip
-    lid = {"type": "manhole", "from": "yard.gully", "to": "shaft", "crest": 0.0, "area": 0.28, "perimeter": 1.9}
+    basin = {
+        "type": "basin",
+        "size": [10.0, 4.0],
+        "cells": [20, 8],
+        "level": 0.5,
+        "elevation": 0.0,
+        "walls": {"bund": {"line": [[5, -1], [5, 5]], "crest": 0.8}},
+        "patches": {"gully": gully},
+    }
+    lid = {
+        "type": "manhole",
+        "from": "yard.gully",
+        "to": "shaft",
+        "crest": 0.0,
+        "area": 0.28,
+        "perimeter": 1.9,
+    }
     nodes = {"yard": basin, "shaft": {"type": "tank", "area": 2.0, "elevation": -2.0, "level": 0.5}}
     numerics = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
     found = fvsolve.run(
-        scene(nodes, {"lid": lid}, 30.0, numerics, ["yard.depth@8,2", "yard.volume", "shaft.level"], 1.0)
+        scene(
+            nodes,
+            {"lid": lid},
+            30.0,
+            numerics,
+            ["yard.depth@8,2", "yard.volume", "shaft.level"],
+            1.0,
+        )
     )
     assert (found["yard.depth@8,2"] == 0.5).all()
     assert found["yard.volume"] + 2.0 * found["shaft.level"] == approx(20.0 + 1.0, rel=1e-12)

@@ -36,7 +36,10 @@ def test_a_rectangle_agrees_with_its_formula_at_first_order():
     left, right, inner = mesh.left, np.where(mesh.right < 0, mesh.left, mesh.right), mesh.inner
     wall = (mesh.right < 0)[:, None]
     u = (q / h).T
-    un, ut = (np.sum(u[left] * mesh.normal, 1), u[left] - np.sum(u[left] * mesh.normal, 1)[:, None] * mesh.normal)
+    un, ut = (
+        np.sum(u[left] * mesh.normal, 1),
+        u[left] - np.sum(u[left] * mesh.normal, 1)[:, None] * mesh.normal,
+    )
     vn = np.where(wall[:, 0], -un, np.sum(u[right] * mesh.normal, 1))
     vt = np.where(wall, ut, u[right] - np.sum(u[right] * mesh.normal, 1)[:, None] * mesh.normal)
     bed = np.maximum(plan[1] - plan[0], -np.inf)
@@ -54,7 +57,10 @@ def test_a_rectangle_agrees_with_its_formula_at_first_order():
     flux = np.column_stack([mass, push[:, None] * mesh.normal + along]) * mesh.length[:, None]
     rates = np.zeros((n, 3))
     step = np.zeros((len(left), 3))
-    for cells, water, sign, chosen in ((left, a, 1.0, slice(None)), (right, b, -1.0, slice(0, inner))):
+    for cells, water, sign, chosen in (
+        (left, a, 1.0, slice(None)),
+        (right, b, -1.0, slice(0, inner)),
+    ):
         step[:, 1:] = (G / 2 * (h[cells] ** 2 - water**2) * mesh.length)[:, None] * mesh.normal
         np.subtract.at(rates, cells[chosen], sign * (flux + step)[chosen])
     found, _ = field.shallow(UPWIND, plan, np.stack([h - plan[0], *q]))
@@ -65,7 +71,9 @@ def test_a_rectangle_agrees_with_its_formula_at_first_order():
 @pytest.mark.parametrize("kind", ["triangles", "quads", "mixed"])
 @pytest.mark.parametrize("scheme", [UPWIND, MUSCL], ids=["upwind", "muscl"])
 def test_a_lake_with_dry_islands_rests_to_the_bit_and_no_water_is_lost(tmp_path, kind, scheme):
-    field = mixed(tmp_path) if kind == "mixed" else triangles(tmp_path, 12, 9, quads=kind == "quads")
+    field = (
+        mixed(tmp_path) if kind == "mixed" else triangles(tmp_path, 12, 9, quads=kind == "quads")
+    )
     plan = field.lake(hilly(field))
     assert (plan[0] == 0).sum() > 5 and (plan[0] > 0).sum() > 5
     assert not field.shallow(scheme, plan, np.zeros((3, len(plan[0]))))[0].any()
@@ -87,7 +95,13 @@ def test_no_depth_falls_below_zero_when_a_dam_breaks_over_islands(tmp_path, kind
     y = np.zeros((3, len(plan[0])))
     y[0, field.centre[:, 0] < 1.0] = 1.0
     lowest, start = [], (plan[0] + y[0]) @ field.area
-    end = march(lambda y: field.shallow(MUSCL, plan, y), y, 1.5, 0.5, lambda y: lowest.append((plan[0] + y[0]).min()))
+    end = march(
+        lambda y: field.shallow(MUSCL, plan, y),
+        y,
+        1.5,
+        0.5,
+        lambda y: lowest.append((plan[0] + y[0]).min()),
+    )
     assert min(lowest) >= -1e-16
     assert (plan[0] + end[0]) @ field.area == approx(start, rel=1e-13)
 
@@ -99,7 +113,9 @@ def stoker(x, t, high, low):
     h = brentq(lambda h: 2 * (c - math.sqrt(G * h)) - shock(h), low, high, xtol=1e-14)
     u = shock(h)
     fan = (2 * c - x / t) ** 2 / (9 * G)
-    return np.select([x < -c * t, x < (u - math.sqrt(G * h)) * t, x < h * u / (h - low) * t], [high, fan, h], low)
+    return np.select(
+        [x < -c * t, x < (u - math.sqrt(G * h)) * t, x < h * u / (h - low) * t], [high, fan, h], low
+    )
 
 
 def test_a_dam_breaks_on_triangles_as_in_the_exact_solution(tmp_path):
@@ -132,7 +148,9 @@ def test_a_vortex_stands_over_a_hill_with_the_order_of_its_scheme(tmp_path, sche
     assert min(found) > order - 0.3
 
 
-@pytest.mark.parametrize(("scheme", "angle"), [(UPWIND, 0.7), (MUSCL, 0.5 * math.pi)], ids=["upwind", "muscl"])
+@pytest.mark.parametrize(
+    ("scheme", "angle"), [(UPWIND, 0.7), (MUSCL, 0.5 * math.pi)], ids=["upwind", "muscl"]
+)
 def test_a_turned_mesh_gives_turned_rates(tmp_path, scheme, angle):
     """The rotation for muscl is a right angle, because slopes of both components are limited separately."""
     rng = np.random.default_rng(4)
@@ -143,7 +161,10 @@ def test_a_turned_mesh_gives_turned_rates(tmp_path, scheme, angle):
     y = np.stack([0.1 * rng.random(n), *0.3 * rng.standard_normal((2, n))])
     turned = np.stack([y[0], *turn @ y[1:]])
     plan = fields[0].lake(hilly(fields[0]))
-    for rates in (lambda f, y: f.shallow(scheme, plan, y), lambda f, y: f.liquid(LAW_LOG, scheme, 100 * y)):
+    for rates in (
+        lambda f, y: f.shallow(scheme, plan, y),
+        lambda f, y: f.liquid(LAW_LOG, scheme, 100 * y),
+    ):
         (one, fast), (other, fast_too) = rates(fields[0], y), rates(fields[1], turned)
         assert np.stack([one[0], *turn @ one[1:]]) == approx(other, abs=1e-11 * np.abs(one).max())
         assert fast == approx(fast_too, rel=1e-12)
@@ -175,7 +196,8 @@ def test_a_plane_wave_comes_back_from_a_side_as_its_share(tmp_path, reflect):
     x = field.centre[:, 0]
     pulse = np.exp(-(((x - 0.6) / 0.1) ** 2))
     y = np.stack([pulse, C * pulse, 0 * x])
-    end = march(lambda y: field.liquid(LAW_LINEAR, MUSCL, y, share), y, 0.08, 0.5)  # 1.4 reflects to 0.6
+    # 1.4 reflects to 0.6
+    end = march(lambda y: field.liquid(LAW_LINEAR, MUSCL, y, share), y, 0.08, 0.5)
     back = np.stack([reflect * pulse, -reflect * C * pulse, 0 * x])
     assert (np.abs(end - back)[0] @ field.area) < 0.03 * (pulse @ field.area)
 
@@ -191,8 +213,12 @@ def test_a_log_liquid_parts_as_in_the_exact_riemann_problem(tmp_path):
         y[0] = np.where(x < 0, fluid.rho(40000.0), RHO) - RHO
         z = march(lambda y, f=field: f.liquid(LAW_LOG, MUSCL, y), y, t, 0.5)
         p, u = np.array([exact.at(xi) for xi in x / t]).T
-        errors.append([np.abs(z[0] + RHO - fluid.rho(p)).mean(), np.abs(z[1] - fluid.rho(p) * u).mean()])
-    assert (np.array(errors[0]) / errors[1] > 2.0**0.6).all() and errors[1][0] < 0.01 * (fluid.rho(40000.0) - RHO)
+        errors.append(
+            [np.abs(z[0] + RHO - fluid.rho(p)).mean(), np.abs(z[1] - fluid.rho(p) * u).mean()]
+        )
+    assert (np.array(errors[0]) / errors[1] > 2.0**0.6).all() and errors[1][0] < 0.01 * (
+        fluid.rho(40000.0) - RHO
+    )
 
 
 def test_uniform_values_stay_and_no_amount_is_lost(tmp_path):
@@ -202,7 +228,9 @@ def test_uniform_values_stay_and_no_amount_is_lost(tmp_path):
     rng = np.random.default_rng(5)
     depth = 0.5 + rng.random(n)
     for scheme in (UPWIND, MUSCL):
-        found, rate = field.advection(scheme, flow, 0.7 * depth, np.full(b, 0.7), depth, diffusivity=0.01)
+        found, rate = field.advection(
+            scheme, flow, 0.7 * depth, np.full(b, 0.7), depth, diffusivity=0.01
+        )
         assert np.abs(found).max() < 1e-14 * rate
         closed = np.where(np.arange(len(flow)) < field.mesh.inner, flow, 0.0)
         found, _ = field.advection(scheme, closed, rng.random(n), diffusivity=0.01)
@@ -217,20 +245,26 @@ def test_a_bump_is_carried_over_triangles_with_the_order_of_its_scheme(tmp_path,
         flow = field.stream(lambda x, y: 0.8 * y - 0.5 * x)
         bump = lambda x, y: np.cos(math.pi * np.minimum(np.hypot(x, y) / 0.25, 1.0)) / 2 + 0.5  # noqa: E731
         x, y = field.centre.T
-        c = march(lambda s, f=field, q=flow: f.advection(scheme, q, s), bump(x - 0.3, y - 0.35), 0.4, 0.5)
+        c = march(
+            lambda s, f=field, q=flow: f.advection(scheme, q, s), bump(x - 0.3, y - 0.35), 0.4, 0.5
+        )
         errors.append(np.abs(c - bump(x - 0.62, y - 0.55)) @ field.area)
     assert observed_order(errors, [1 / n for n in sizes]) > order - 0.3
 
 
 def slotted(field) -> np.ndarray:
     x, y = field.centre.T
-    return ((np.hypot(x - 0.5, y - 0.3) < 0.2) & ~((np.abs(x - 0.5) < 0.05) & (y < 0.35))).astype(float)
+    return ((np.hypot(x - 0.5, y - 0.3) < 0.2) & ~((np.abs(x - 0.5) < 0.05) & (y < 0.35))).astype(
+        float
+    )
 
 
 KEEPS = {  # scheme, `wide` of the limiter, bounds, greatest Courant number of Euler steps
-    "upwind": (UPWIND, 1.0, FREE, 1.0), "narrow": (MUSCL, 1.0, FREE, 2 / 3),
-    "narrow, bounded": (MUSCL, 1.0, (0.0, 1.0), 1.0), "wide": (MUSCL, WIDE, (0.0, 1.0), 1.0),
-}  # fmt: skip
+    "upwind": (UPWIND, 1.0, FREE, 1.0),
+    "narrow": (MUSCL, 1.0, FREE, 2 / 3),
+    "narrow, bounded": (MUSCL, 1.0, (0.0, 1.0), 1.0),
+    "wide": (MUSCL, WIDE, (0.0, 1.0), 1.0),
+}
 
 
 @pytest.mark.in_turn
@@ -252,14 +286,19 @@ def test_a_slotted_disk_stays_between_its_bounds(tmp_path, name, quads):
 def test_a_step_of_euler_stays_within_bounds_in_random_flows_and_depths(tmp_path, wide):
     """Values start at their bounds, with random flows through faces, which also change depths."""
     for seed in range(40):
-        random, field = np.random.default_rng(seed), mixed(tmp_path) if seed % 2 else triangles(tmp_path, 9, 7)
+        random, field = (
+            np.random.default_rng(seed),
+            mixed(tmp_path) if seed % 2 else triangles(tmp_path, 9, 7),
+        )
         n = len(field.area)
         flow, depth = random.normal(size=len(field.mesh.left)), 0.1 + random.random(n)
         c = random.choice([-0.5, 1.0, random.uniform(-0.5, 1.0)], n)
         outside, bounds = random.uniform(-0.5, 1.0, len(field.edge)), (-0.5, 1.0)
         given = {"depth": depth, "wide": wide, "bounds": bounds}
         rate, quickest = field.advection(MUSCL, flow, c * depth, outside, **given)
-        filled, _ = field.advection(MUSCL, flow, depth, np.ones(len(field.edge)), **given | {"bounds": FREE})
+        filled, _ = field.advection(
+            MUSCL, flow, depth, np.ones(len(field.edge)), **given | {"bounds": FREE}
+        )
         after = (c * depth + rate / quickest) / (depth + filled / quickest)
         assert after.min() > -0.5 - 1e-13 and after.max() < 1.0 + 1e-13
 
@@ -271,7 +310,12 @@ def test_bounds_cost_a_smooth_value_nothing_that_shows(tmp_path, quads):
     def off(n, bounds):
         field = triangles(tmp_path, n, n, quads=quads)
         (x, y), flow = field.centre.T, field.stream(lambda x, y: 0.8 * y - 0.5 * x)
-        c = march(lambda s: field.advection(MUSCL, flow, s, bounds=bounds), bump(x - 0.3, y - 0.35), 0.4, 0.9)
+        c = march(
+            lambda s: field.advection(MUSCL, flow, s, bounds=bounds),
+            bump(x - 0.3, y - 0.35),
+            0.4,
+            0.9,
+        )
         return np.abs(c - bump(x - 0.62, y - 0.55)) @ field.area
 
     kept = [off(n, (0.0, 1.0)) for n in (24, 48)]
@@ -285,7 +329,9 @@ def test_diffusion_damps_a_mode_at_second_order_and_reaches_the_value_of_the_inf
     for n in sizes:
         field = triangles(tmp_path, n, n)
         still, mode = np.zeros(len(field.mesh.left)), np.cos(math.pi * field.centre).prod(1)
-        s = march(lambda s, f=field, q=still: f.advection(MUSCL, q, s, diffusivity=1.0), mode, 0.05, 0.9)
+        s = march(
+            lambda s, f=field, q=still: f.advection(MUSCL, q, s, diffusivity=1.0), mode, 0.05, 0.9
+        )
         errors.append(np.abs(s - math.exp(-2 * math.pi**2 * 0.05) * mode) @ field.area)
     assert observed_order(errors, [1 / n for n in sizes]) > 1.7
     field = triangles(tmp_path, 40, 3, (1.0, 0.1))

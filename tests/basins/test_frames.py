@@ -18,7 +18,14 @@ METHODS = ("ssp-rk3", "gauss-4", "rodas-4")
 
 
 def tank(cells=(20, 20), size=(2.0, 2.0), level=0.3, on="body", **more):
-    return {"type": "basin", "on": on, "size": list(size), "cells": list(cells), "level": level, **more}
+    return {
+        "type": "basin",
+        "on": on,
+        "size": list(size),
+        "cells": list(cells),
+        "level": level,
+        **more,
+    }
 
 
 def moved(body, basin, until, numerics=None, **nodes):
@@ -37,8 +44,14 @@ def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_i
     rate, (cx, cy) = 2.0, (0.7, 1.3)
     bowl = f"0.3 + {rate**2 / (2 * GRAVITY)} * ((x - {cx})**2 + (y - {cy})**2)"
     basin = tank((10, 10), at=[-cx, -cy, 0.0], start={"level": bowl})
-    case = {"scheme": "muscl", "method": method, **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05})}
-    model, state = ended(scene({"body": turning(straight(rate, 100.0), axis), "b": basin}, {}, 1.0, case), 1.0)
+    case = {
+        "scheme": "muscl",
+        "method": method,
+        **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05}),
+    }
+    model, state = ended(
+        scene({"body": turning(straight(rate, 100.0), axis), "b": basin}, {}, 1.0, case), 1.0
+    )
     found = model.meshed[0].deviations(state.y)
     assert np.abs(found[1:]).max() < (1e-13 if method == "ssp-rk3" else 1e-10)
     assert found[0] == pytest.approx(model.meshed[0].deviations(model.start)[0], abs=1e-10)
@@ -77,7 +90,11 @@ def forced(x, length, w, push, depth=0.3):
     """V(x) [m/s] of u = V cos(w t) under the force per mass push sin(w t) in a closed box, with u = V at the start."""
     k = w / math.sqrt(GRAVITY * depth)
     a = push / w
-    return -a + a * np.cos(k * x) + a * (1.0 - math.cos(k * length)) / math.sin(k * length) * np.sin(k * x)
+    return (
+        -a
+        + a * np.cos(k * x)
+        + a * (1.0 - math.cos(k * length)) / math.sin(k * length) * np.sin(k * x)
+    )
 
 
 def start_of(length, w, push, depth=0.3, along="x"):
@@ -91,12 +108,21 @@ def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
     a, w, length, high = 1e-5, 3.0, 2.0, 1.5
     swing = {"mean": 0.0, "amplitude": a, "period": 2.0 * math.pi / w}
     rolled = a * (GRAVITY + high * w**2)  # gravity along the box, and acceleration of its bed
-    push = {"sway": a * w**2, "surge": a * w**2, "heading": a * w**2, "roll": -rolled, "pitch": rolled}[way]
+    push = {
+        "sway": a * w**2,
+        "surge": a * w**2,
+        "heading": a * w**2,
+        "roll": -rolled,
+        "pitch": rolled,
+    }[way]
     along = "y" if way in ("surge", "roll") else "x"
     body = {
-        "sway": sliding(swing), "surge": sliding(swing, (0, 1, 0)), "heading": sliding(swing, (0, 1, 0)),
-        "pitch": turning(swing, (0, 1, 0)), "roll": turning(swing, (1, 0, 0)),
-    }[way]  # fmt: skip
+        "sway": sliding(swing),
+        "surge": sliding(swing, (0, 1, 0)),
+        "heading": sliding(swing, (0, 1, 0)),
+        "pitch": turning(swing, (0, 1, 0)),
+        "roll": turning(swing, (1, 0, 0)),
+    }[way]
     errors = []
     for n in (16, 32):
         more = {"start": {"u" if along == "x" else "v": start_of(length, w, push, along=along)}}
@@ -134,8 +160,9 @@ def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still()
     bed = f"{h0 / a**2} * ((x - 2)**2 + (y - 2)**2)"
     start = {
         "level": f"{h0} + {eta * h0 / a**2} * (2 * (x - 2) - {eta})",
-        "u": f"{spin} * (y - 2)", "v": f"{eta * w} - {spin} * (x - 2)",
-    }  # fmt: skip
+        "u": f"{spin} * (y - 2)",
+        "v": f"{eta * w} - {spin} * (x - 2)",
+    }
     errors = []
     for n in (30, 60):
         basin = tank((n, n), (4.0, 4.0), level=h0, at=[-2.0, -2.0, 0.0], bed=bed, start=start)
@@ -143,7 +170,10 @@ def test_thackers_bowl_seen_from_axes_that_swing_is_the_bowl_that_stands_still()
         one = model.meshed[0]
         angle = amplitude * math.sin(2.0 * math.pi * end / period)
         x, y = one.x - 2.0, one.y - 2.0
-        east, north = math.cos(angle) * x - math.sin(angle) * y, math.sin(angle) * x + math.cos(angle) * y
+        east, north = (
+            math.cos(angle) * x - math.sin(angle) * y,
+            math.sin(angle) * x + math.cos(angle) * y,
+        )
         wanted = np.maximum(depth(east, north, end), 0.0)
         errors.append(np.abs(one.depth + found[0] - wanted).sum() / wanted.sum())
     assert errors[1] < errors[0] / 2.0
@@ -160,15 +190,26 @@ def test_a_tank_that_falls_freely_ends_the_run_by_name():
 # faults ----------
 
 FAULTS = {
-    "has no effect on a body; give the position in the axes of body as `at`": ({}, {"elevation": 1.0}),
+    "has no effect on a body; give the position in the axes of body as `at`": (
+        {},
+        {"elevation": 1.0},
+    ),
     "expected a body: body; did you mean": ({}, {"on": "bdy"}),
     "give the body as `on = BODY`": ({}, {"on": None, "at": [0, 0, 1]}),
     "and the reaction to outflow is not modelled": (
-        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}}, {"patches": {"gap": {"side": "east", "boundary": "open"}}}),
-    "cannot be on a body; expected": ({}, {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}}),
-    "a basin on a body cannot have moving walls": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
+        {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
+        {"patches": {"gap": {"side": "east", "boundary": "open"}}},
+    ),
+    "cannot be on a body; expected": (
+        {},
+        {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}},
+    ),
+    "a basin on a body cannot have moving walls": (
+        {},
+        {"patches": {"lid": {"side": "east", "travel": 0.1}}},
+    ),
     "unknown key": ({}, {"attitude": {"rol": 0.1}}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", FAULTS)
@@ -199,9 +240,20 @@ def test_moments_are_sums_over_cells(monkeypatch, deep, grid):
     frame[REST_LEVEL] = LEVEL
     start = frame.size + places.size
     frame[CELL_POSITIONS], frame[REST_SURFACE] = frame.size, start + 2 * N
-    basin = {"n": N, "y": 0, "frame": 0, "deep": int(deep), "thickness": THICKNESS, "area": start, "plan": start + N,
-             "nx": WIDE if grid else 0, "ny": LONG if grid else 0}  # fmt: skip
-    tables = SimpleNamespace(plane=np.concatenate([frame, places, area, rest, surface]), settings=[{"rho": DENSITY}])
+    basin = {
+        "n": N,
+        "y": 0,
+        "frame": 0,
+        "deep": int(deep),
+        "thickness": THICKNESS,
+        "area": start,
+        "plan": start + N,
+        "nx": WIDE if grid else 0,
+        "ny": LONG if grid else 0,
+    }
+    tables = SimpleNamespace(
+        plane=np.concatenate([frame, places, area, rest, surface]), settings=[{"rho": DENSITY}]
+    )
     found = frame_forces.mass_moments.py_func(
         tables, basin, np.concatenate([h, qx, qy]), np.concatenate([dh, dx, dy]), 0, 0.0, 0.0, 0.0
     )

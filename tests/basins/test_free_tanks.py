@@ -17,21 +17,46 @@ LENGTH, DEPTH = 2.0, 0.1
 
 def tank(n=20, along="x", level=DEPTH, **more):
     cells, size = ((n, 1), (LENGTH, 1.0)) if along == "x" else ((1, n), (1.0, LENGTH))
-    return {"type": "basin", "on": "cart", "size": list(size), "cells": list(cells), "level": level, **more}
+    return {
+        "type": "basin",
+        "on": "cart",
+        "size": list(size),
+        "cells": list(cells),
+        "level": level,
+        **more,
+    }
 
 
 def sprung(basin, body, stiffness, end, numerics, probes, toward=(5.0, 0, 0), **spring):
     world = {"type": "frame", "points": {"far": list(toward)}}
-    links = {"spring": {"type": "spring", "from": "cart", "to": "world.far", "stiffness": stiffness, **spring}}
+    links = {
+        "spring": {
+            "type": "spring",
+            "from": "cart",
+            "to": "world.far",
+            "stiffness": stiffness,
+            **spring,
+        }
+    }
     nodes = {"cart": body, "world": world, "b": basin}
-    return scene(nodes, links, end, {"scheme": "upwind5", "method": "rk4", **numerics}, probes, every=0.01)
+    return scene(
+        nodes, links, end, {"scheme": "upwind5", "method": "rk4", **numerics}, probes, every=0.01
+    )
 
 
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
 def test_water_at_rest_on_a_vertical_spring_swings_as_frozen_mass(method):
     stiff, water = 2e4, RHO * DEPTH * LENGTH
-    case = sprung(tank(4), cart(axis=(0, 0, 1), rate=0.05), stiff, 1.0, {"method": method, "step": 2e-3},
-                  ["cart.z", "b.speed@1,0.5"], (0, 0, 9.0), preload=-(100.0 + water) * GRAVITY)  # fmt: skip
+    case = sprung(
+        tank(4),
+        cart(axis=(0, 0, 1), rate=0.05),
+        stiff,
+        1.0,
+        {"method": method, "step": 2e-3},
+        ["cart.z", "b.speed@1,0.5"],
+        (0, 0, 9.0),
+        preload=-(100.0 + water) * GRAVITY,
+    )
     result = run(case)
     w = math.sqrt(stiff / (100.0 + water))
     assert np.abs(result["cart.z"] - 0.05 / w * np.sin(w * result.t)).max() < 1e-6 * 0.05 / w
@@ -40,7 +65,16 @@ def test_water_at_rest_on_a_vertical_spring_swings_as_frozen_mass(method):
 
 def test_a_tank_at_rest_on_its_spring_does_not_move_by_a_bit():
     preload = -(100.0 + RHO * DEPTH * LENGTH) * GRAVITY
-    case = sprung(tank(8), cart(axis=(0, 0, 1)), 2e4, 1.0, {"step": 2e-3}, ["cart.z"], (0, 0, 9.0), preload=preload)
+    case = sprung(
+        tank(8),
+        cart(axis=(0, 0, 1)),
+        2e4,
+        1.0,
+        {"step": 2e-3},
+        ["cart.z"],
+        (0, 0, 9.0),
+        preload=preload,
+    )
     result = run(case)
     assert np.ptp(result["cart.z"]) == 0.0
 
@@ -64,8 +98,16 @@ def test_a_tank_on_a_spring_swings_at_the_root_of_the_tangent_law(along):
         flow = f"{speed} * (cos({k} * {along}) + {ratio} * sin({k} * {along}) - 1)"
         basin = tank(n, along, start={"u" if along == "x" else "v": flow})
         toward = tuple(5.0 * a for a in axis)
-        case = sprung(basin, cart(mass, axis, rate=speed), stiff, 4.0, {"step": 0.1 / n}, ["cart.rate"], toward,
-                      preload=0.0)  # fmt: skip
+        case = sprung(
+            basin,
+            cart(mass, axis, rate=speed),
+            stiff,
+            4.0,
+            {"step": 0.1 / n},
+            ["cart.rate"],
+            toward,
+            preload=0.0,
+        )
         result = run(case)
         errors.append(np.abs(result["cart.rate"] - speed * np.cos(w * result.t)).max() / speed)
     assert errors[1] < errors[0] / 2.5
@@ -95,18 +137,41 @@ def test_a_free_tank_on_rails_conserves_its_momentum():
 def rocking(n=24, **numerics):
     """Return a case of a hull with a transverse tank that rolls on two springs."""
     hull = {
-        "type": "body", "mass": 400.0, "inertia": [800.0, 800.0, 800.0], "centre_of_mass": [0, 0, -0.5],
+        "type": "body",
+        "mass": 400.0,
+        "inertia": [800.0, 800.0, 800.0],
+        "centre_of_mass": [0, 0, -0.5],
         "points": {"right": [0, 2.0, 0], "left": [0, -2.0, 0]},
         "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": 0.03},
-    }  # fmt: skip
-    basin = {"type": "basin", "on": "hull", "at": [-0.5, -1.0, 0.4], "size": [1.0, 2.0], "cells": [1, n], "level": 0.1}
+    }
+    basin = {
+        "type": "basin",
+        "on": "hull",
+        "at": [-0.5, -1.0, 0.4],
+        "size": [1.0, 2.0],
+        "cells": [1, n],
+        "level": 0.1,
+    }
     world = {"type": "frame", "points": {"right": [0, 2.0, -3.0], "left": [0, -2.0, -3.0]}}
     links = {
-        side: {"type": "spring", "from": f"world.{side}", "to": f"hull.{side}", "stiffness": 400.0, "preload": 0.0}
+        side: {
+            "type": "spring",
+            "from": f"world.{side}",
+            "to": f"hull.{side}",
+            "stiffness": 400.0,
+            "preload": 0.0,
+        }
         for side in ("right", "left")
     }
     nodes = {"hull": hull, "world": world, "b": basin}
-    return scene(nodes, links, 2.0, {"scheme": "muscl", "method": "ssp-rk3", **numerics}, ["hull.angle"], every=0.02)
+    return scene(
+        nodes,
+        links,
+        2.0,
+        {"scheme": "muscl", "method": "ssp-rk3", **numerics},
+        ["hull.angle"],
+        every=0.02,
+    )
 
 
 def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_created():
@@ -123,11 +188,26 @@ def test_energy_of_a_hull_and_its_water_is_lost_by_the_scheme_alone_and_never_cr
 
 def test_work_on_a_driven_tank_is_the_gain_and_the_loss_of_its_water():
     body = {
-        "type": "body", "mass": 50.0, "inertia": [5.0, 5.0, 5.0],
-        "joint": {"kind": "revolute", "axis": [0, 1, 0], "angle": {"mean": 0, "amplitude": 0.03, "period": 1.7}},
-    }  # fmt: skip
-    basin = {"type": "basin", "on": "cart", "at": [-1, -0.5, 0.6], "size": [2.0, 1.0], "cells": [30, 2], "level": 0.2}
-    case = scene({"cart": body, "b": basin}, {}, 1.6, {"scheme": "muscl", "method": "ssp-rk3", "step": 2e-3})
+        "type": "body",
+        "mass": 50.0,
+        "inertia": [5.0, 5.0, 5.0],
+        "joint": {
+            "kind": "revolute",
+            "axis": [0, 1, 0],
+            "angle": {"mean": 0, "amplitude": 0.03, "period": 1.7},
+        },
+    }
+    basin = {
+        "type": "basin",
+        "on": "cart",
+        "at": [-1, -0.5, 0.6],
+        "size": [2.0, 1.0],
+        "cells": [30, 2],
+        "level": 0.2,
+    }
+    case = scene(
+        {"cart": body, "b": basin}, {}, 1.6, {"scheme": "muscl", "method": "ssp-rk3", "step": 2e-3}
+    )
     found = energy(case)
     passed = max(np.abs(one).max() for one in found.supplied.values())
     assert passed > 1.0
@@ -142,10 +222,19 @@ def test_frozen_water_is_the_body_that_weighs_as_much():
     """Frozen water of 2 m x 1 m x 0.1 m at an angle on its body equals a body with its mass and inertia."""
     turn = {"yaw": "30 deg", "roll": "10 deg"}
     hull = {
-        "type": "body", "mass": 300.0, "inertia": [30.0, 60.0, 70.0], "centre_of_mass": [0.1, 0.0, -0.2],
+        "type": "body",
+        "mass": 300.0,
+        "inertia": [30.0, 60.0, 70.0],
+        "centre_of_mass": [0.1, 0.0, -0.2],
         "joint": {"kind": "revolute", "axis": [0, 1, 0], "angle": 0.3},
-    }  # fmt: skip
-    basin = {**tank(8), "on": "hull", "at": [0.3, -0.2, -1.0], "attitude": turn, "sloshing": "frozen"}
+    }
+    basin = {
+        **tank(8),
+        "on": "hull",
+        "at": [0.3, -0.2, -1.0],
+        "attitude": turn,
+        "sloshing": "frozen",
+    }
     block = {
         "type": "body", "mass": 200.0, "centre_of_mass": [1.0, 0.5, 0.05],
         "inertia": [200.0 * (1 + 0.01) / 12, 200.0 * (4 + 0.01) / 12, 200.0 * 5 / 12],
@@ -159,8 +248,16 @@ def test_frozen_water_is_the_body_that_weighs_as_much():
 
 
 def test_in_heave_cells_and_frozen_water_are_equal():
-    case = sprung({**tank(1), "sloshing": "cells"}, cart(axis=(0, 0, 1), rate=0.05), 2e4, 1.0, {"step": 2e-3},
-                  ["cart.z"], (0, 0, 9.0), preload=-300.0 * GRAVITY)  # fmt: skip
+    case = sprung(
+        {**tank(1), "sloshing": "cells"},
+        cart(axis=(0, 0, 1), rate=0.05),
+        2e4,
+        1.0,
+        {"step": 2e-3},
+        ["cart.z"],
+        (0, 0, 9.0),
+        preload=-300.0 * GRAVITY,
+    )
     cells = run(case)
     case["nodes"]["b"]["sloshing"] = "frozen"
     assert run(case)["cart.z"] == pytest.approx(cells["cart.z"], abs=1e-12)
@@ -188,18 +285,39 @@ def test_a_hull_rolls_with_its_tank_at_the_root_of_the_closed_form(high):
     errors = []
     for n in (20, 40):
         hull = {
-            "type": "body", "mass": 100.0, "inertia": [inertia, 500.0, 600.0], "points": {"pin": [0, 0, 0]},
+            "type": "body",
+            "mass": 100.0,
+            "inertia": [inertia, 500.0, 600.0],
+            "points": {"pin": [0, 0, 0]},
             "joint": {"kind": "revolute", "axis": [1, 0, 0], "rate": a * w},
-        }  # fmt: skip
+        }
         basin = {
-            "type": "basin", "on": "hull", "at": [-0.5, -0.5 * LENGTH, high], "size": [1.0, LENGTH], "cells": [1, n],
-            "level": depth, "start": {"v": f"{-push} + {push} * cos({k} * y) + {tilt} * sin({k} * y)"},
-        }  # fmt: skip
+            "type": "basin",
+            "on": "hull",
+            "at": [-0.5, -0.5 * LENGTH, high],
+            "size": [1.0, LENGTH],
+            "cells": [1, n],
+            "level": depth,
+            "start": {"v": f"{-push} + {push} * cos({k} * y) + {tilt} * sin({k} * y)"},
+        }
         world = {"type": "frame", "points": {"pin": [0, 0, 0]}}
-        links = {"twist": {"type": "bushing", "from": "world.pin", "to": "hull.pin", "stiffness": 1e3,
-                           "rotational_stiffness": stiff}}  # fmt: skip
-        case = scene({"hull": hull, "world": world, "b": basin}, links, 3.0,
-                     {"scheme": "upwind5", "method": "rk4", "step": 0.08 / n}, ["hull.angle"], every=0.02)  # fmt: skip
+        links = {
+            "twist": {
+                "type": "bushing",
+                "from": "world.pin",
+                "to": "hull.pin",
+                "stiffness": 1e3,
+                "rotational_stiffness": stiff,
+            }
+        }
+        case = scene(
+            {"hull": hull, "world": world, "b": basin},
+            links,
+            3.0,
+            {"scheme": "upwind5", "method": "rk4", "step": 0.08 / n},
+            ["hull.angle"],
+            every=0.02,
+        )
         result = run(case)
         errors.append(np.abs(result["hull.angle"] - a * np.sin(w * result.t)).max() / a)
     assert errors[1] < errors[0] / 2.5
@@ -207,10 +325,22 @@ def test_a_hull_rolls_with_its_tank_at_the_root_of_the_closed_form(high):
 
 
 def test_a_joint_holds_nothing_of_the_water_where_it_lets_its_body_move():
-    hung = {"type": "body", "mass": 300.0, "inertia": [80.0, 60.0, 90.0], "centre_of_mass": [0.1, 0.2, -0.5],
-            "joint": {"kind": "ball", "attitude": {"roll": 0.03, "yaw": 0.5}, "rate": [0.02, -0.03, 0.1]}}  # fmt: skip
+    hung = {
+        "type": "body",
+        "mass": 300.0,
+        "inertia": [80.0, 60.0, 90.0],
+        "centre_of_mass": [0.1, 0.2, -0.5],
+        "joint": {
+            "kind": "ball",
+            "attitude": {"roll": 0.03, "yaw": 0.5},
+            "rate": [0.02, -0.03, 0.1],
+        },
+    }
     heaves = cart(axis=(0, 0, 1), rate=0.05)
-    held = {"tx ty tz": (hung, tank(8, at=[-0.7, -0.2, -0.4], attitude={"roll": 0.05})), "fz": (heaves, tank(4))}
+    held = {
+        "tx ty tz": (hung, tank(8, at=[-0.7, -0.2, -0.4], attitude={"roll": 0.05})),
+        "fz": (heaves, tank(4)),
+    }
     for free, (body, basin) in held.items():
         probes = [f"cart.joint_{one}{axis}" for one in "ft" for axis in "xyz"]
         numerics = {"scheme": "muscl", "method": "rk4", "courant": 0.5}

@@ -18,20 +18,49 @@ from fvsolve.errors import CaseError
 
 SIZE = 10.0
 HOLE = {"at": [4.5, 5.5], "area": 1.0}
-LID = {"type": "manhole", "from": "pond.hole", "to": "shaft", "crest": 0.2, "area": 0.28, "perimeter": 1.9}
+LID = {
+    "type": "manhole",
+    "from": "pond.hole",
+    "to": "shaft",
+    "crest": 0.2,
+    "area": 0.28,
+    "perimeter": 1.9,
+}
 SHAFT = {"type": "tank", "area": 4.0, "elevation": -2.0, "level": 0.5}
-WIDE = {"type": "orifice", "from": "pond.hole", "to": "shaft", "area": 20.0, "discharge_coefficient": 0.6}
+WIDE = {
+    "type": "orifice",
+    "from": "pond.hole",
+    "to": "shaft",
+    "area": 20.0,
+    "discharge_coefficient": 0.6,
+}
 
 
-def pond(link=LID, shaft=SHAFT, end=20.0, cells=(10, 10), numerics=None, hole=HOLE, probes=(), **basin):
+def pond(
+    link=LID, shaft=SHAFT, end=20.0, cells=(10, 10), numerics=None, hole=HOLE, probes=(), **basin
+):
     """Square pond with an interior patch that a link joins to a shaft."""
-    own = {"type": "basin", "size": [SIZE, SIZE], "cells": list(cells), "level": 1.0, "elevation": 0.0,
-           "patches": {"hole": hole}, **basin}  # fmt: skip
+    own = {
+        "type": "basin",
+        "size": [SIZE, SIZE],
+        "cells": list(cells),
+        "level": 1.0,
+        "elevation": 0.0,
+        "patches": {"hole": hole},
+        **basin,
+    }
     given = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9} | (numerics or {})
     given = {key: value for key, value in given.items() if value is not None}
     links, nodes = ({"lid": link}, {"pond": own, "shaft": shaft}) if link else ({}, {"pond": own})
     names = [*(["lid.flow", "shaft.level"] if link else []), "pond.hole.level", "pond.volume"]
-    return scene(nodes, links, end, given, probes or names[:: 1 if shaft.get("type") == "tank" else 2], end / 50)
+    return scene(
+        nodes,
+        links,
+        end,
+        given,
+        probes or names[:: 1 if shaft.get("type") == "tank" else 2],
+        end / 50,
+    )
 
 
 @pytest.mark.parametrize("cells", [(10, 10), (20, 20)])
@@ -52,11 +81,14 @@ def test_a_pond_fills_a_shaft_through_a_manhole_as_a_tank_does(cells):
 def test_the_level_of_a_spring_is_that_around_it():
     """A steady radial inflow q = Q / (2 pi r) has the level of its surroundings, less its velocity head."""
     flow = 0.05
-    case = pond(None, end=6.0, cells=(101, 101), hole={"at": [5.05, 4.95], "area": 0.01, "discharge": flow})
+    case = pond(
+        None, end=6.0, cells=(101, 101), hole={"at": [5.05, 4.95], "area": 0.01, "discharge": flow}
+    )
     found = fvsolve.run(case)
     assert found["pond.volume"][-1] - found["pond.volume"][0] == approx(6.0 * flow, abs=1e-10)
     mean = 1.0 + 6.0 * flow / SIZE**2
-    assert found["pond.hole.level"][-1] == approx(mean, abs=2.5e-3)  # 5 percent of the drop Q / (c P / 4)
+    # 5 percent of the drop Q / (c P / 4)
+    assert found["pond.hole.level"][-1] == approx(mean, abs=2.5e-3)
 
 
 @pytest.mark.parametrize("link", [WIDE, LID], ids=["orifice", "manhole"])
@@ -73,7 +105,14 @@ ROUGH = "0.3*sin(1.7*x)*cos(2.3*y) + 0.15*x - 0.4"  # with dry cells at the leve
 @pytest.mark.parametrize("at", [[4.5, 5.5], [7.7, 2.2]])  # the second place is half dry
 @pytest.mark.parametrize("path", ["grid", "triangles"])
 def test_at_rest_not_a_bit_moves(at, path, tmp_path):
-    case = pond(WIDE, lake(0.6, elevation=0.0), level=0.6, bed=ROUGH, cells=(20, 20), hole={"at": at, "area": 4.0})
+    case = pond(
+        WIDE,
+        lake(0.6, elevation=0.0),
+        level=0.6,
+        bed=ROUGH,
+        cells=(20, 20),
+        hole={"at": at, "area": 4.0},
+    )
     model = model_of(case if path == "grid" else on_triangles(case, tmp_path))
     assert (model.meshed[0].depth == 0.0).any()
     dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
@@ -84,20 +123,31 @@ def on_triangles(case: dict, folder) -> dict:
     """The same case with triangles."""
     points, cells = triangles((SIZE, SIZE), 0.5)
     write(folder / "t.msh", points, cells.tolist(), {"rim": boundary(cells)})
-    basin = {key: value for key, value in case["nodes"]["pond"].items() if key not in ("size", "cells")}
-    return case | {"nodes": case["nodes"] | {"pond": basin | {"mesh": {"file": str(folder / "t.msh")}}}}
+    basin = {
+        key: value for key, value in case["nodes"]["pond"].items() if key not in ("size", "cells")
+    }
+    return case | {
+        "nodes": case["nodes"] | {"pond": basin | {"mesh": {"file": str(folder / "t.msh")}}}
+    }
 
 
-METHODS = {"ssp-rk2": {}, "rk4": {}, "dormand-prince": {"rtol": 1e-7, "courant": None},
-           "implicit-midpoint": {"step": 0.05, "courant": None}, "radau-iia-5": {"rtol": 1e-7, "courant": None},
-           "rodas-5p": {"rtol": 1e-7, "courant": None}}  # fmt: skip
+METHODS = {
+    "ssp-rk2": {},
+    "rk4": {},
+    "dormand-prince": {"rtol": 1e-7, "courant": None},
+    "implicit-midpoint": {"step": 0.05, "courant": None},
+    "radau-iia-5": {"rtol": 1e-7, "courant": None},
+    "rodas-5p": {"rtol": 1e-7, "courant": None},
+}
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_all_methods_give_the_same_flow(method):
     numerics = {"method": method, **METHODS[method], "scheme": "upwind"}
     found = fvsolve.run(pond(numerics=numerics, end=5.0))
-    exact = fvsolve.run(pond(numerics={"method": "rk4", "courant": 0.1, "scheme": "upwind"}, end=5.0))
+    exact = fvsolve.run(
+        pond(numerics={"method": "rk4", "courant": 0.1, "scheme": "upwind"}, end=5.0)
+    )
     assert found["lid.flow"] == approx(exact["lid.flow"], rel=2e-3)
     assert found["shaft.level"][-1] == approx(exact["shaft.level"][-1], rel=1e-5)
 
@@ -116,18 +166,22 @@ def test_a_pond_that_empties_and_fills_conserves_its_volume(ground, head, scheme
     assert (model.meshed[0].depth + model.meshed[0].states_of(state.y)[0]).min() > -1e-12
 
 
-@pytest.mark.parametrize("path", ["mirrored", "turned", "drawn the other way", "polygon", "resumed", "threads"])
+@pytest.mark.parametrize(
+    "path", ["mirrored", "turned", "drawn the other way", "polygon", "resumed", "threads"]
+)
 def test_a_restated_pond_gives_the_same(path, tmp_path, monkeypatch):
     bed = "0.02*x + 0.05*y"
     here = fvsolve.run(pond(bed=bed))
     if path == "resumed":
-        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+        # checkpoints after 1000, 1250, ... steps
+        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):
             monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
         run_in_two_parts(pond(bed=bed, numerics={"step": 5e-3, "courant": None}), tmp_path, 8.0)
         assert_equal_files(tmp_path, ["history.csv"])
     elif path == "threads":
         one, three = (
-            fvsolve.run(pond(bed=bed, cells=(40, 36), probes=["lid.flow"]), threads=count) for count in (1, 3)
+            fvsolve.run(pond(bed=bed, cells=(40, 36), probes=["lid.flow"]), threads=count)
+            for count in (1, 3)
         )
         assert (one["lid.flow"] == three["lid.flow"]).all() and three.summary["threads"] == 3
     elif path == "drawn the other way":
@@ -150,24 +204,48 @@ def test_a_grid_and_the_same_cells_as_a_mesh_give_the_same(tmp_path):
     corner = (11 * np.arange(10)[:, None] + np.arange(10)).ravel()
     cells = np.stack([corner, corner + 1, corner + 12, corner + 11], axis=1)
     write(tmp_path / "q.msh", np.column_stack([x, y]), cells.tolist(), {"rim": [[0, 1]]})
-    basin = {key: value for key, value in case["nodes"]["pond"].items() if key not in ("size", "cells")}
-    other = case | {"nodes": case["nodes"] | {"pond": basin | {"mesh": {"file": str(tmp_path / "q.msh")}}}}
+    basin = {
+        key: value for key, value in case["nodes"]["pond"].items() if key not in ("size", "cells")
+    }
+    other = case | {
+        "nodes": case["nodes"] | {"pond": basin | {"mesh": {"file": str(tmp_path / "q.msh")}}}
+    }
     there, here = fvsolve.run(other), fvsolve.run(case)
-    assert there["lid.flow"] == approx(here["lid.flow"], rel=1e-8)  # to the tolerance of Newton's method
+    # to the tolerance of Newton's method
+    assert there["lid.flow"] == approx(here["lid.flow"], rel=1e-8)
     assert there["pond.volume"] == approx(here["pond.volume"], rel=1e-11)
 
 
 def test_street_manhole_shaft_and_sewer_keep_their_volume_and_the_flow_turns_once():
-    street = {"type": "basin", "size": [40.0, 8.0], "cells": [40, 8], "level": 0.05, "elevation": 0.0,
-              "bed": "0.002*(40 - x)", "manning": 0.015, "patches": {"hole": {"at": [35, 4], "area": 4}}}  # fmt: skip
+    street = {
+        "type": "basin",
+        "size": [40.0, 8.0],
+        "cells": [40, 8],
+        "level": 0.05,
+        "elevation": 0.0,
+        "bed": "0.002*(40 - x)",
+        "manning": 0.015,
+        "patches": {"hole": {"at": [35, 4], "area": 4}},
+    }
     tide = {"time": [0, 60, 180, 300, 360], "value": [-1.5, -1.5, 1.0, 1.0, -1.5]}
-    nodes = {"street": street, "shaft": {"type": "tank", "area": 0.8, "elevation": -2.0, "level": 0.5},
-             "river": lake(tide, elevation=0.0)}  # fmt: skip
+    nodes = {
+        "street": street,
+        "shaft": {"type": "tank", "area": 0.8, "elevation": -2.0, "level": 0.5},
+        "river": lake(tide, elevation=0.0),
+    }
     links = {
         "lid": {**LID, "from": "street.hole", "crest": 0.01},
-        "sewer": {"type": "pipe", "from": "shaft", "to": "river", "length": 50.0, "diameter": 0.3, "wave_speed": 400.0,
-                  "cells": 5, "friction": {"model": "steady", "factor": 0.02}},
-    }  # fmt: skip
+        "sewer": {
+            "type": "pipe",
+            "from": "shaft",
+            "to": "river",
+            "length": 50.0,
+            "diameter": 0.3,
+            "wave_speed": 400.0,
+            "cells": 5,
+            "friction": {"model": "steady", "factor": 0.02},
+        },
+    }
     probes = ["lid.flow", "sewer.flow@0", "street.hole.head", "shaft.head", "street.volume"]
     numerics = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.4}
     found = fvsolve.run(scene(nodes, links, 400.0, numerics, probes, 1.0))
@@ -185,7 +263,9 @@ def test_more_than_critical_outflow_is_held_with_a_mark(drawn_by, method):
     asked, own = 8.0, {"rtol": 1e-6, "courant": None} if method != "ssp-rk2" else {}
     numerics = {"scheme": "upwind", "method": method, **own}
     if drawn_by == "discharge":
-        case = pond(None, end=20.0, hole={**HOLE, "discharge": -asked}, level=0.5, numerics=numerics)
+        case = pond(
+            None, end=20.0, hole={**HOLE, "discharge": -asked}, level=0.5, numerics=numerics
+        )
     else:
         shaft = {"type": "junction", "elevation": 0.0, "demand": asked}
         case = pond(WIDE, shaft, end=20.0, level=0.5, numerics=numerics, probes=["pond.volume"])
@@ -193,7 +273,9 @@ def test_more_than_critical_outflow_is_held_with_a_mark(drawn_by, method):
     mark, left = found.marks[-1], found["pond.volume"]
     assert found.reason == "finished" and not found.ok
     assert mark.what == "discharge held" and mark.place == "nodes.pond.hole"
-    assert mark.volume == approx(asked * 20.0 - (left[0] - left[-1]), rel=1e-9) and left.min() >= 0.0
+    assert (
+        mark.volume == approx(asked * 20.0 - (left[0] - left[-1]), rel=1e-9) and left.min() >= 0.0
+    )
     assert abs(found.ledger["mass"]["relative"]) < 1e-12
     early = (
         -np.diff(left)[0] / 0.4
@@ -206,13 +288,29 @@ FAULTS = {
     "in a hole": (HOLE, {"holes": [[4, 5, 5, 6]]}, "lies outside the mesh or in a hole"),
     "without area": ({"at": [4.5, 5.5]}, {}, "area is missing"),
     "with a side": ({**HOLE, "side": "west"}, {}, "keep one"),
-    "without area, with a side": ({"at": [4.5, 5.5], "side": "west", "stage": "1 m"}, {}, "keep one"),
-    "an area of a polygon": ({"polygon": [[1, 1], [3, 1], [3, 3]], "area": 2.0}, {}, "area and polygon are given"),
+    "without area, with a side": (
+        {"at": [4.5, 5.5], "side": "west", "stage": "1 m"},
+        {},
+        "keep one",
+    ),
+    "an area of a polygon": (
+        {"polygon": [[1, 1], [3, 1], [3, 3]], "area": 2.0},
+        {},
+        "area and polygon are given",
+    ),
     "two shapes": ({"at": [4.5, 5.5], "polygon": [[1, 1], [2, 2], [1, 2]]}, {}, "keep one"),
-    "with a closure": ({**HOLE, "stage": "1 m"}, {}, "this is an interior patch; leave this key out"),
+    "with a closure": (
+        {**HOLE, "stage": "1 m"},
+        {},
+        "this is an interior patch; leave this key out",
+    ),
     "two corners": ({"polygon": [[1, 1], [2, 2]]}, {}, "list of 3 or more points"),
     "the whole basin": ({"at": [5.0, 5.0], "area": 200.0}, {}, "contains all cells"),
-    "overlap": (HOLE, {"patches": {"hole": HOLE, "other": {"at": [4.8, 5.8], "area": 0.1}}}, "has a cell of hole too"),
+    "overlap": (
+        HOLE,
+        {"patches": {"hole": HOLE, "other": {"at": [4.8, 5.8], "area": 0.1}}},
+        "has a cell of hole too",
+    ),
 }
 
 
@@ -227,16 +325,38 @@ def test_a_faulty_interior_patch_is_named(name):
 @pytest.mark.parametrize("fall", [False, True], ids=["demand", "deep fall"])
 def test_outflow_of_an_interior_patch_is_at_most_critical(fall):
     """The rim of four cells of 1 m passes Ritter's flow at first; a demand has a mark, a deep fall has none."""
-    pool = {"type": "basin", "elevation": 0.0, "size": [20.0, 20.0], "cells": [20, 20], "level": 0.5,
-            "patches": {"gully": {"at": [10.0, 10.0], "area": 4.0}}}  # fmt: skip
+    pool = {
+        "type": "basin",
+        "elevation": 0.0,
+        "size": [20.0, 20.0],
+        "cells": [20, 20],
+        "level": 0.5,
+        "patches": {"gully": {"at": [10.0, 10.0], "area": 4.0}},
+    }
     low = {"type": "reservoir", "head": -50.0, "elevation": -60.0}
     use = low if fall else {"type": "junction", "elevation": -1.0, "demand": 30.0}
-    gate = {"type": "orifice", "from": "pool.gully", "to": "use", "area": 100.0, "discharge_coefficient": 0.6}
+    gate = {
+        "type": "orifice",
+        "from": "pool.gully",
+        "to": "use",
+        "area": 100.0,
+        "discharge_coefficient": 0.6,
+    }
     numerics = {"courant": 0.5, "end": 0.5}
-    result = fvsolve.run({"schema": 1, "title": "fall", "fluid": {"name": "Water", "temperature": 293.15},
-                          "nodes": {"pool": pool, "use": use}, "links": {"gate": gate}, "numerics": numerics,
-                          "output": {"every": 0.5, "probes": ["pool.gully.flow"]}})  # fmt: skip
-    assert result["pool.gully.flow"][0] == pytest.approx(-8.0 * 8.0 / 27.0 * (9.80665 * 0.5**3) ** 0.5, rel=1e-6)
+    result = fvsolve.run(
+        {
+            "schema": 1,
+            "title": "fall",
+            "fluid": {"name": "Water", "temperature": 293.15},
+            "nodes": {"pool": pool, "use": use},
+            "links": {"gate": gate},
+            "numerics": numerics,
+            "output": {"every": 0.5, "probes": ["pool.gully.flow"]},
+        }
+    )
+    assert result["pool.gully.flow"][0] == pytest.approx(
+        -8.0 * 8.0 / 27.0 * (9.80665 * 0.5**3) ** 0.5, rel=1e-6
+    )
     assert result.reason == "finished" and result.ok is fall
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
     held = [mark for mark in result.marks if mark.what == "discharge held"]

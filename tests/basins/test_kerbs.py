@@ -28,13 +28,25 @@ def hillside(bed, rain, end, numerics, axis="x", n=0.02, cells=20, points=()):
     size, count, side = [LONG, 1.0], [cells, 1], "east"
     if axis == "y":
         size, count, side = size[::-1], count[::-1], "north"
-    hill = {"type": "basin", "level": -1.0, "elevation": 0.0, "size": size, "cells": count, "manning": n, "rain": rain,
-            "bed": bed.replace("(s", f"({axis}").replace("- s)", f"- {axis})"),
-            "patches": {"out": {"side": side, "boundary": "critical"}}}  # fmt: skip
+    hill = {
+        "type": "basin",
+        "level": -1.0,
+        "elevation": 0.0,
+        "size": size,
+        "cells": count,
+        "manning": n,
+        "rain": rain,
+        "bed": bed.replace("(s", f"({axis}").replace("- s)", f"- {axis})"),
+        "patches": {"out": {"side": side, "boundary": "critical"}},
+    }
     probes = [f"hill.depth@{s},0.5" if axis == "x" else f"hill.depth@0.5,{s}" for s in points]
-    found = fvsolve.run(scene({"hill": hill}, {}, end, numerics, ["hill.out.flow", *probes], every=end / 200))
+    found = fvsolve.run(
+        scene({"hill": hill}, {}, end, numerics, ["hill.out.flow", *probes], every=end / 200)
+    )
     assert found.ok
-    return -found["hill.out.flow"][100:] / (rain * LONG), [float(found[name][-1]) for name in probes]
+    return -found["hill.out.flow"][100:] / (rain * LONG), [
+        float(found[name][-1]) for name in probes
+    ]
 
 
 def plane(slope, kerb):
@@ -48,7 +60,9 @@ def test_a_film_over_a_kerb_comes_to_rest_at_the_rain(scheme, limiter, axis):
     slope, rain = 0.05, 60.0 / 3.6e6
     for kerb in (0.002, 0.01, 0.02, 0.05, 0.1, -0.02, -0.05):
         numerics = {"scheme": scheme, "limiter": limiter}
-        share, depths = hillside(plane(slope, kerb), rain, 1200.0, numerics, axis, points=[7.5, 13.5])
+        share, depths = hillside(
+            plane(slope, kerb), rain, 1200.0, numerics, axis, points=[7.5, 13.5]
+        )
         assert np.abs(share - 1.0).max() < 1e-3, kerb
         right = [(0.02 * rain * at / math.sqrt(slope)) ** 0.6 for at in (7.5, 13.5)]
         assert depths[0] == approx(right[0], rel=0.01)
@@ -79,7 +93,9 @@ def triangles(folder, kind):
     for k in (k for k in range(41) if k != 20):
         a, b, c, d = k, k + 1, k + 22, k + 21
         whole, alike = kind == "mixed" and k % 2 == 0, kind == "equal" or k % 3
-        cells += [[a, b, c, d]] if whole else [[a, b, c], [a, c, d]] if alike else [[a, b, d], [b, c, d]]
+        cells += (
+            [[a, b, c, d]] if whole else [[a, b, c], [a, c, d]] if alike else [[a, b, d], [b, c, d]]
+        )
     return write(folder / "hill.msh", points, cells, {"east": [[20, 41], [41, 62]]})
 
 
@@ -88,16 +104,35 @@ def test_a_film_over_a_kerb_of_triangles_comes_to_rest_at_the_rain(tmp_path, kin
     """The film of the last scene, of 0.3 mm on a slope of 0.15, still pulses by 3 to 6 % on triangles."""
     path = str(triangles(tmp_path, kind))
     for slope, rain, kerb, at in [
-        (0.05, 60.0, 0.02, 15.0), (0.05, 60.0, 0.05, 15.0), (0.05, 60.0, 0.1, 15.0), (0.05, 60.0, -0.05, 15.0),
-        (0.05, 60.0, 0.1, 13.3), (0.15, 200.0, 0.05, 15.0), (0.02, 10.0, 0.05, 13.3), (0.05, 200.0, -0.05, 15.0),
-        (0.02, 10.0, -0.02, 13.3), (0.15, 10.0, 0.01, 13.3),
-    ]:  # fmt: skip
+        (0.05, 60.0, 0.02, 15.0),
+        (0.05, 60.0, 0.05, 15.0),
+        (0.05, 60.0, 0.1, 15.0),
+        (0.05, 60.0, -0.05, 15.0),
+        (0.05, 60.0, 0.1, 13.3),
+        (0.15, 200.0, 0.05, 15.0),
+        (0.02, 10.0, 0.05, 13.3),
+        (0.05, 200.0, -0.05, 15.0),
+        (0.02, 10.0, -0.02, 13.3),
+        (0.15, 10.0, 0.01, 13.3),
+    ]:
         rate, end = rain / 3.6e6, 1500.0 * (60.0 / rain) ** 0.6
-        hill = {"type": "basin", "level": -1.0, "elevation": 0.0, "mesh": {"file": path}, "manning": 0.02, "rain": rate,
-                "bed": plane(slope, kerb).replace("(s)", "x").replace("- s", "- x").replace("x < 15", f"x < {at}"),
-                "patches": {"east": {"boundary": "critical"}}}  # fmt: skip
+        hill = {
+            "type": "basin",
+            "level": -1.0,
+            "elevation": 0.0,
+            "mesh": {"file": path},
+            "manning": 0.02,
+            "rain": rate,
+            "bed": plane(slope, kerb)
+            .replace("(s)", "x")
+            .replace("- s", "- x")
+            .replace("x < 15", f"x < {at}"),
+            "patches": {"east": {"boundary": "critical"}},
+        }
         probes = ["hill.east.flow", "hill.depth@7.5,1.1"]
-        found = fvsolve.run(scene({"hill": hill}, {}, end, {"scheme": "muscl"}, probes, every=end / 200))
+        found = fvsolve.run(
+            scene({"hill": hill}, {}, end, {"scheme": "muscl"}, probes, every=end / 200)
+        )
         share = -found["hill.east.flow"][100:] / (rate * 2.0 * LONG)
         allowed = 7e-2 if (slope, rain) == (0.15, 10.0) else most
         assert np.abs(share - 1.0).max() < allowed, (slope, rain, kerb, at)

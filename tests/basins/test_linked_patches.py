@@ -22,17 +22,44 @@ DEEP, WIDE, LONG = 2.0, 2.0, 60.0
 NUMERICS = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.9}
 
 
-def channel(head, area=1.0, end=4.0, cells=(120, 2), numerics=None, side="east", probes=(), turned=False, **basin):
+def channel(
+    head,
+    area=1.0,
+    end=4.0,
+    cells=(120, 2),
+    numerics=None,
+    side="east",
+    probes=(),
+    turned=False,
+    **basin,
+):
     """Channel at rest with an orifice to a reservoir; turned : True if the orifice is drawn from the basin."""
     size = (LONG, WIDE) if side in ("east", "west") else (WIDE, LONG)
     cells = cells if side in ("east", "west") else cells[::-1]
-    own = {"type": "basin", "size": list(size), "cells": list(cells), "level": DEEP, "elevation": 0.0,
-           "patches": {"end": {"side": side}}, **basin}  # fmt: skip
+    own = {
+        "type": "basin",
+        "size": list(size),
+        "cells": list(cells),
+        "level": DEEP,
+        "elevation": 0.0,
+        "patches": {"end": {"side": side}},
+        **basin,
+    }
     ends = ("reach.end", "lake") if turned else ("lake", "reach.end")
-    gate = {"type": "orifice", "from": ends[0], "to": ends[1], "area": area, "discharge_coefficient": 0.6}
-    given = {key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None}
+    gate = {
+        "type": "orifice",
+        "from": ends[0],
+        "to": ends[1],
+        "area": area,
+        "discharge_coefficient": 0.6,
+    }
+    given = {
+        key: value for key, value in (NUMERICS | (numerics or {})).items() if value is not None
+    }
     nodes = {"reach": own, "lake": lake(head, elevation=0.0)}
-    return scene(nodes, {"gate": gate}, end, given, probes or ["gate.flow", "reach.end.level"], end / 40)
+    return scene(
+        nodes, {"gate": gate}, end, given, probes or ["gate.flow", "reach.end.level"], end / 40
+    )
 
 
 def inflow_at(z: float) -> float:
@@ -55,9 +82,14 @@ def balanced(head: float, area: float) -> tuple[float, float]:
     return inflow_at(z), z
 
 
-METHODS = {"ssp-rk2": {}, "rk4": {}, "dormand-prince": {"rtol": 1e-7, "courant": None},
-           "implicit-midpoint": {"step": 0.05, "courant": None}, "radau-iia-5": {"rtol": 1e-7, "courant": None},
-           "rodas-5p": {"rtol": 1e-7, "courant": None}}  # fmt: skip
+METHODS = {
+    "ssp-rk2": {},
+    "rk4": {},
+    "dormand-prince": {"rtol": 1e-7, "courant": None},
+    "implicit-midpoint": {"step": 0.05, "courant": None},
+    "radau-iia-5": {"rtol": 1e-7, "courant": None},
+    "rodas-5p": {"rtol": 1e-7, "courant": None},
+}
 
 
 @pytest.mark.in_turn
@@ -67,17 +99,26 @@ def test_a_sudden_level_drives_the_flow_of_a_simple_wave(head, area, method):
     numerics = {"method": method, **METHODS[method], "scheme": "muscl"}
     found = fvsolve.run(channel(head, area, numerics=numerics, cells=(120, 1)))
     flow, level = balanced(head, area)
-    assert found["gate.flow"][-1] == approx(flow, rel=1e-3) and found["reach.end.level"][-1] == approx(level, rel=1e-3)
+    assert found["gate.flow"][-1] == approx(flow, rel=1e-3) and found["reach.end.level"][
+        -1
+    ] == approx(level, rel=1e-3)
 
 
-PIPED = {"from": "lake", "to": "reach.end", "length": 20.0, "diameter": 1.0}  # between the lake and the channel
+# between the lake and the channel
+PIPED = {"from": "lake", "to": "reach.end", "length": 20.0, "diameter": 1.0}
 
 
 def test_a_delay_line_and_a_pipe_of_cells_deliver_the_same_flow():
     flows = []
     for own in ({"pipe_model": "delay-line"}, {"cells": 100}):
         case = channel({"time": [0.0, 4.0], "value": [2.0, 2.3]}, numerics={"courant": 0.9})
-        case["links"]["gate"] = {"type": "pipe", **PIPED, "wave_speed": 400.0, "friction": {"model": "none"}, **own}
+        case["links"]["gate"] = {
+            "type": "pipe",
+            **PIPED,
+            "wave_speed": 400.0,
+            "friction": {"model": "none"},
+            **own,
+        }
         case["output"]["probes"] = ["gate.flow@1"]
         found = fvsolve.run(case)
         assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
@@ -92,7 +133,9 @@ def test_a_delay_line_that_falls_deep_draws_the_critical_outflow(method):
     case["links"]["gate"] = {**line, **PIPED, "diameter": 2.0, "friction": {"model": "none"}}
     case["output"]["probes"] = ["reach.end.flow"]
     found = fvsolve.run(case)
-    assert found["reach.end.flow"][-1] == approx(-WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5, rel=3e-4)
+    assert found["reach.end.flow"][-1] == approx(
+        -WIDE * 8.0 / 27.0 * math.sqrt(G) * DEEP**1.5, rel=3e-4
+    )
     assert found.ledger["mass"]["made_up"] == 0.0 and abs(found.ledger["mass"]["relative"]) < 1e-12
 
 
@@ -115,13 +158,20 @@ def test_a_wide_orifice_is_a_stage():
 
 
 LINKS = {
-    "small orifice": {"area": 0.5}, "wide orifice": {"area": 20.0},
+    "small orifice": {"area": 0.5},
+    "wide orifice": {"area": 20.0},
     "weir": {"type": "weir", "width": 2.0, "crest": 1.0},
     "sluice-gate": {"type": "sluice-gate", "width": 2.0, "sill": 0.0, "opening": 0.5},
-    "culvert": {"type": "culvert", "diameter": 1.2, "length": 20.0, "inverts": [0.2, 0.1], "manning": 0.013,
-                "inlet": "circular-concrete-square-edge"},
+    "culvert": {
+        "type": "culvert",
+        "diameter": 1.2,
+        "length": 20.0,
+        "inverts": [0.2, 0.1],
+        "manning": 0.013,
+        "inlet": "circular-concrete-square-edge",
+    },
     "manhole": {"type": "manhole", "crest": 1.5, "area": 0.28, "perimeter": 1.9},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("link", LINKS)
@@ -155,15 +205,31 @@ def test_at_rest_not_a_bit_moves(side, path, scheme, tmp_path):
 def on_mesh(case: dict, side: str, folder) -> dict:
     """The same case with triangles."""
     points, cells = triangles((LONG, WIDE), 0.5)
-    write(folder / "t.msh", points, cells.tolist(), {"end": on_sides(points, boundary(cells), (LONG, WIDE))[side]})
-    basin = {key: value for key, value in case["nodes"]["reach"].items() if key not in ("size", "cells", "patches")}
-    return case | {"nodes": case["nodes"] | {"reach": basin | {"mesh": {"file": str(folder / "t.msh")}}}}
+    write(
+        folder / "t.msh",
+        points,
+        cells.tolist(),
+        {"end": on_sides(points, boundary(cells), (LONG, WIDE))[side]},
+    )
+    basin = {
+        key: value
+        for key, value in case["nodes"]["reach"].items()
+        if key not in ("size", "cells", "patches")
+    }
+    return case | {
+        "nodes": case["nodes"] | {"reach": basin | {"mesh": {"file": str(folder / "t.msh")}}}
+    }
 
 
 @pytest.mark.parametrize("ground, head", [("0", 2.5), ("0", 1.0), ("0.05*x + 0.1*sin(3*x)", 2.2)])
 def test_volume_passes_from_lake_to_basin_and_no_depth_is_negative(ground, head):
     case = channel(
-        {"time": [0, 2, 4, 6], "value": [head, head, 1.5, 2.0]}, 3.0, 8.0, bed=ground, side="west", level=1.8
+        {"time": [0, 2, 4, 6], "value": [head, head, 1.5, 2.0]},
+        3.0,
+        8.0,
+        bed=ground,
+        side="west",
+        level=1.8,
     )
     found = fvsolve.run(case)
     assert found.ok and abs(found.ledger["mass"]["relative"]) < 1e-12
@@ -174,7 +240,8 @@ def test_a_restated_channel_gives_the_same(path, tmp_path, monkeypatch):
     head = {"time": [0, 2, 4], "value": [2.0, 2.6, 1.6]}
     here = fvsolve.run(channel(head))
     if path == "resumed":
-        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+        # checkpoints after 1000, 1250, ... steps
+        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):
             monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
         run_in_two_parts(channel(head, numerics={"step": 2e-3, "courant": None}), tmp_path, 2.5)
         assert_equal_files(tmp_path, ["history.csv"])
@@ -184,7 +251,9 @@ def test_a_restated_channel_gives_the_same(path, tmp_path, monkeypatch):
         here = fvsolve.run(channel(head, cells=(120, 12)), threads=1)
         assert (there["gate.flow"] == here["gate.flow"]).all() and there.summary["threads"] == 3
         return
-    there = fvsolve.run(channel(head, turned=True) if path == "turned" else channel(head, side=path))
+    there = fvsolve.run(
+        channel(head, turned=True) if path == "turned" else channel(head, side=path)
+    )
     sign = -1.0 if path == "turned" else 1.0
     assert sign * there["gate.flow"] == approx(here["gate.flow"], rel=1e-9, abs=1e-9)
 
@@ -207,7 +276,11 @@ PONDS = {  # link, its law in plain Python, levels at the start, end [s]
     "culvert": (LINKS["culvert"] | {"diameter": 0.6, "inverts": [0.0, 0.0], "manning": 0.012},
                 structures.culvert_drowned(0.6, 20.0, 0.012, 1.5), (2.4, 1.2), 1500.0),
 }  # fmt: skip
-POND_METHODS = {"ssp-rk2": {"courant": 0.9}, "rodas-5p": {"rtol": 1e-6}, "radau-iia-5": {"rtol": 1e-6}}
+POND_METHODS = {
+    "ssp-rk2": {"courant": 0.9},
+    "rodas-5p": {"rtol": 1e-6},
+    "radau-iia-5": {"rtol": 1e-6},
+}
 
 
 @pytest.mark.in_turn
@@ -216,15 +289,31 @@ POND_METHODS = {"ssp-rk2": {"courant": 0.9}, "rodas-5p": {"rtol": 1e-6}, "radau-
 def test_basins_come_to_equal_levels_as_tanks_do(name, method):
     """Basins of 600 and 400 m2 beside a pair of tanks with the same law, by SciPy."""
     link, law, levels, end = PONDS[name]
-    nodes = {pond: {"type": "basin", "size": list(size), "cells": [3, 2], "level": level, "elevation": 0.0,
-                    "manning": 0.05, "patches": {"end": {"side": side}}}
-             for (pond, (size, side)), level in zip(SIZES.items(), levels, strict=True)}  # fmt: skip
+    nodes = {
+        pond: {
+            "type": "basin",
+            "size": list(size),
+            "cells": [3, 2],
+            "level": level,
+            "elevation": 0.0,
+            "manning": 0.05,
+            "patches": {"end": {"side": side}},
+        }
+        for (pond, (size, side)), level in zip(SIZES.items(), levels, strict=True)
+    }
     numerics = {"scheme": "muscl", "method": method} | POND_METHODS[method]
     joined = {"x": {"from": "a.end", "to": "b.end", **link}}
     found = fvsolve.run(scene(nodes, joined, end, numerics, ["a.volume", "b.volume"], end / 30))
     areas = np.array([600.0, 400.0])
-    tanks = solve_ivp(lambda t, z: law(*z) * np.array([-1.0, 1.0]) / areas, (0.0, end), levels, method="LSODA",
-                      t_eval=found.t, rtol=1e-8, atol=1e-10)  # fmt: skip
+    tanks = solve_ivp(
+        lambda t, z: law(*z) * np.array([-1.0, 1.0]) / areas,
+        (0.0, end),
+        levels,
+        method="LSODA",
+        t_eval=found.t,
+        rtol=1e-8,
+        atol=1e-10,
+    )
     change = abs(levels[0] - levels[1])
     assert found["a.volume"] / 600.0 == approx(tanks.y[0], abs=1e-3 * change)
     assert found["b.volume"] / 400.0 == approx(tanks.y[1], abs=1e-3 * change)
@@ -239,22 +328,45 @@ def test_a_culvert_under_a_road_does_not_chatter():
     assert np.diff(found["under.flow"][rising]).min() > 0.0 and found.ok
 
 
-PLACES = {"sides": ({"side": "east"}, {"side": "west"}),
-          "interior": ({"at": [10, 5], "area": 4.0}, {"at": [6, 4], "area": 8.0})}  # fmt: skip
+PLACES = {
+    "sides": ({"side": "east"}, {"side": "west"}),
+    "interior": ({"at": [10, 5], "area": 4.0}, {"at": [6, 4], "area": 8.0}),
+}
 
 
 @pytest.mark.parametrize("method", ["ssp-rk2", "rodas-5p", "radau-iia-5"])
 @pytest.mark.parametrize("where", PLACES)
 def test_a_pump_lifts_water_between_two_basins(where, method):
     """Levels of two basins, and of two tanks with the pump's curve H = 2 m - 800 q^2, by SciPy."""
-    low, high = ({"type": "basin", "size": [size, 10.0], "cells": [int(size / 2), 5], "level": level, "elevation": 0.0,
-                  "patches": {"end": patch}}
-                 for size, level, patch in zip((20.0, 12.0), (1.0, 1.5), PLACES[where], strict=True))  # fmt: skip
-    pump = {"type": "pump", "from": "low.end", "to": "high.end", "curve": {"coefficients": [2.0, 0.0, -800.0]}}
+    low, high = (
+        {
+            "type": "basin",
+            "size": [size, 10.0],
+            "cells": [int(size / 2), 5],
+            "level": level,
+            "elevation": 0.0,
+            "patches": {"end": patch},
+        }
+        for size, level, patch in zip((20.0, 12.0), (1.0, 1.5), PLACES[where], strict=True)
+    )
+    pump = {
+        "type": "pump",
+        "from": "low.end",
+        "to": "high.end",
+        "curve": {"coefficients": [2.0, 0.0, -800.0]},
+    }
     own = {"rtol": 1e-6} if method != "ssp-rk2" else {"courant": 0.9}
     numerics = {"scheme": "upwind", "method": method, **own}
-    found = fvsolve.run(scene({"low": low, "high": high}, {"pump": pump}, 200.0, numerics,
-                              ["pump.flow", "low.volume", "high.volume"], 5.0))  # fmt: skip
+    found = fvsolve.run(
+        scene(
+            {"low": low, "high": high},
+            {"pump": pump},
+            200.0,
+            numerics,
+            ["pump.flow", "low.volume", "high.volume"],
+            5.0,
+        )
+    )
 
     def lifted(t, volumes):
         q = math.sqrt((2.0 - (volumes[1] / 120.0 - volumes[0] / 200.0)) / 800.0)
@@ -280,7 +392,9 @@ def drawn(side="east", turned=False, **rest) -> dict:
 def test_a_demand_beyond_critical_outflow_is_held_there_with_a_mark(method):
     """Critical outflow of a simple wave from still water (Ritter's at the dam); the rest has a line in the ledger."""
     numerics = {"method": method, **METHODS[method]}
-    found = fvsolve.run(drawn(numerics=numerics, cells=(240, 1), probes=["reach.end.flow", "gate.flow"]))
+    found = fvsolve.run(
+        drawn(numerics=numerics, cells=(240, 1), probes=["reach.end.flow", "gate.flow"])
+    )
     assert found.reason == "finished" and not found.ok
     assert abs(found["gate.flow"]) == approx(ASKED)
     assert found["reach.end.flow"][-1] == approx(-CRITICAL, rel=1e-3)
@@ -298,18 +412,25 @@ def test_a_demand_beyond_critical_outflow_is_held_there_with_a_mark(method):
 def test_a_restated_demand_beyond_critical_outflow_is_held_equally(path, tmp_path, monkeypatch):
     probes = ["reach.end.flow"]
     if path == "resumed":
-        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):  # checkpoints after 1000, 1250, ... steps
+        # checkpoints after 1000, 1250, ... steps
+        for name in ("CHECKPOINT_SECONDS", "CHUNK_SECONDS"):
             monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, 0.0)
-        run_in_two_parts(drawn(numerics={"step": 2e-3, "courant": None}, probes=probes), tmp_path, 2.5, ok=False)
+        run_in_two_parts(
+            drawn(numerics={"step": 2e-3, "courant": None}, probes=probes), tmp_path, 2.5, ok=False
+        )
         assert_equal_files(tmp_path, ["history.csv"])
-        whole, resumed = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "run"))
+        whole, resumed = (
+            json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "run")
+        )
         assert whole["marks"] == resumed["marks"] and whole["marks"][0]["volume"] > 50.0
         assert whole["ledgers"] == resumed["ledgers"]
         return
     here = fvsolve.run(drawn(cells=(120, 12), probes=probes))
     if path == "threads":
         there = fvsolve.run(drawn(cells=(120, 12), probes=probes), threads=3)
-        assert (there["reach.end.flow"] == here["reach.end.flow"]).all() and there.summary["threads"] == 3
+        assert (there["reach.end.flow"] == here["reach.end.flow"]).all() and there.summary[
+            "threads"
+        ] == 3
     else:
         turned = path == "turned"
         side = "east" if turned else path
@@ -331,7 +452,9 @@ def test_a_demand_that_exceeds_critical_outflow_for_a_time_is_satisfied_again():
     other = fvsolve.run(scheduled)
     assert found["reach.end.flow"] == approx(other["reach.end.flow"], rel=2e-3)
     assert found["reach.end.flow"][-1] == approx(-2.0)
-    volumes = [next(m.volume for m in run.marks if m.what == "discharge held") for run in (found, other)]
+    volumes = [
+        next(m.volume for m in run.marks if m.what == "discharge held") for run in (found, other)
+    ]
     assert volumes[0] == approx(volumes[1], rel=5e-3)
 
 
@@ -341,19 +464,32 @@ def test_a_basin_drained_by_a_demand_runs_dry_at_its_patch():
     found = fvsolve.run(case)
     mark, ledger = found.marks[-1], found.ledger["mass"]
     assert found.reason == "finished" and abs(ledger["relative"]) < 1e-12
-    assert mark.volume == approx(ASKED * 40.0 - (ledger["initial"] - ledger["final"]) / ledger["initial"] * 240.0)
+    assert mark.volume == approx(
+        ASKED * 40.0 - (ledger["initial"] - ledger["final"]) / ledger["initial"] * 240.0
+    )
 
 
 BELOW_GROUND = {
-    "weir": {"crest": 1.7, "width": 2.0}, "manhole": {"crest": 1.7, "area": 0.3, "perimeter": 2.0},
-    "sluice-gate": {"sill": 1.2, "width": 2.0, "opening": 0.4}, "orifice": {"area": 0.2},
-    "culvert": {"diameter": 0.6, "length": 10.0, "inverts": [1.4, 1.3], "manning": 0.013, "inlet":
-                "circular-concrete-square-edge", "entrance_loss": 0.5},
-}  # fmt: skip
+    "weir": {"crest": 1.7, "width": 2.0},
+    "manhole": {"crest": 1.7, "area": 0.3, "perimeter": 2.0},
+    "sluice-gate": {"sill": 1.2, "width": 2.0, "opening": 0.4},
+    "orifice": {"area": 0.2},
+    "culvert": {
+        "diameter": 0.6,
+        "length": 10.0,
+        "inverts": [1.4, 1.3],
+        "manning": 0.013,
+        "inlet": "circular-concrete-square-edge",
+        "entrance_loss": 0.5,
+    },
+}
 
 
-FILM_METHODS = {"explicit": {}, "Rosenbrock": {"method": "rodas-5p", "rtol": 1e-6, "courant": None},
-                "auto": {"method": "auto", "courant": None}}  # fmt: skip
+FILM_METHODS = {
+    "explicit": {},
+    "Rosenbrock": {"method": "rodas-5p", "rtol": 1e-6, "courant": None},
+    "auto": {"method": "auto", "courant": None},
+}
 
 
 @pytest.mark.parametrize("way", FILM_METHODS)
@@ -362,11 +498,22 @@ def test_a_film_falls_freely_into_whatever_lies_below_it(name, way):
     """Rain on a slope of 0.1 : links that could pass more draw the critical outflow of a free overfall."""
 
     def slope(**patch) -> dict:
-        return {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 2.0, "level": 0.0,
-                "bed": "0.1*x", "start": {"level": 0.0}, "manning": 0.02, "rain": "100 mm/h",
-                "patches": {"low": {"side": "south", **patch}}}  # fmt: skip
+        return {
+            "type": "basin",
+            "size": [24.0, 10.0],
+            "cells": [24, 10],
+            "elevation": 2.0,
+            "level": 0.0,
+            "bed": "0.1*x",
+            "start": {"level": 0.0},
+            "manning": 0.02,
+            "rain": "100 mm/h",
+            "patches": {"low": {"side": "south", **patch}},
+        }
 
-    given = {key: value for key, value in (NUMERICS | FILM_METHODS[way]).items() if value is not None}
+    given = {
+        key: value for key, value in (NUMERICS | FILM_METHODS[way]).items() if value is not None
+    }
     link = {"type": name, "from": "slope.low", "to": "lake", **BELOW_GROUND[name]}
     probes = ["slope.volume", "slope.low.flow"]
     nodes = {"slope": slope(), "lake": lake(-1.0)}
@@ -375,18 +522,42 @@ def test_a_film_falls_freely_into_whatever_lies_below_it(name, way):
     assert linked.ok and linked.ledger["mass"]["relative"] < 1e-12
     assert free["slope.low.flow"][-1] < -5e-5
     for probe in probes:
-        assert linked[probe] == approx(free[probe], rel=1e-9 if "courant" in given else 1e-3, abs=1e-15)
+        assert linked[probe] == approx(
+            free[probe], rel=1e-9 if "courant" in given else 1e-3, abs=1e-15
+        )
 
 
 @pytest.mark.parametrize("method", ["ssp-rk2", "ssp-rk3", "euler"])
 def test_a_pump_with_a_dry_sump_waits(method):
     """The level of the dry patch falls until the pump gives its shut-off head; then a hydrograph fills the sump."""
-    sump = {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 0.0, "level": 0.0, "bed": "0.1*x",
-            "start": {"level": -0.01}, "patches": {"intake": {"side": "west", "span": ["4 m", "6 m"]},
-            "inflow": {"side": "north", "discharge": {"time": [0.0, 5.0, 6.0], "value": [0.0, 0.0, 1.0]}}}}  # fmt: skip
-    pond = {"type": "basin", "size": [24.0, 10.0], "cells": [24, 10], "elevation": 2.0, "level": 0.0, "bed": -1.0,
-            "patches": {"in": {"at": [14.5, 3.2], "area": "0.5 m2"},
-                        "out": {"side": "south", "boundary": "critical"}}}  # fmt: skip
+    sump = {
+        "type": "basin",
+        "size": [24.0, 10.0],
+        "cells": [24, 10],
+        "elevation": 0.0,
+        "level": 0.0,
+        "bed": "0.1*x",
+        "start": {"level": -0.01},
+        "patches": {
+            "intake": {"side": "west", "span": ["4 m", "6 m"]},
+            "inflow": {
+                "side": "north",
+                "discharge": {"time": [0.0, 5.0, 6.0], "value": [0.0, 0.0, 1.0]},
+            },
+        },
+    }
+    pond = {
+        "type": "basin",
+        "size": [24.0, 10.0],
+        "cells": [24, 10],
+        "elevation": 2.0,
+        "level": 0.0,
+        "bed": -1.0,
+        "patches": {
+            "in": {"at": [14.5, 3.2], "area": "0.5 m2"},
+            "out": {"side": "south", "boundary": "critical"},
+        },
+    }
     curve = {"flow": [0, 0.2, 0.4], "head": [6, 4, 1]}
     pump = {"type": "pump", "from": "sump.intake", "to": "pond.in", "curve": curve}
     drain = {"type": "orifice", "from": "pond.in", "to": "lake", "area": 0.1}
@@ -406,10 +577,23 @@ STATE_LINKS = BELOW_GROUND | {"pump": {"curve": {"flow": [0, 0.2, 0.4], "head": 
 
 def joined_patches(rng) -> dict:
     """Two basins and a lake whose patches two to five random links join."""
-    patches = {"west": {"side": "west"}, "south": {"side": "south"}, "in": {"at": [9.0, 3.0], "area": 4.0}}
-    basin = {"type": "basin", "size": [12.0, 6.0], "cells": [6, 3], "level": 0.0, "patches": patches}
-    nodes = {"a": {**basin, "elevation": 2.0, "bed": "0.1*x"}, "lake": lake(float(rng.choice([-1.0, 1.8, 3.0]))),
-             "b": {**basin, "elevation": float(rng.choice([0.0, 1.0, 2.0])), "bed": "0.3*sin(x)*cos(y)"}}  # fmt: skip
+    patches = {
+        "west": {"side": "west"},
+        "south": {"side": "south"},
+        "in": {"at": [9.0, 3.0], "area": 4.0},
+    }
+    basin = {
+        "type": "basin",
+        "size": [12.0, 6.0],
+        "cells": [6, 3],
+        "level": 0.0,
+        "patches": patches,
+    }
+    nodes = {
+        "a": {**basin, "elevation": 2.0, "bed": "0.1*x"},
+        "lake": lake(float(rng.choice([-1.0, 1.8, 3.0]))),
+        "b": {**basin, "elevation": float(rng.choice([0.0, 1.0, 2.0])), "bed": "0.3*sin(x)*cos(y)"},
+    }
     places, links = [f"{name}.{patch}" for name in "ab" for patch in patches], {}
     links["drain"] = {"type": "orifice", "area": 0.1, "from": "a.west", "to": "lake"}
     for i in range(rng.integers(2, 6)):
@@ -432,8 +616,14 @@ def test_flows_balance_between_dry_thin_and_deep_water(seed, thinnest, most):
                 at, n = int(basin.row["y"]), basin.n
                 depth = 10.0 ** rng.uniform(thinnest, 0.3, n) * (rng.random(n) > 0.3)
                 y[at : at + n] = depth - basin.depth
-                y[at + n : at + 3 * n] = np.tile(depth * np.sqrt(G * depth), 2) * rng.uniform(-2.0, 2.0, 2 * n)
-            out, valves, sums = model.evaluate(0.0, y)[1], model.tables.valves, np.zeros(len(model.node_names))
+                y[at + n : at + 3 * n] = np.tile(depth * np.sqrt(G * depth), 2) * rng.uniform(
+                    -2.0, 2.0, 2 * n
+                )
+            out, valves, sums = (
+                model.evaluate(0.0, y)[1],
+                model.tables.valves,
+                np.zeros(len(model.node_names)),
+            )
             flows = out[model.layout["valve"] : model.layout["valve"] + valves.size]
             np.add.at(sums, valves["to_node"], flows)
             np.add.at(sums, valves["from_node"], -flows)

@@ -50,17 +50,33 @@ def twins(joint, link, swap=False, turned=False, folder=None, start=None, end=1.
     turned : True to reverse the x axis of `b`; start : surface as a function of x and y of the body
     """
     far = SIZE[0] + WAY
-    given = [{} if start is None else {"start": {"level": start(f"(x + ({x}))", "y")}} for x in (0.0, far)]
+    given = [
+        {} if start is None else {"start": {"level": start(f"(x + ({x}))", "y")}}
+        for x in (0.0, far)
+    ]
     second = {"at": (far, 0.0, 0.0), "side": "west"}
     if turned:
-        second = {"at": (far + SIZE[0], SIZE[1], 0.0), "side": "east", "attitude": {"yaw": "180 deg"}}
+        second = {
+            "at": (far + SIZE[0], SIZE[1], 0.0),
+            "side": "east",
+            "attitude": {"yaw": "180 deg"},
+        }
         if start is not None:
             given[1] = {"start": {"level": start(f"({far + SIZE[0]} - x)", f"({SIZE[1]} - y)")}}
-    nodes = {"hull": hull(**joint), "a": basin((0, 0, 0), "east", folder, **given[0]),
-             "b": basin(folder=folder, **second, **given[1])}  # fmt: skip
+    nodes = {
+        "hull": hull(**joint),
+        "a": basin((0, 0, 0), "east", folder, **given[0]),
+        "b": basin(folder=folder, **second, **given[1]),
+    }
     ends = ("b.gap", "a.gap") if swap else ("a.gap", "b.gap")
     links = {"duct": {**link, "from": ends[0], "to": ends[1], "length": WAY}}
-    numerics = {"initial": "rest", "scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
+    numerics = {
+        "initial": "rest",
+        "scheme": "muscl",
+        "method": "ssp-rk3",
+        "courant": 0.5,
+        **(numerics or {}),
+    }
     numerics = {key: one for key, one in numerics.items() if one is not None}
     return scene(nodes, links, end, numerics, [FLOW[link["type"]]], every=end / 20)
 
@@ -79,12 +95,15 @@ FRAMES = {  # (joint, surface at rest in its frame)
         lambda x, y: f"{LEVEL} + {SLOWS / GRAVITY} * ({x} - 2.5)",
     ),
     "turns": (spin(RATE), lambda x, y: f"0.2 + {RATE**2 / (2 * GRAVITY)} * ({x}**2 + {y}**2)"),
-}  # fmt: skip
+}
 WAYS = {
-    "as drawn": {}, "column back": {"swap": True}, "turned": {"turned": True}, "mesh": {"folder": True},
+    "as drawn": {},
+    "column back": {"swap": True},
+    "turned": {"turned": True},
+    "mesh": {"folder": True},
     "weno5": {"numerics": {"scheme": "weno5"}},
     "implicit": {"numerics": {"method": "gauss-4", "courant": None, "step": 0.1}},
-}  # fmt: skip
+}
 
 
 def rests(case, loose=1e-13):
@@ -98,7 +117,9 @@ def rests(case, loose=1e-13):
 @pytest.mark.in_turn
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("frame", FRAMES)
-def test_basins_joined_by_a_column_on_a_body_rest_where_a_surface_rests_in_their_frame(frame, way, tmp_path):
+def test_basins_joined_by_a_column_on_a_body_rest_where_a_surface_rests_in_their_frame(
+    frame, way, tmp_path
+):
     (joint, start), more = FRAMES[frame], {"link": COLUMN, **WAYS[way]}
     if "folder" in more:
         more["folder"] = tmp_path
@@ -108,7 +129,9 @@ def test_basins_joined_by_a_column_on_a_body_rest_where_a_surface_rests_in_their
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("link", [COLUMN, PIPE], ids=["column", "pipe"])
-@pytest.mark.parametrize("way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}])
+@pytest.mark.parametrize(
+    "way", [{}, {"swap": True}, {"turned": True}, {"folder": True}, {"held": False}]
+)
 def test_basins_joined_by_a_link_on_a_body_rest_on_a_common_level_in_the_world(way, link, tmp_path):
     """The body or its carrier is tilted; the levels of both basins form one horizontal surface."""
     down = Rotation.from_euler("ZYX", [20, -3, 4], degrees=True).inv().apply([0, 0, -1])
@@ -140,14 +163,28 @@ def half_u(joint, grid=(1, 1), swap=False, turned=False, later=False, **link):
     if turned:
         at, way = (0.5 * LONG, north, BED - DEEP), {"attitude": {"yaw": "180 deg"}}
     gap = {"gap": {"side": "south" if turned else "north"}}
-    arm = {"type": "basin", "on": "hull", "at": list(at), "size": [LONG, WIDE], "cells": list(grid),
-           "level": HIGH - BED, "patches": gap, **way}  # fmt: skip
+    arm = {
+        "type": "basin",
+        "on": "hull",
+        "at": list(at),
+        "size": [LONG, WIDE],
+        "cells": list(grid),
+        "level": HIGH - BED,
+        "patches": gap,
+        **way,
+    }
     far = {"type": "tank", "on": "hull", "at": [0, HALF, -DEEP], "area": AREA, "level": HIGH}
     arms = {"port": arm, "far": far}
     ends = ("far", "port.gap") if swap else ("port.gap", "far")
     nodes = {"hull": hull(**joint)} | (dict(reversed(arms.items())) if later else arms)
-    duct = {"type": "rigid-column", "from": ends[0], "to": ends[1], "length": 2 * HALF, "diameter": DUCT,
-            "minor_loss": LOSS}  # fmt: skip
+    duct = {
+        "type": "rigid-column",
+        "from": ends[0],
+        "to": ends[1],
+        "length": 2 * HALF,
+        "diameter": DUCT,
+        "minor_loss": LOSS,
+    }
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5}
     return scene(nodes, {"duct": duct | link}, 10.0, numerics, ["far.level"], every=0.1)
 
@@ -178,11 +215,15 @@ def column_rate(t, state, force):
 
     def along(y1, z1, y2, z2):
         square = y2 * y2 + z2 * z2 - y1 * y1 - z1 * z1
-        return gy * (y2 - y1) + gz * (z2 - z1) - quicker * (y1 * z2 - z1 * y2) + 0.5 * turn**2 * square
+        return (
+            gy * (y2 - y1) + gz * (z2 - z1) - quicker * (y1 * z2 - z1 * y2) + 0.5 * turn**2 * square
+        )
 
     bed, face = BED - DEEP, -HALF + 0.5 * WIDE
     weight = -(gz + quicker * HALF + turn**2 * bed)  # at y = -HALF on the bed
-    drive = weight * (HIGH - BED - rise) + along(-HALF, bed, face, bed) + along(face, bed, HALF, -DEEP)
+    drive = (
+        weight * (HIGH - BED - rise) + along(-HALF, bed, face, bed) + along(face, bed, HALF, -DEEP)
+    )
     drive += along(HALF, -DEEP, HALF, -DEEP + level)
     bore = 0.25 * math.pi * DUCT**2
     return [bore / (2 * HALF) * (drive - 0.5 * LOSS * abs(q) * q / bore**2), q / AREA]
@@ -192,10 +233,18 @@ JOINTS = {
     "rolls": ({"kind": "revolute", "axis": [1, 0, 0], "angle": SWING}, rolls),
     "sways": ({"kind": "prismatic", "axis": [0, 1, 0], "travel": SWAY}, sways),
 }
-DRAWN = {"as drawn": {}, "the duct to port": {"swap": True}, "turned": {"turned": True}, "tank first": {"later": True}}
+DRAWN = {
+    "as drawn": {},
+    "the duct to port": {"swap": True},
+    "turned": {"turned": True},
+    "tank first": {"later": True},
+}
 
 
-QUICK = {"of many cells": {"grid": (2, 4)}, "a pipe": {"type": "pipe", "wave_speed": 200.0, "cells": 8}}
+QUICK = {
+    "of many cells": {"grid": (2, 4)},
+    "a pipe": {"type": "pipe", "wave_speed": 200.0, "cells": 8},
+}
 
 
 @pytest.mark.in_turn
@@ -206,7 +255,9 @@ def test_a_basin_and_a_tank_oscillate_as_a_single_column_of_water(joint, drawn):
     moves, force = JOINTS[joint]
     result = fv.run(half_u(moves, **(DRAWN | QUICK)[drawn]))
     t = result.t
-    truth = solve_ivp(column_rate, (0, 10), [0.0, HIGH], t_eval=t, args=(force,), rtol=1e-11, atol=1e-12)
+    truth = solve_ivp(
+        column_rate, (0, 10), [0.0, HIGH], t_eval=t, args=(force,), rtol=1e-11, atol=1e-12
+    )
     rise = truth.y[1] - HIGH
     assert np.ptp(rise) > 0.1
     close = (1e-2 if drawn in QUICK else 1e-5) * np.ptp(rise)
@@ -232,29 +283,52 @@ def test_a_valve_between_basins_that_touch_lets_them_reach_a_common_level_in_the
     case["output"]["probes"] = ["a.gap.head", "b.gap.head", "gate.flow"]
     result = fv.run(case)
     heads = np.array([result["a.gap.head"], result["b.gap.head"]])
-    assert abs(heads[0, 0] - heads[1, 0]) == pytest.approx(SIZE[0] * math.sin(math.radians(4.0)), rel=1e-3)
+    assert abs(heads[0, 0] - heads[1, 0]) == pytest.approx(
+        SIZE[0] * math.sin(math.radians(4.0)), rel=1e-3
+    )
     assert heads[0, -1] == pytest.approx(heads[1, -1], abs=5e-3)
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-STANDS = {"type": "basin", "size": [1, 1], "cells": [2, 2], "level": 1.0, "elevation": 0.0,
-          "patches": {"gap": {"side": "west"}}}  # fmt: skip
+STANDS = {
+    "type": "basin",
+    "size": [1, 1],
+    "cells": [2, 2],
+    "level": 1.0,
+    "elevation": 0.0,
+    "patches": {"gap": {"side": "west"}},
+}
 FAULTS = {  # text: (keys of nodes, of the link)
-    "joins a.gap, on hull and b.gap, which is fixed: this would be a flexible hose": ({"b": STANDS}, {}),
+    "joins a.gap, on hull and b.gap, which is fixed: this would be a flexible hose": (
+        {"b": STANDS},
+        {},
+    ),
     "joins a.gap, on hull and b.gap, on deck: this would be a flexible hose": (
-        {"deck": hull(kind="fixed", on="hull"), "b": basin((0, 0, 0), "west") | {"on": "deck"}}, {}),
+        {"deck": hull(kind="fixed", on="hull"), "b": basin((0, 0, 0), "west") | {"on": "deck"}},
+        {},
+    ),
     "0.9 m is too short: the route on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
-        {}, {"length": 0.9}),
+        {},
+        {"length": 0.9},
+    ),
     "the ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no length": (
-        {}, {"type": "valve", "area": 0.1, "length": None, "diameter": None}),
+        {},
+        {"type": "valve", "area": 0.1, "length": None, "diameter": None},
+    ),
     'joins a.gap, a patch of a basin without cells; expected sloshing = "cells" in this basin': (
-        {"a": {"sloshing": "frozen"}}, {}),
+        {"a": {"sloshing": "frozen"}},
+        {},
+    ),
     'joins a.gap of a basin on a body, which physics "liquid" does not support yet': (
-        {"a": {"physics": "liquid", "pressure": 2e5, "thickness": 0.1, "level": None}}, {}),
+        {"a": {"physics": "liquid", "pressure": 2e5, "thickness": 0.1, "level": None}},
+        {},
+    ),
     "the reaction of the flow through a.gap is not modelled yet; "
     "expected a tank instead of the basin, or a driven joint": (
-        {"hull": hull(kind="revolute", axis=[1, 0, 0])}, {}),
-}  # fmt: skip
+        {"hull": hull(kind="revolute", axis=[1, 0, 0])},
+        {},
+    ),
+}
 
 
 def changed(case, nodes, link):
@@ -275,17 +349,27 @@ def test_links_that_cannot_be_are_refused_by_name(text):
     assert text in str(found.value)
 
 
-@pytest.mark.parametrize("link", [COLUMN, {"type": "valve", "diameter": BORE, "length": None}], ids=["column", "valve"])
+@pytest.mark.parametrize(
+    "link", [COLUMN, {"type": "valve", "diameter": BORE, "length": None}], ids=["column", "valve"]
+)
 def test_joint_forces_and_energy_are_refused_where_a_link_joins_a_basin_on_a_body(link):
-    case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
-    case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
+    case = changed(
+        twins({"kind": "fixed"}, COLUMN),
+        {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}},
+        {},
+    )
+    case["links"]["duct"] = changed(
+        {"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link
+    )["links"]["duct"]
     with pytest.raises(
-        FvsolveError, match="not supported; links.duct: the reaction of the flow through a.gap is not modelled yet"
+        FvsolveError,
+        match="not supported; links.duct: the reaction of the flow through a.gap is not modelled yet",
     ):
         energy(case)
     case["output"]["probes"] = ["hull.joint_fx"]
     with pytest.raises(
-        CaseError, match="a probe reads forces of joints, but the reaction of the flow through a.gap is not modelled"
+        CaseError,
+        match="a probe reads forces of joints, but the reaction of the flow through a.gap is not modelled",
     ):
         model_of(case)
 
@@ -297,10 +381,18 @@ def test_a_patch_has_the_pressure_on_the_bed_at_the_middle_of_its_faces():
     case = twins(joint, COLUMN)
     case["nodes"]["a"] |= bed
     del case["nodes"]["b"], case["links"]["duct"]
-    case["nodes"]["far"] = {"type": "tank", "on": "hull", "at": [3, 0.5, 0], "area": 1.0, "level": 0.1}
+    case["nodes"]["far"] = {
+        "type": "tank",
+        "on": "hull",
+        "at": [3, 0.5, 0],
+        "area": 1.0,
+        "level": 0.1,
+    }
     case["links"]["duct"] = {**COLUMN, "from": "a.gap", "to": "far", "length": 2.0}
     case["output"]["probes"] = ["a.gap.pressure"]
     case["numerics"]["end"] = 1e-3
     behind = 0.1 * (SIZE[0] - 0.5 * SIZE[0] / CELLS[0])  # bed of the cells behind
     deep = LEVEL + SLOWS / GRAVITY * SIZE[0] - behind
-    assert fv.run(case)["a.gap.pressure"][-1] == pytest.approx(AMBIENT + RHO * GRAVITY * deep, rel=1e-6)
+    assert fv.run(case)["a.gap.pressure"][-1] == pytest.approx(
+        AMBIENT + RHO * GRAVITY * deep, rel=1e-6
+    )

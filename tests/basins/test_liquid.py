@@ -56,7 +56,9 @@ def test_standing_modes_of_a_box_converge_at_the_order_of_the_scheme(scheme):
     box = Box(4, 3, scheme, (1.0, 0.75))
     sizes, end, courant = ((16, 32), 0.1, 0.1) if ORDERS[scheme] == 5 else ((64, 128), 0.03, 0.5)
     for m, n in ((1, 1), (2, 1)):
-        found = order(box, lambda b, t, m=m, n=n: mode(b, m, n, t), end, [m * k for k in sizes], courant)
+        found = order(
+            box, lambda b, t, m=m, n=n: mode(b, m, n, t), end, [m * k for k in sizes], courant
+        )
         assert found == approx(ORDERS[scheme], abs=0.1)
 
 
@@ -69,14 +71,21 @@ def test_on_graded_cells_every_scheme_is_second_order(scheme):
 
 def wave(box: Box, at: float, way: float) -> np.ndarray:
     """Pulse at x = `at` that travels east (way 1) or west (-1)."""
-    return box.averages(lambda x, y: np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None])
+    return box.averages(
+        lambda x, y: np.exp(-(((x - at) / 6) ** 2)) * np.array([1.0, way * C, 0.0])[:, None, None]
+    )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_plane_wave_is_carried_unchanged(scheme):
     box = Box(4, 1, scheme, (100.0, 1.0))
-    sizes, end = {1: (800, 1600), 2: (800, 1600), 5: (200, 400)}[ORDERS[scheme]], 0.3 if scheme == "upwind" else 3.0
-    assert order(box, lambda b, t: wave(b, 35.0 + C * t, 1.0), end, sizes) == approx(ORDERS[scheme], abs=0.1)
+    sizes, end = (
+        {1: (800, 1600), 2: (800, 1600), 5: (200, 400)}[ORDERS[scheme]],
+        0.3 if scheme == "upwind" else 3.0,
+    )
+    assert order(box, lambda b, t: wave(b, 35.0 + C * t, 1.0), end, sizes) == approx(
+        ORDERS[scheme], abs=0.1
+    )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -84,11 +93,19 @@ def test_a_row_of_cells_is_a_pipe(scheme):
     """Rates are equal to rounding inside; after reflections at a reservoir and a dead end, so are errors to 2 %."""
     n, length, diameter = 200, 100.0, 0.5
     section = math.pi / 4 * diameter**2
-    fluid = {"name": "user", "density": RHO, "bulk_modulus": RHO * C**2, "viscosity": 1e-3, "vapor_pressure": 100.0}
+    fluid = {
+        "name": "user",
+        "density": RHO,
+        "bulk_modulus": RHO * C**2,
+        "viscosity": 1e-3,
+        "vapor_pressure": 100.0,
+    }
     numerics = {"scheme": scheme, "limiter": "monotonized-central", "method": "rk4", "courant": 0.5}
     nodes = {"left": reservoir(101325.0), "right": junction()}
     links = {"main": stiff_pipe("left", "right", length, diameter, n, friction=NO_FRICTION)}
-    case = scene(nodes, links, 10.0, numerics, ["right.pressure"], 0.1, fluid=fluid | {"law": "linear"})
+    case = scene(
+        nodes, links, 10.0, numerics, ["right.pressure"], 0.1, fluid=fluid | {"law": "linear"}
+    )
     model = model_of(case)
     box = Box(n, 1, scheme, (length, 1.0), reflect=np.array([-1.0] + [1.0] * (1 + 2 * n)))
 
@@ -98,7 +115,9 @@ def test_a_row_of_cells_is_a_pipe(scheme):
     start = wave(box, 40.0, 1.0) + 0.3 * wave(box, 60.0, -1.0)
     y = section * np.concatenate([C * start[0, 0] + start[1, 0], C * start[0, 0] - start[1, 0]]) / 2
     rates, inside = box.rates(start)[0][:2, 0], slice(3, n - 3)
-    assert of_waves(model.rhs(0.0, y))[:, inside] == approx(rates[:, inside], abs=1e-14 * np.abs(rates).max())
+    assert of_waves(model.rhs(0.0, y))[:, inside] == approx(
+        rates[:, inside], abs=1e-14 * np.abs(rates).max()
+    )
     state = fvsolve.initial_state(model)
     state.y[:] = y
     exact = (wave(box, 70.0, -1.0) - 0.3 * wave(box, 30.0, 1.0))[:2, 0]
@@ -112,7 +131,9 @@ def test_a_row_of_cells_is_a_pipe(scheme):
 @pytest.mark.parametrize("share", [1.0, 0.6, 0.0, -0.35, -1.0])
 def test_a_side_sends_back_the_stated_share_of_a_wave(share, log):
     """A pulse arrives at the eastern side; `share` of it returns westwards, and nothing else remains."""
-    box = Box(200, 1, "upwind5", (100.0, 1.0), log=log, reflect=np.array([1.0, share] + [1.0] * 400))
+    box = Box(
+        200, 1, "upwind5", (100.0, 1.0), log=log, reflect=np.array([1.0, share] + [1.0] * 400)
+    )
     small = 1e-6 if log else 1.0
     found = box.run(small * wave(box, 60.0, 1.0), 8.0) / small
     assert np.abs(found - share * wave(box, 60.0, -1.0)).max() / C < 1.2e-4 * abs(share) + 1e-9
@@ -146,7 +167,9 @@ def holed(box: Box, seed: int) -> np.ndarray:
 def test_no_mode_grows_whatever_the_sides_send_back(scheme):
     """Eigenvalues of linear schemes have no positive real part, to 1e-12 per travel time of a cell."""
     worst = []
-    for nx, ny in ((5, 5), (8, 6), (6, 11)) if scheme == "upwind5" else ((1, 1), (1, 4), (3, 2), (8, 6)):
+    for nx, ny in (
+        ((5, 5), (8, 6), (6, 11)) if scheme == "upwind5" else ((1, 1), (1, 4), (3, 2), (8, 6))
+    ):
         box = Box(nx, ny, scheme, (nx, ny))
         scale = np.repeat([1.0, C, C], nx * ny)
         units = (np.eye(scale.size) * scale).reshape(-1, 3, ny, nx)
@@ -175,9 +198,12 @@ def test_a_round_pulse_stays_round(scheme):
     """Errors against Hankel's integral, and their difference between axes and diagonals, fall at the order."""
 
     def height(r, t):
-        return quad_vec(lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r), 0.0, 16.0, epsrel=1e-12)[
-            0
-        ]
+        return quad_vec(
+            lambda k: k / 2 * np.exp(-k * k / 4) * np.cos(C * k * t) * j0(k * r),
+            0.0,
+            16.0,
+            epsrel=1e-12,
+        )[0]
 
     radii, end = np.linspace(0.0, 9.0, 500), 0.15
     shape = {t: CubicSpline(radii, height(radii, t)) for t in (0.0, end)}
@@ -207,8 +233,12 @@ def test_mirrored_and_rotated_liquids_stay_so_to_the_bit_and_conserve_mass(schem
     for sides in (WALLS, shares(box)):
         box = replace(box, reflect=sides)
         state = noise(box, 0.1)
-        west, east, south, north = np.split(sides, np.cumsum([9, 9, 7])) if sides.size else (WALLS,) * 4
-        turned = replace(box, nx=9, ny=7, size=(4.5, 7.0), reflect=np.concatenate([south, north, west, east]))
+        west, east, south, north = (
+            np.split(sides, np.cumsum([9, 9, 7])) if sides.size else (WALLS,) * 4
+        )
+        turned = replace(
+            box, nx=9, ny=7, size=(4.5, 7.0), reflect=np.concatenate([south, north, west, east])
+        )
         mirrored = replace(box, reflect=np.concatenate([east, west, south[::-1], north[::-1]]))
         rates, rate = box.rates(state)
         found, same = turned.rates(state.transpose(0, 2, 1)[[0, 2, 1]])
@@ -254,7 +284,9 @@ def test_the_log_law_is_the_linear_law_for_small_waves(scheme):
     apart = []
     for size in (1e-4, 1e-5):
         state = noise(box, size)
-        apart.append(np.abs(replace(box, log=True).rates(state)[0] - box.rates(state)[0]).max(axis=(1, 2)))
+        apart.append(
+            np.abs(replace(box, log=True).rates(state)[0] - box.rates(state)[0]).max(axis=(1, 2))
+        )
     assert apart[0] / apart[1] == approx(100.0, rel=1e-3)
 
 
@@ -271,7 +303,11 @@ def vortex(box: Box, t: float, speed: float = 3.0, drift=(2.0, 1.0)) -> np.ndarr
         x, y = x - x0, y - y0
         bell = np.exp(1 - x * x - y * y)
         rho = RHO / (1 + 0.5 * (speed / C) ** 2 * bell)
-        return rho - RHO, rho * (drift[0] - speed * np.sqrt(bell) * y), rho * (drift[1] + speed * np.sqrt(bell) * x)
+        return (
+            rho - RHO,
+            rho * (drift[0] - speed * np.sqrt(bell) * y),
+            rho * (drift[1] + speed * np.sqrt(bell) * x),
+        )
 
     return box.averages(field_at)
 
@@ -288,7 +324,13 @@ def test_an_advected_value_has_the_order_of_the_scheme(scheme):
     """Tangential velocity in a stream that enters and leaves at given pressure."""
 
     def exact(box, t):
-        return box.averages(lambda x, y: (0 * x, RHO * 2.0 + 0 * x, RHO * np.exp(-(((x - 40.0 - 2.0 * t) / 6) ** 2))))
+        return box.averages(
+            lambda x, y: (
+                0 * x,
+                RHO * 2.0 + 0 * x,
+                RHO * np.exp(-(((x - 40.0 - 2.0 * t) / 6) ** 2)),
+            )
+        )
 
     box = Box(4, 1, scheme, (100.0, 1.0), log=True, reflect=-1.0)
     sizes = {1: (800, 1600), 2: (400, 800), 5: (100, 200)}[ORDERS[scheme]]
@@ -325,7 +367,9 @@ def test_exact_riemann_problems_of_the_log_law(name, scheme):
         found, inner = box.run(start, end, 0.5)[:, 0], abs(x) < 27.0
         rays = (x[inner, None] + 100.0 / n * ((np.arange(8) + 0.5) / 8 - 0.5)) / end
         averages = np.array([np.mean([at(xi) for xi in row], axis=0) for row in rays]).T
-        errors.append(np.abs(found[:, inner] - averages).mean(axis=1)[:2] / RHO / np.array([1.0, C]))
+        errors.append(
+            np.abs(found[:, inner] - averages).mean(axis=1)[:2] / RHO / np.array([1.0, C])
+        )
     assert (errors[0] / errors[2] > 4**0.6).all() and (errors[2] < 4e-3).all()
 
 
@@ -355,18 +399,28 @@ def test_a_simple_wave_steepens_as_the_exact_solution(size, scheme):
         return np.array([rho - RHO, flux, 0 * rho])[:, None, :]
 
     wanted = ORDERS[scheme] if size < 0.1 else min(ORDERS[scheme], 2)
-    sizes, end = ((100, 200), 3.0) if wanted == 5 else ((800, 1600), 0.3 if scheme == "upwind" else 3.0)
-    assert order(Box(4, 1, scheme, (100.0, 1.0), log=True), exact, end, sizes) == approx(wanted, abs=0.3)
+    sizes, end = (
+        ((100, 200), 3.0) if wanted == 5 else ((800, 1600), 0.3 if scheme == "upwind" else 3.0)
+    )
+    assert order(Box(4, 1, scheme, (100.0, 1.0), log=True), exact, end, sizes) == approx(
+        wanted, abs=0.3
+    )
 
 
 SOUND, DENSITY = 1200.0, 998.0
-RATE_MASS, RATE_X, RATE_Y = (slice(k * BLOCK, (k + 1) * BLOCK) for k in (3, 4, 5))  # rows of the scratch of a block
+# rows of the scratch of a block
+RATE_MASS, RATE_X, RATE_Y = (slice(k * BLOCK, (k + 1) * BLOCK) for k in (3, 4, 5))
 
 
 def block(random) -> tuple[np.ndarray, ...]:
     """Directions, reach, deviation of pressure over wave speed, and both flows of the cells of a block."""
     angle = random.uniform(0.0, 2.0 * np.pi, BLOCK)
-    return np.cos(angle), np.sin(angle), random.uniform(0.5, 2.0, BLOCK), *random.normal(0.0, 50.0, (3, BLOCK))
+    return (
+        np.cos(angle),
+        np.sin(angle),
+        random.uniform(0.5, 2.0, BLOCK),
+        *random.normal(0.0, 50.0, (3, BLOCK)),
+    )
 
 
 def measures(nx, ny, reach) -> np.ndarray:
@@ -382,7 +436,9 @@ def test_a_uniform_liquid_passes_a_moving_side_by_its_flux_less_the_swept_amount
     nx, ny, reach, w, mx, my = block(random)
     speed, scratch = random.uniform(-3.0, 3.0, BLOCK), np.zeros(ROWS * BLOCK)
     scratch[: 3 * BLOCK] = np.concatenate([w, mx, my])
-    add_side_linear_moving.py_func(SOUND, DENSITY, w, mx, my, measures(nx, ny, reach), scratch, speed)
+    add_side_linear_moving.py_func(
+        SOUND, DENSITY, w, mx, my, measures(nx, ny, reach), scratch, speed
+    )
     mass = mx * nx + my * ny - speed * (DENSITY + w / SOUND)
     pressure = SOUND * w
     assert scratch[RATE_MASS] == pytest.approx(-reach * mass, rel=1e-12)
@@ -394,7 +450,10 @@ def test_a_moving_side_of_no_speed_is_a_fixed_side():
     random = np.random.default_rng(4)
     nx, ny, reach, *inside = block(random)
     beyond, found = random.normal(0.0, 50.0, 3 * BLOCK), []
-    for add, own, more in ((add_side_linear, (), ()), (add_side_linear_moving, (DENSITY,), (np.zeros(BLOCK),))):
+    for add, own, more in (
+        (add_side_linear, (), ()),
+        (add_side_linear_moving, (DENSITY,), (np.zeros(BLOCK),)),
+    ):
         scratch = np.zeros(ROWS * BLOCK)
         scratch[: 3 * BLOCK] = beyond
         add.py_func(SOUND, *own, *inside, measures(nx, ny, reach), scratch, *more)

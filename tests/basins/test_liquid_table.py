@@ -19,14 +19,22 @@ from fvsolve.features.basins.liquid import riemann_invariants
 from fvsolve.features.basins.liquid.lower import RiemannInvariants
 
 REST = 6e6
-FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}  # 519 m/s, at 300 bar 697 m/s
+# 519 m/s, at 300 bar 697 m/s
+FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}
 TRUTH = Isentrope("CO2", 280.0, REST, 4.5e6, 6e7)
 HOLE = [[3.0, 0.0, 4.0, 1.0]]
 
 
 def basin(**more) -> dict:
-    return {"type": "basin", "size": [4.0, 2.0], "cells": [32, 16], "physics": "liquid", "pressure": REST,
-            "thickness": 0.1, **more}  # fmt: skip
+    return {
+        "type": "basin",
+        "size": [4.0, 2.0],
+        "cells": [32, 16],
+        "physics": "liquid",
+        "pressure": REST,
+        "thickness": 0.1,
+        **more,
+    }
 
 
 def single(pool: dict, end: float = 1.0, **more):
@@ -57,15 +65,21 @@ def test_exact_riemann_problems_of_the_isentrope(name, scheme):
     """L1 errors of density and flow fall as shocks and kinks permit; under the law `log` 0.2 % to 3 % remain."""
     left, right = STATES[name]
     exact, errors, end = Riemann(TRUTH, left, right), [], 0.03
-    start = {"pressure": f"where(x < 50, {left[0] - REST}, {right[0] - REST})",
-             "u": f"where(x < 50, {left[1]}, {right[1]})"}  # fmt: skip
+    start = {
+        "pressure": f"where(x < 50, {left[0] - REST}, {right[0] - REST})",
+        "u": f"where(x < 50, {left[1]}, {right[1]})",
+    }
     for n in (100, 200, 400):
         model = single(basin(size=[100.0, 1.0], cells=[n, 1], start=start), end, scheme=scheme)
         pool = model.meshed[0]
         inner = abs(pool.x - 50.0) < 27.0
         rays = (pool.x[inner, None] - 50.0 + 100.0 / n * ((np.arange(8) + 0.5) / 8 - 0.5)) / end
         means = exact.at(rays.ravel()).reshape(2, -1, 8).mean(axis=2)
-        errors.append(np.abs(at_end(model, end)[:, inner] - means).mean(axis=1) / pool.density / [1.0, pool.speed])
+        errors.append(
+            np.abs(at_end(model, end)[:, inner] - means).mean(axis=1)
+            / pool.density
+            / [1.0, pool.speed]
+        )
     assert (errors[0] / errors[2] > 4**0.6).all() and (errors[2] < 4e-4).all()
 
 
@@ -74,12 +88,17 @@ PULSE = "exp(-((x - 40)/6)^2)"
 
 def pipe_of(n: int, start: np.ndarray, end: float) -> np.ndarray:
     """Density minus that at rest, and mass flow density, at `end` in a pipe of 100 m : float64[2, n]."""
-    nodes, numerics = {"left": reservoir(REST), "right": junction()}, {"scheme": "muscl", "method": "ssp-rk3"}
+    nodes, numerics = (
+        {"left": reservoir(REST), "right": junction()},
+        {"scheme": "muscl", "method": "ssp-rk3"},
+    )
     links = {"main": stiff_pipe("left", "right", 100.0, 0.5, n, friction=NO_FRICTION)}
     model = model_of(scene(nodes, links, end, numerics | {"courant": 0.5}, (), end, fluid=FLUID))
     state, row = fvsolve.initial_state(model), model.tables.pipes[0]
     c, area = row["speed"], row["area"]
-    state.y[: 2 * n] = 0.5 * area * np.concatenate([c * start[0] + start[1], c * start[0] - start[1]])
+    state.y[: 2 * n] = (
+        0.5 * area * np.concatenate([c * start[0] + start[1], c * start[0] - start[1]])
+    )
     y = fvsolve.advance(model, state, end).y
     return np.array([(y[:n] + y[n : 2 * n]) / c, y[:n] - y[n : 2 * n]]) / area
 
@@ -88,12 +107,15 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
     """For a pulse of 40 bar that divides and steepens, the difference falls at the order of the schemes."""
     apart, end = [], 0.04
     for n in (200, 400):
-        pool = basin(size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"})
+        pool = basin(
+            size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"}
+        )
         model = single(pool, end, limiter="monotonized-central")
         start = model.meshed[0].deviations(model.start)[:2]
         found = at_end(model, end) - [[model.meshed[0].density], [0.0]]
         other = pipe_of(n, start, end)
-        assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # the pulse has moved
+        # the pulse has moved
+        assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)
         apart.append(np.abs(found - other).mean(axis=1) / np.abs(found).mean(axis=1))
     assert (np.log2(apart[0] / apart[1]) > 1.8).all() and (apart[1] < 2e-3).all()
 
@@ -123,7 +145,9 @@ def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
     bulk = rho * c**2
     p = rest + bulk * np.linspace(-0.5, 0.5, 33)
     table = FluidTable(p, np.log(rho) + (p - rest) / bulk, np.full(p.size, 1.0 / bulk), 0.0)
-    return RiemannInvariants(Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest).table()
+    return RiemannInvariants(
+        Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest
+    ).table()
 
 
 @pytest.mark.in_turn
@@ -141,9 +165,13 @@ def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):
 def test_so_it_is_on_triangles(scheme, tmp_path):
     field = face_fields.triangles(tmp_path, 10, 8)
     scale = face_fields.RHO * np.array([1.0, face_fields.C, face_fields.C])
-    state = 0.02 * scale[:, None] * np.random.default_rng(4).uniform(-1.0, 1.0, (3, len(field.area)))
+    state = (
+        0.02 * scale[:, None] * np.random.default_rng(4).uniform(-1.0, 1.0, (3, len(field.area)))
+    )
     table = of_log(1e5, face_fields.RHO, face_fields.C)
-    (exact, rate), (found, same) = (field.liquid(rec.LAW_LOG, scheme, state, table=one) for one in (None, table))
+    (exact, rate), (found, same) = (
+        field.liquid(rec.LAW_LOG, scheme, state, table=one) for one in (None, table)
+    )
     assert np.abs(found - exact).max() < 1e-9 * np.abs(exact).max()
     assert same == approx(rate, rel=1e-7)
 
@@ -169,7 +197,10 @@ def test_a_basin_is_relieved_into_the_network_and_all_of_it_is_booked(path, tmp_
     pool |= {"holes": HOLE} if path == "faces" else {}
     links = {"tap": valve("pool.out", "end", 1e-3, ramp(0.0, 0.002, 0.0, 1.0))}
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, "initial": "rest"}
-    nodes, probes = {"pool": pool, "end": reservoir(5e6)}, ["tap.flow", "pool.out.pressure", "pool.out.flow"]
+    nodes, probes = (
+        {"pool": pool, "end": reservoir(5e6)},
+        ["tap.flow", "pool.out.pressure", "pool.out.flow"],
+    )
     result = fvsolve.run(scene(nodes, links, 0.01, numerics, probes, 1e-3, fluid=FLUID))
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-13
     p, flow = result["pool.out.pressure"][-1], result["tap.flow"][-1]
@@ -190,7 +221,9 @@ def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
     stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
     behind = 0.1 * 16 * own.mesh.area[0]  # [m3]
     assert stiffness == approx(TRUTH.c(REST + over) ** 2 / behind, rel=1e-5)
-    assert own.deviations(model.start)[0] == approx(TRUTH.rho(REST + over) - TRUTH.rho(REST), rel=1e-6, abs=1e-6)
+    assert own.deviations(model.start)[0] == approx(
+        TRUTH.rho(REST + over) - TRUTH.rho(REST), rel=1e-6, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("holes", [None, HOLE], ids=["grid", "faces"])
@@ -213,7 +246,9 @@ def test_probes_and_frames_have_the_isentropes_pressures(holes):
 
 @pytest.mark.parametrize("holes", [None, HOLE], ids=["grid", "faces"])
 def test_implicit_steps_agree_with_explicit_ones(holes):
-    pool = basin(cells=[8, 4], start={"pressure": "1e6*cos(pi*x/4)"}, **({"holes": holes} if holes else {}))
+    pool = basin(
+        cells=[8, 4], start={"pressure": "1e6*cos(pi*x/4)"}, **({"holes": holes} if holes else {})
+    )
     found = []
     for method, rtol in (("radau-iia-5", 1e-7), ("dormand-prince", 1e-9)):
         numerics = {"scheme": "upwind", "method": method, "rtol": rtol}
@@ -226,23 +261,35 @@ def test_implicit_steps_agree_with_explicit_ones(holes):
 def test_walls_with_large_compliance_leave_the_pressure_unchanged(wave_speed):
     """A slope of pressure accelerates the fluid as between rigid walls, and the state returns the given pressure."""
     pool = {
-        "type": "basin", "physics": "liquid", "size": [1.0, 0.2], "cells": [10, 2], "pressure": 3e5, "thickness": 0.1,
-        "wave_speed": wave_speed, "start": {"pressure": "1000 * (x - 0.5)"},
-    }  # fmt: skip
+        "type": "basin",
+        "physics": "liquid",
+        "size": [1.0, 0.2],
+        "cells": [10, 2],
+        "pressure": 3e5,
+        "thickness": 0.1,
+        "wave_speed": wave_speed,
+        "start": {"pressure": "1000 * (x - 0.5)"},
+    }
     fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
     model = model_of(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid))
     basin = model.meshed[0]
     rates = basin.states_of(model.evaluate(0.0, model.start.copy())[0])
     assert rates[1].reshape(2, 10)[:, 2:-2] == approx(-1000.0, rel=1e-5)
-    assert basin.fields(basin.deviations(model.start))["pressure"] == approx(3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9)
+    assert basin.fields(basin.deviations(model.start))["pressure"] == approx(
+        3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9
+    )
 
 
 def test_walls_make_no_wave_quicker_than_the_fluids_own():
-    with pytest.raises(CaseError, match="nodes.pool.wave_speed: 600 m/s is faster than sound in the fluid, 519"):
+    with pytest.raises(
+        CaseError, match="nodes.pool.wave_speed: 600 m/s is faster than sound in the fluid, 519"
+    ):
         single(basin(wave_speed=600.0))
 
 
 def test_a_mixture_is_refused():
     fluid = {"name": "ISO VG 46", "law": "mixture", "air_fraction": 0.01}
-    with pytest.raises(CaseError, match='"mixture" does not apply to basins; expected "linear", "log" or "table"'):
+    with pytest.raises(
+        CaseError, match='"mixture" does not apply to basins; expected "linear", "log" or "table"'
+    ):
         fvsolve.load(scene({"pool": basin()}, {}, 1.0, {"scheme": "muscl"}, (), 0.1, fluid=fluid))

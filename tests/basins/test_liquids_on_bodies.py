@@ -26,7 +26,15 @@ REST = 3e5
 def full(cells=(12, 10), size=(2.0, 1.5), **more):
     """Return a closed box full of liquid, between plates 0.1 m apart."""
     outline = {} if "mesh" in more else {"size": list(size), "cells": list(cells)}
-    return {"type": "basin", "physics": "liquid", "on": "body", **outline, "pressure": REST, "thickness": 0.1, **more}
+    return {
+        "type": "basin",
+        "physics": "liquid",
+        "on": "body",
+        **outline,
+        "pressure": REST,
+        "thickness": 0.1,
+        **more,
+    }
 
 
 def case_of(body, basin, end, law="linear", probes=(), **numerics):
@@ -130,8 +138,13 @@ def test_joukowskys_box_that_begins_to_turn_leaves_its_liquid_behind(law):
     rate = amplitude * 2.0 * np.pi / period
     errors = []
     for n in (10, 20):
-        basin, numerics = full((n, n), (long, wide), wave_speed=800.0), {"scheme": "upwind5", "method": "rk4"}
-        basin, found = after(case_of(turning(swing), basin, 0.25, law, courant=0.9, **numerics), 0.25)
+        basin, numerics = (
+            full((n, n), (long, wide), wave_speed=800.0),
+            {"scheme": "upwind5", "method": "rk4"},
+        )
+        basin, found = after(
+            case_of(turning(swing), basin, 0.25, law, courant=0.9, **numerics), 0.25
+        )
         wanted = rate * np.array(spun(basin.x, basin.y, long, wide))
         errors.append(np.abs(found[1:] / RHO - wanted).mean() / np.abs(wanted).mean())
     assert errors[1] < errors[0] / 3.0
@@ -154,20 +167,28 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
     bulk = RHO * c**2
     start = {
         "pressure": f"{high * bulk} * exp(-((x - {1 + away})**2 + (y - 1)**2) / {2 * width**2})",
-        "u": f"{rate} * (y - 1)", "v": f"{-rate} * (x - 1)",
-    }  # fmt: skip
+        "u": f"{rate} * (y - 1)",
+        "v": f"{-rate} * (x - 1)",
+    }
     errors = []
     for n in (48, 96):
         basin = full((n, n), (2.0, 2.0), at=[-1, -1, 0], start=start, wave_speed=c)
-        basin, found = after(case_of(turning(straight(rate, 100.0)), basin, end, "log", courant=0.8), end)
+        basin, found = after(
+            case_of(turning(straight(rate, 100.0)), basin, end, "log", courant=0.8), end
+        )
         x, y = basin.x - 1.0, basin.y - 1.0
         near = np.hypot(x, y) < 0.5  # waves of the walls do not arrive here
         turned = rate * end
-        east, north = math.cos(turned) * x - math.sin(turned) * y, math.sin(turned) * x + math.cos(turned) * y
+        east, north = (
+            math.cos(turned) * x - math.sin(turned) * y,
+            math.sin(turned) * x + math.cos(turned) * y,
+        )
         far = np.hypot(east - away, north)
         radii = np.linspace(0.0, 1.2, 121)
         wanted = high * bulk * np.interp(far, radii, [ring(r, end, c, width) for r in radii])
-        errors.append(np.abs(basin.pressure(found[0]) - wanted)[near].mean() / np.abs(wanted)[near].mean())
+        errors.append(
+            np.abs(basin.pressure(found[0]) - wanted)[near].mean() / np.abs(wanted)[near].mean()
+        )
     assert errors[1] < errors[0] / 3.0
     assert errors[1] < 0.03
 
@@ -181,13 +202,18 @@ def test_a_ring_of_pressure_seen_from_axes_that_turn_is_the_ring_that_stands_sti
 def test_a_full_box_that_is_pushed_at_once_rings_as_a_closed_pipe(along, law):
     """u = F t until waves from both ends arrive; behind them liquid moves with the box, at the pressure rho c u."""
     slows, long, n, c = 2.0, 1.5, 60, 50.0
-    body = sliding({"start": 0.0, "duration": 10.0, "value": [0.0, 0.5 * slows * 100.0], "exponent": 2},
-                   (1, 0, 0) if along == "x" else (0, 1, 0))  # fmt: skip
+    body = sliding(
+        {"start": 0.0, "duration": 10.0, "value": [0.0, 0.5 * slows * 100.0], "exponent": 2},
+        (1, 0, 0) if along == "x" else (0, 1, 0),
+    )
     cells, size = ((n, 1), (long, 0.2)) if along == "x" else ((1, n), (0.2, long))
     for share in (0.4, 0.9):
         end = share * long / c
         basin, found = after(
-            case_of(body, full(cells, size, wave_speed=c), end, law, scheme="upwind5", method="rk4"), end
+            case_of(
+                body, full(cells, size, wave_speed=c), end, law, scheme="upwind5", method="rk4"
+            ),
+            end,
         )
         x = basin.x if along == "x" else basin.y
         reached = np.minimum(np.minimum(x, long - x) / c, end)
@@ -221,7 +247,11 @@ def test_a_joint_holds_the_liquid_that_rests_on_its_body(law):
 @pytest.mark.parametrize("way", ["pitches", "turns", "slides"])
 def test_work_on_a_full_box_is_the_gain_and_the_loss_of_its_liquid(way):
     swing = {"mean": 0.0, "amplitude": 0.1, "period": 0.17}
-    body = {"pitches": turning(swing, (0, 1, 0)), "turns": turning(swing), "slides": sliding(swing)}[way]
+    body = {
+        "pitches": turning(swing, (0, 1, 0)),
+        "turns": turning(swing),
+        "slides": sliding(swing),
+    }[way]
     basin = full((16, 12), at=[-0.8, -0.5, 0.6], attitude=TILT, wave_speed=60.0)
     parts = []
     for step in (4e-4, 2e-4):
@@ -258,10 +288,22 @@ def test_a_full_box_on_a_spring_swings_at_the_root_of_the_tangent_law(law):
         flow = f"{speed} * (cos({k} * x) + {ratio} * sin({k} * x) - 1)"
         basin = full((n, 1), (long, 0.5), wave_speed=c, start={"u": flow})
         world = {"type": "frame", "points": {"far": [5.0, 0, 0]}}
-        spring = {"type": "spring", "from": "body", "to": "world.far", "stiffness": stiff, "preload": 0.0}
-        case = scene({"body": cart(mass, rate=speed), "world": world, "b": basin}, {"spring": spring}, 0.06,
-                     {"scheme": "upwind5", "method": "rk4", "step": 0.5 * long / n / c}, ["body.rate"], every=5e-4,
-                     fluid=FLUIDS[law])  # fmt: skip
+        spring = {
+            "type": "spring",
+            "from": "body",
+            "to": "world.far",
+            "stiffness": stiff,
+            "preload": 0.0,
+        }
+        case = scene(
+            {"body": cart(mass, rate=speed), "world": world, "b": basin},
+            {"spring": spring},
+            0.06,
+            {"scheme": "upwind5", "method": "rk4", "step": 0.5 * long / n / c},
+            ["body.rate"],
+            every=5e-4,
+            fluid=FLUIDS[law],
+        )
         result = run(case)
         errors.append(np.abs(result["body.rate"] - speed * np.cos(w * result.t)).max() / speed)
     assert errors[1] < errors[0] / 2.5
@@ -296,15 +338,30 @@ def slipping(long, wide):
 def test_an_upright_box_on_a_pin_oscillates_as_a_pendulum_with_a_slipping_liquid(law):
     long, high, arm, angle, end = 1.0, 0.6, 0.5, 1e-2, 0.5
     body = {
-        "type": "body", "mass": 5.0, "inertia": [1.0, 1.0, 1.0],
-        "joint": {"kind": "revolute", "axis": [0, 0, 1], "attitude": {"roll": "90 deg"}, "angle": angle},
-    }  # fmt: skip
-    mass = 0.1 * long * high * RHO * (1.0 if law == "linear" else math.exp((REST - AMBIENT) / STIFF))
+        "type": "body",
+        "mass": 5.0,
+        "inertia": [1.0, 1.0, 1.0],
+        "joint": {
+            "kind": "revolute",
+            "axis": [0, 0, 1],
+            "attitude": {"roll": "90 deg"},
+            "angle": angle,
+        },
+    }
+    mass = (
+        0.1 * long * high * RHO * (1.0 if law == "linear" else math.exp((REST - AMBIENT) / STIFF))
+    )
     w = math.sqrt(mass * GRAVITY * arm / (1.0 + mass * (arm**2 + slipping(long, high))))
     errors = []
     for n in (10, 20):
-        basin = full((n, n), (long, high), at=[-0.5 * long, -arm - 0.5 * high, 0.0], wave_speed=400.0)
-        result = run(case_of(body, basin, end, law, ["body.angle"], scheme="upwind5", method="rk4", courant=0.9))
+        basin = full(
+            (n, n), (long, high), at=[-0.5 * long, -arm - 0.5 * high, 0.0], wave_speed=400.0
+        )
+        result = run(
+            case_of(
+                body, basin, end, law, ["body.angle"], scheme="upwind5", method="rk4", courant=0.9
+            )
+        )
         errors.append(np.abs(result["body.angle"] - angle * np.cos(w * result.t)).max() / angle)
     assert errors[1] < errors[0] / 2.0
     assert errors[1] < 5e-3
@@ -314,13 +371,21 @@ def test_an_upright_box_on_a_pin_oscillates_as_a_pendulum_with_a_slipping_liquid
 def test_implicit_methods_agree_on_a_box_that_is_free_to_turn(method):
     """Implicit methods converge to rk4, so their Jacobian contains the coupling of box and body."""
     body = {**HEAVY, "joint": {"kind": "revolute", "axis": [1, 0, 0], "angle": 0.4, "rate": 3.0}}
-    basin = full((5, 4), (1.0, 0.8), at=[-0.2, 0.3, 0.1], attitude={"roll": "70 deg", "yaw": "20 deg"}, wave_speed=60.0)
+    basin = full(
+        (5, 4),
+        (1.0, 0.8),
+        at=[-0.2, 0.3, 0.1],
+        attitude={"roll": "70 deg", "yaw": "20 deg"},
+        wave_speed=60.0,
+    )
     errors = []
     for step in (1e-3, 5e-4):
         found = []
         for one in ("rk4", method):
             numerics = {"scheme": "upwind5", "method": one, "step": step}
-            result = run(case_of(body, basin, 0.02, "log", ["body.angle", "b.pressure@0.3,0.2"], **numerics))
+            result = run(
+                case_of(body, basin, 0.02, "log", ["body.angle", "b.pressure@0.3,0.2"], **numerics)
+            )
             found.append(np.array([result["body.angle"], 1e-5 * result["b.pressure@0.3,0.2"]]))
         errors.append(np.abs(found[1] - found[0]).max())
     assert errors[1] < errors[0] / 8.0
@@ -335,7 +400,9 @@ def test_implicit_methods_agree_on_a_box_that_is_free_to_turn(method):
 @pytest.mark.parametrize("side", [{"boundary": "open"}, {"impedance": 0.0}])
 def test_liquid_beyond_an_open_side_rests_in_the_same_axes(side, law):
     body = {**HEAVY, "joint": {"kind": "fixed", "attitude": TILT}}
-    _, found = after(case_of(body, full(patches={"gap": {"side": "east", **side}}), 0.01, law), 0.01)
+    _, found = after(
+        case_of(body, full(patches={"gap": {"side": "east", **side}}), 0.01, law), 0.01
+    )
     assert np.abs(found[1:]).max() < 1e-12
 
 
@@ -344,7 +411,9 @@ def test_energy_and_joints_are_refused_by_name_where_a_side_is_open():
     water = {"physics": "free-surface", "level": 0.3, "pressure": None, "thickness": None}
     for more in ({}, water):
         basin = {key: one for key, one in {**full(patches=gap), **more}.items() if one is not None}
-        with pytest.raises(FvsolveError, match="a basin on a body with an open side is not supported"):
+        with pytest.raises(
+            FvsolveError, match="a basin on a body with an open side is not supported"
+        ):
             energy(case_of(turning(straight(1.0, 100.0)), basin, 0.01))
         with pytest.raises(CaseError, match=r"joint load omits the flow through b\.gap\."):
             model_of(case_of(turning(straight(1.0, 100.0)), basin, 0.01, probes=["body.joint_fz"]))
@@ -355,7 +424,10 @@ def test_energy_and_joints_are_refused_by_name_where_a_side_is_open():
 FAULTS = {
     "on a body has only": ({}, {"sloshing": "frozen"}),
     "goes? by|on a body has only .cells.": ({}, {"sloshing": "modes"}),
-    "a basin on a body cannot have moving walls": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
+    "a basin on a body cannot have moving walls": (
+        {},
+        {"patches": {"lid": {"side": "east", "travel": 0.1}}},
+    ),
     "and the reaction to outflow": (
         {"joint": {"kind": "prismatic", "axis": [1, 0, 0]}},
         {"patches": {"gap": {"side": "east", "impedance": 0.0}}},

@@ -25,11 +25,25 @@ SPEED = math.sqrt(2.2e9 / RHO)
 def pool(path: str, folder, patches: dict, **more) -> dict:
     """Return a basin of 4 m x 2 m."""
     if path != "triangles":
-        shape = {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": [[1.0, 0.5, 1.5, 1.0]]}}.get(path, {})
-        return {"type": "basin", "size": list(SIZE), "cells": [32, 16], "patches": patches, **shape, **more}
+        shape = {"graded": {"grading": [2.0, 1.5]}, "holes": {"holes": [[1.0, 0.5, 1.5, 1.0]]}}.get(
+            path, {}
+        )
+        return {
+            "type": "basin",
+            "size": list(SIZE),
+            "cells": [32, 16],
+            "patches": patches,
+            **shape,
+            **more,
+        }
     points, cells = triangles(SIZE, 0.125)
-    write(folder / "t.msh", points, cells.tolist(), on_sides(points, boundary(cells), SIZE, patches))
-    stated = {name: {key: value for key, value in patch.items() if key != "side"} for name, patch in patches.items()}
+    write(
+        folder / "t.msh", points, cells.tolist(), on_sides(points, boundary(cells), SIZE, patches)
+    )
+    stated = {
+        name: {key: value for key, value in patch.items() if key != "side"}
+        for name, patch in patches.items()
+    }
     return {"type": "basin", "mesh": {"file": str(folder / "t.msh")}, "patches": stated, **more}
 
 
@@ -56,7 +70,8 @@ LAWS = ["water", "linear", "log", "table"]
 
 
 @pytest.mark.parametrize(
-    "path, scheme, law", [one for one in pairs(PATHS, schemes("grid"), LAWS) if one[1] in schemes(one[0])]
+    "path, scheme, law",
+    [one for one in pairs(PATHS, schemes("grid"), LAWS) if one[1] in schemes(one[0])],
 )
 def test_gain_of_cells_at_an_open_side_is_accounted_to_it(path, scheme, law, tmp_path):
     """Noise near the middle of a side is booked at this side alone; noise everywhere, at all sides."""
@@ -123,7 +138,9 @@ def test_a_wave_into_an_empty_half_leaves_half_its_flow_at_either_end(path, law,
 def test_ledgers_with_four_open_sides_close(path, law, tmp_path):
     """A mound leaves through all sides; water also carries a dye."""
     bump = "exp(-4*((x - 1.5)^2 + (y - 0.8)^2))"
-    start = {"level": f"1 + 0.2*{bump}", "u": 0.3} if law == "water" else {"pressure": f"1e5*{bump}"}
+    start = (
+        {"level": f"1 + 0.2*{bump}", "u": 0.3} if law == "water" else {"pressure": f"1e5*{bump}"}
+    )
     basin = pool(path, tmp_path, OPEN, **physics(law), start=start)
     dye = {"scalars": {"dye": {"initial": 1.0}}} if law == "water" else {}
     end = 2.0 if law == "water" else 3.0 / SPEED
@@ -154,7 +171,9 @@ def test_a_given_velocity_shows_at_the_patches_that_it_passes(path, tmp_path):
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["water", "linear", "log"])
-@pytest.mark.parametrize(("path", "scheme"), [("grid", s) for s in schemes("grid")] + [("triangles", "muscl")])
+@pytest.mark.parametrize(
+    ("path", "scheme"), [("grid", s) for s in schemes("grid")] + [("triangles", "muscl")]
+)
 def test_flow_through_open_sides_stays_within_its_pattern(path, scheme, law, tmp_path):
     patches = OPEN if law == "water" else IMPEDANCE
     basin = pool(path, tmp_path, patches, **physics(law))

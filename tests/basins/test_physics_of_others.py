@@ -106,8 +106,14 @@ class BeltRows(BasinRows):
 ''',
 }
 NUMERICS = {"end": 2.0, "scheme": "upwind", "method": "euler", "courant": 1.0}
-BELT = {"type": "basin", "physics": "belt", "size": [10.0, 2.0], "cells": [10, 2], "pace": "2 m/s",
-        "start": {"heat": "(x > 1) * (x < 3) * (300 + y)"}}  # fmt: skip
+BELT = {
+    "type": "basin",
+    "physics": "belt",
+    "size": [10.0, 2.0],
+    "cells": [10, 2],
+    "pace": "2 m/s",
+    "start": {"heat": "(x > 1) * (x < 3) * (300 + y)"},
+}
 SAYS = """
 import json, sys
 import numpy as np
@@ -152,7 +158,9 @@ def process_results(tmp_path_factory) -> dict:
         (folder / name).write_text(text)
     output = {"every": 0.5, "probes": ["belt.heat@6.5,0.5"]}
     case = {"fluid": dict(WATER), "nodes": {"belt": BELT}, "numerics": NUMERICS, "output": output}
-    found = subprocess.run([sys.executable, "-c", SAYS, str(folder), json.dumps(case)], capture_output=True, text=True)
+    found = subprocess.run(
+        [sys.executable, "-c", SAYS, str(folder), json.dumps(case)], capture_output=True, text=True
+    )
     assert found.returncode == 0, found.stderr
     return json.loads(found.stdout.splitlines()[-1])
 
@@ -171,9 +179,15 @@ def test_it_is_stepped_implicitly(process_results):
 
 
 def test_it_is_checked_by_its_own_declaration(process_results):
-    assert 'no physics named "belt"; expected one of free-surface, liquid, transport' in process_results["unknown"]
+    assert (
+        'no physics named "belt"; expected one of free-surface, liquid, transport'
+        in process_results["unknown"]
+    )
     assert "nodes.belt: pace is missing" in process_results["missing"]
-    assert 'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface' in process_results["other"]
+    assert (
+        'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface'
+        in process_results["other"]
+    )
     assert 'nodes.belt.start.u: does not apply to physics "belt"' in process_results["start"]
     assert 'fluid.law: "log" does not apply to basins; expected "linear"' in process_results["law"]
     assert process_results["path"] == "grid" and process_results["schema"]
@@ -181,7 +195,10 @@ def test_it_is_checked_by_its_own_declaration(process_results):
 
 def test_every_physics_is_a_folder_that_lowers_itself():
     """Each physics has a folder of basins with `part.py` and `lower.py`, and a basin has all its keys."""
-    folders = {path.parent.name for path in (Path(fvsolve.__file__).parent / "features" / "basins").glob("*/part.py")}
+    folders = {
+        path.parent.name
+        for path in (Path(fvsolve.__file__).parent / "features" / "basins").glob("*/part.py")
+    }
     assert {one.__module__.split(".")[-2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)
@@ -192,7 +209,9 @@ def test_every_physics_is_a_folder_that_lowers_itself():
 @pytest.mark.parametrize("key", ["pressure", "size"])  # keys of liquids and of all basins
 def test_a_key_that_exists_retains_its_meaning(key):
     keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
-    with pytest.raises(FvsolveError, match=f'"clock" declares {key} differently from the existing key of a basin'):
+    with pytest.raises(
+        FvsolveError, match=f'"clock" declares {key} differently from the existing key of a basin'
+    ):
         type(Physics)("Clock", (Physics,), keys, name="clock")
     assert "clock" not in Physics.kinds and Basin.keys().count(key) == 1
 

@@ -24,8 +24,13 @@ from scipy.optimize import brentq
 import fvsolve
 
 LONG, SLOPE, ROUGHNESS, INTENSITY = 100.0, 0.02, 0.02, 50 * MM_PER_HOUR
-PLANE = {"size": [LONG, 1.0], "cells": [200, 1], "bed": f"{SLOPE}*({LONG} - x)", "manning": ROUGHNESS,
-         "patches": {"foot": {"side": "east", "boundary": "critical"}}}  # fmt: skip
+PLANE = {
+    "size": [LONG, 1.0],
+    "cells": [200, 1],
+    "bed": f"{SLOPE}*({LONG} - x)",
+    "manning": ROUGHNESS,
+    "patches": {"foot": {"side": "east", "boundary": "critical"}},
+}
 FACTOR = math.sqrt(SLOPE) / ROUGHNESS  # q = FACTOR h^(5/3)
 CONCENTRATION = (LONG / (FACTOR * INTENSITY ** (2 / 3))) ** 0.6  # time to the steady flow [s]
 
@@ -69,9 +74,13 @@ def test_the_recession_after_rain_is_that_of_kinematic_waves():
 
 
 BY_METHOD = {
-    "ssp-rk2": {"courant": 0.9}, "rk4": {"courant": 0.9}, "dormand-prince": {"rtol": 1e-6}, "tr-bdf2": {"step": 5.0},
-    "radau-iia-5": {"rtol": 1e-7}, "rodas-5p": {"rtol": 1e-7},
-}  # fmt: skip
+    "ssp-rk2": {"courant": 0.9},
+    "rk4": {"courant": 0.9},
+    "dormand-prince": {"rtol": 1e-6},
+    "tr-bdf2": {"step": 5.0},
+    "radau-iia-5": {"rtol": 1e-7},
+    "rodas-5p": {"rtol": 1e-7},
+}
 
 
 def green_ampt_height(t: float) -> float:
@@ -81,8 +90,12 @@ def green_ampt_height(t: float) -> float:
     ponding = before / rain
 
     def excess(height):
-        return (height - before - store * math.log((height + store) / (before + store))
-                - CONDUCTIVITY * (t - ponding))  # fmt: skip
+        return (
+            height
+            - before
+            - store * math.log((height + store) / (before + store))
+            - CONDUCTIVITY * (t - ponding)
+        )
 
     return brentq(excess, before, 1.0, xtol=1e-15)
 
@@ -105,30 +118,55 @@ def soil_in_cells(by: str, folder, **texts) -> dict:
     from reference.raster_files import ascii_grid
 
     centres = {name: 2.5 * array + 1.25 for name, array in zip("yx", np.mgrid[:4, :4], strict=True)}
-    return {key: {"raster": str(ascii_grid(folder / f"{key}.asc", eval(text, centres), size=2.5))}
-            for key, text in texts.items()}  # fmt: skip
+    return {
+        key: {"raster": str(ascii_grid(folder / f"{key}.asc", eval(text, centres), size=2.5))}
+        for key, text in texts.items()
+    }
 
 
 @pytest.mark.parametrize("by", ["formula", "raster"])
 def test_green_ampt_of_each_cell_under_deep_water_is_its_closed_form(by, tmp_path):
     """F - S ln(1 + F / S) = K t, with S = psi d."""
-    soil = {"model": "green-ampt", **soil_in_cells(by, tmp_path, conductivity="(5 + x) / 3.6e6", suction="0.1 + 0.01*y",
-                                                   deficit="0.5 - 0.03*x")}  # fmt: skip
+    soil = {
+        "model": "green-ampt",
+        **soil_in_cells(
+            by,
+            tmp_path,
+            conductivity="(5 + x) / 3.6e6",
+            suction="0.1 + 0.01*y",
+            deficit="0.5 - 0.03*x",
+        ),
+    }
     numerics = {"courant": None, "method": "rodas-5p", "rtol": 1e-7}
     model, state = ended(field(1200.0, numerics, level=0.5, infiltration=soil))
     x, y, at = *model.meshed[0].mesh.centre.T, int(model.meshed[0].row["infiltrated"])
     stores = (0.1 + 0.01 * y) * (0.5 - 0.03 * x)
-    exact = [brentq(lambda F, S=S, K=K: F - S * math.log1p(F / S) - K * 1200.0, 1e-9, 1.0, xtol=1e-15)
-             for S, K in zip(stores, (5 + x) / 3.6e6, strict=True)]  # fmt: skip
+    exact = [
+        brentq(lambda F, S=S, K=K: F - S * math.log1p(F / S) - K * 1200.0, 1e-9, 1.0, xtol=1e-15)
+        for S, K in zip(stores, (5 + x) / 3.6e6, strict=True)
+    ]
     assert np.ptp(exact) > 1e-3 and state.y[at : at + 16] == approx(exact, rel=1e-4)
 
 
 @pytest.mark.parametrize("by", ["formula", "raster"])
 def test_horton_of_each_cell_under_deep_water_is_its_integral(by, tmp_path):
-    soil = {"model": "horton", **soil_in_cells(by, tmp_path, initial="(40 + 2*x) / 3.6e6", final="(5 + x) / 3.6e6",
-                                               decay="(1 + 0.2*y) / 3600")}  # fmt: skip
+    soil = {
+        "model": "horton",
+        **soil_in_cells(
+            by,
+            tmp_path,
+            initial="(40 + 2*x) / 3.6e6",
+            final="(5 + x) / 3.6e6",
+            decay="(1 + 0.2*y) / 3600",
+        ),
+    }
     model, state = ended(
-        field(3600.0, {"courant": None, "method": "rodas-5p", "rtol": 1e-8}, level=0.5, infiltration=soil)
+        field(
+            3600.0,
+            {"courant": None, "method": "rodas-5p", "rtol": 1e-8},
+            level=0.5,
+            infiltration=soil,
+        )
     )
     x, y, at = *model.meshed[0].mesh.centre.T, int(model.meshed[0].row["infiltrated"])
     first, last, decay = (40 + 2 * x) / 3.6e6, (5 + x) / 3.6e6, (1 + 0.2 * y) / 3600
@@ -138,7 +176,13 @@ def test_horton_of_each_cell_under_deep_water_is_its_integral(by, tmp_path):
 
 def test_green_ampt_ponds_when_its_capacity_falls_to_the_rain():
     found = fvsolve.run(
-        field(640.0, {"courant": None, "step": 0.5}, every=0.5, rain="50 mm/h", infiltration=GREEN_AMPT)
+        field(
+            640.0,
+            {"courant": None, "step": 0.5},
+            every=0.5,
+            rain="50 mm/h",
+            infiltration=GREEN_AMPT,
+        )
     )
     first = found.t[np.argmax(found["field.volume"] > 1e-7)]  # 1e-9 m
     assert first == approx(610.1, abs=1.0)
@@ -154,7 +198,8 @@ def test_horton_is_its_integral(method):
     )
     numerics |= {"step": 1.0} if method == "tr-bdf2" else {}
     found = fvsolve.run(field(7200.0, numerics, rain="70 mm/h", infiltration=HORTON))
-    k, first, last = 2.0 / 3600.0, 60 * MM_PER_HOUR, 10 * MM_PER_HOUR  # the rain is always above the capacity
+    # the rain is always above the capacity
+    k, first, last = 2.0 / 3600.0, 60 * MM_PER_HOUR, 10 * MM_PER_HOUR
     exact = last * 7200.0 + (first - last) / k * (1.0 - math.exp(-k * 7200.0))
     # at first, water must stand for the excess of the capacity over the share h / tau of the depth
     assert found["field.infiltrated"][-1] / 100.0 == approx(exact, rel=1e-6)
@@ -169,20 +214,36 @@ def test_a_constant_capacity_takes_no_more_than_the_rain():
         assert found["field.rain"][-1] == approx(100.0 * INTENSITY, rel=1e-15)
 
 
-STORM = {"time": ["0 s", "20 s", "60 s", "90 s"], "value": ["0 mm/h", "900 mm/h", "100 mm/h", "0 mm/h"]}
+STORM = {
+    "time": ["0 s", "20 s", "60 s", "90 s"],
+    "value": ["0 mm/h", "900 mm/h", "100 mm/h", "0 mm/h"],
+}
 SOILS = {
-    "none": {}, "constant": {"infiltration": {"model": "constant", "rate": "1e-5*(2 + sin(x))"}},
-    "horton": {"infiltration": HORTON}, "green-ampt": {"infiltration": GREEN_AMPT},
-}  # fmt: skip
+    "none": {},
+    "constant": {"infiltration": {"model": "constant", "rate": "1e-5*(2 + sin(x))"}},
+    "horton": {"infiltration": HORTON},
+    "green-ampt": {"infiltration": GREEN_AMPT},
+}
 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("soil", SOILS)
 @pytest.mark.parametrize("mesh", ["grid", "triangles"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
-def test_a_storm_on_dry_rough_ground_conserves_its_balance_and_depths_above_zero(scheme, mesh, soil, tmp_path):
+def test_a_storm_on_dry_rough_ground_conserves_its_balance_and_depths_above_zero(
+    scheme, mesh, soil, tmp_path
+):
     sides = ("east",)
-    case = field(120.0, {"scheme": scheme}, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, **SOILS[soil])
+    case = field(
+        120.0,
+        {"scheme": scheme},
+        OPEN,
+        cells=[12, 10],
+        bed=HILLS,
+        manning=0.03,
+        rain=STORM,
+        **SOILS[soil],
+    )
     if mesh == "triangles":
         case = on_triangles(case, sides, tmp_path)
     found = fvsolve.run(case)
@@ -191,7 +252,9 @@ def test_a_storm_on_dry_rough_ground_conserves_its_balance_and_depths_above_zero
     by_hand = 100.0 * (450.0 * 20.0 + 500.0 * 40.0 + 50.0 * 30.0) * MM_PER_HOUR
     assert mass["relative"] < 1e-12 and rained == approx(by_hand, rel=1e-12)
     assert found["field.rained"][-1] == approx(rained, rel=1e-12)
-    assert found["field.infiltrated"][-1] == approx(-1e-3 * mass["by_node"].get("field.infiltration", 0.0), rel=1e-12)
+    assert found["field.infiltrated"][-1] == approx(
+        -1e-3 * mass["by_node"].get("field.infiltration", 0.0), rel=1e-12
+    )
     model, state = ended(case)
     assert (model.meshed[0].depth + model.meshed[0].deviations(state.y)[0]).min() > -1e-15
 
@@ -212,7 +275,11 @@ def test_any_number_of_threads_gives_the_same_bits(threads, soil):
 def test_a_probe_that_reads_all_cells_has_a_single_thread_and_the_same_bits(asked, probe):
     case = field(30.0, {}, OPEN, cells=[12, 24], bed=HILLS, manning=0.03, rain=STORM)
     case["output"]["probes"] = [f"field.{probe}"] if asked == "probes" else ["field.rained"]
-    case |= {"limits": {"most": {"on": "field", "quantity": probe, "maximum": 1e3}}} if asked == "limits" else {}
+    case |= (
+        {"limits": {"most": {"on": "field", "quantity": probe, "maximum": 1e3}}}
+        if asked == "limits"
+        else {}
+    )
     one, more = (fvsolve.run(case, threads=count) for count in (1, 3))
     assert more.summary["threads"] == 1 and one.summary["extremes"] == more.summary["extremes"]
     assert any("reads all cells" in notice["text"] for notice in more.summary["warnings"])
@@ -224,7 +291,15 @@ def test_a_probe_that_reads_all_cells_has_a_single_thread_and_the_same_bits(aske
 def test_no_rain_and_a_tight_soil_move_not_a_bit(scheme):
     soil = {"model": "constant", "rate": 0.0}
     model = model_of(
-        field(1.0, {"scheme": scheme}, cells=[12, 10], level=0.1, bed=HILLS, rain="0 mm/h", infiltration=soil)
+        field(
+            1.0,
+            {"scheme": scheme},
+            cells=[12, 10],
+            level=0.1,
+            bed=HILLS,
+            rain="0 mm/h",
+            infiltration=soil,
+        )
     )
     dydt, out = model.evaluate(0.0, np.zeros(model.y_size))
     assert not dydt.any() and not out[model.layout["supply"] :][: model.ledgers].any()
@@ -232,7 +307,16 @@ def test_no_rain_and_a_tight_soil_move_not_a_bit(scheme):
 
 def test_a_resumed_run_has_the_bits_and_the_balance_of_an_uninterrupted_run(tmp_path):
     numerics = {"courant": None, "step": 0.0625}
-    case = field(90.0, numerics, OPEN, cells=[12, 10], bed=HILLS, manning=0.03, rain=STORM, infiltration=GREEN_AMPT)
+    case = field(
+        90.0,
+        numerics,
+        OPEN,
+        cells=[12, 10],
+        bed=HILLS,
+        manning=0.03,
+        rain=STORM,
+        infiltration=GREEN_AMPT,
+    )
     whole = fvsolve.run(case)
     fvsolve.run(case, {"numerics.end": 45.0}, out=tmp_path / "run")
     rest = fvsolve.run(case, out=tmp_path / "run", resume=True)
@@ -242,13 +326,21 @@ def test_a_resumed_run_has_the_bits_and_the_balance_of_an_uninterrupted_run(tmp_
 
 def test_infiltration_of_standing_water_is_that_of_solve_ivp():
     """h' = -f, F' = f with f = min(K (1 + S / F), h / 10 s) : water that stands at the start soaks in too."""
-    found = fvsolve.run(field(900.0, {"courant": None, "step": 0.5}, every=30.0, level=0.01, infiltration=GREEN_AMPT))
+    found = fvsolve.run(
+        field(
+            900.0, {"courant": None, "step": 0.5}, every=30.0, level=0.01, infiltration=GREEN_AMPT
+        )
+    )
 
     def rates(t, y):
-        taken = min(CONDUCTIVITY * (1.0 + SUCTION * DEFICIT / max(y[1], 1e-300)), max(y[0], 0.0) / 10.0)
+        taken = min(
+            CONDUCTIVITY * (1.0 + SUCTION * DEFICIT / max(y[1], 1e-300)), max(y[0], 0.0) / 10.0
+        )
         return [-taken, taken]
 
-    exact = solve_ivp(rates, (0.0, 900.0), [0.01, 0.0], method="LSODA", rtol=1e-10, atol=1e-14, t_eval=found.t)
+    exact = solve_ivp(
+        rates, (0.0, 900.0), [0.01, 0.0], method="LSODA", rtol=1e-10, atol=1e-14, t_eval=found.t
+    )
     assert found["field.infiltrated"] / 100.0 == approx(exact.y[1], rel=2e-4, abs=1e-8)
 
 
@@ -263,9 +355,10 @@ FAULTS = {
     "is below `final`": {"infiltration": HORTON | {"final": "70 mm/h"}},
     "rain: .* at least 0": {"rain": "-1 mm/h"},
     "not supported for a basin with a moving wall": {
-        "rain": "1 mm/h", "patches": {"wall": {"side": "west", "travel": 0.0}}
+        "rain": "1 mm/h",
+        "patches": {"wall": {"side": "west", "travel": 0.0}},
     },
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", FAULTS)
@@ -276,17 +369,23 @@ def test_rain_and_soil_that_cannot_be_are_named(text):
 
 def test_scalars_cannot_infiltrate():
     case = field(1.0, infiltration=GREEN_AMPT) | {"scalars": {"dye": {}}}
-    with pytest.raises(fvsolve.FvsolveError, match=r"field\.infiltration: .* not the scalars in it"):
+    with pytest.raises(
+        fvsolve.FvsolveError, match=r"field\.infiltration: .* not the scalars in it"
+    ):
         fvsolve.load(case)
 
 
 def test_rain_above_a_cloudburst_gets_a_note():
-    assert any("cloudburst" in notice.text for notice in fvsolve.load(field(1.0, rain="900 mm/h")).notices)
+    assert any(
+        "cloudburst" in notice.text for notice in fvsolve.load(field(1.0, rain="900 mm/h")).notices
+    )
     assert not fvsolve.load(field(1.0, rain="90 mm/h")).notices
 
 
 def test_a_case_that_rain_fills_starts_dry_without_a_notice():
-    assert not [notice for notice in model_of(field(1.0, rain="90 mm/h")).warnings if "dry" in notice.text]
+    assert not [
+        notice for notice in model_of(field(1.0, rain="90 mm/h")).warnings if "dry" in notice.text
+    ]
     assert [notice for notice in model_of(field(1.0)).warnings if "dry" in notice.text]
 
 
@@ -298,14 +397,23 @@ def test_a_v_shaped_catchment_has_the_flow_and_the_store_of_kinematic_waves():
     """
     rate, long, across, along = 10.8 * MM_PER_HOUR, 1000.0, 0.05, 0.02
     sides = {"left": [0.0, 800.0], "out": [800.0, 820.0], "right": [820.0, 1620.0]}
-    patches = {name: {"side": "north", "span": span, "normal_slope": along} for name, span in sides.items()}
-    basin = {"size": [1620.0, long], "cells": [81, 20], "bed": "0.02*(1000 - y) + 0.05*max(abs(x - 810) - 10, 0)",
-             "manning": "where(abs(x - 810) < 10, 0.15, 0.015)", "rain": "10.8 mm/h", "patches": patches}  # fmt: skip
+    patches = {
+        name: {"side": "north", "span": span, "normal_slope": along} for name, span in sides.items()
+    }
+    basin = {
+        "size": [1620.0, long],
+        "cells": [81, 20],
+        "bed": "0.02*(1000 - y) + 0.05*max(abs(x - 810) - 10, 0)",
+        "manning": "where(abs(x - 810) < 10, 0.15, 0.015)",
+        "rain": "10.8 mm/h",
+        "patches": patches,
+    }
     case = field(5400.0, **basin)
     case["output"]["probes"] += ["field.out.flow"]
     found = fvsolve.run(case)
     slope = math.hypot(across, along)
-    d, y = np.meshgrid((np.arange(800) + 0.5), (np.arange(1000) + 0.5))  # distance from the ridge and along the channel
+    # distance from the ridge and along the channel
+    d, y = np.meshgrid((np.arange(800) + 0.5), (np.arange(1000) + 0.5))
     path = np.minimum(d * slope / across, y * slope / along)
     planes = 2.0 * np.sum((rate * path * 0.015 / math.sqrt(slope)) ** 0.6)
     bank = rate * np.minimum(800.0 * slope / across, y[:, 0] * slope / along) * across / slope
@@ -316,7 +424,10 @@ def test_a_v_shaped_catchment_has_the_flow_and_the_store_of_kinematic_waves():
 
 
 def test_a_uniform_field_of_manning_gives_the_bits_of_a_number():
-    both = [field(60.0, {}, OPEN, cells=[12, 10], bed=HILLS, manning=n, rain=STORM) for n in (0.03, "0.03 + 0*x")]
+    both = [
+        field(60.0, {}, OPEN, cells=[12, 10], bed=HILLS, manning=n, rain=STORM)
+        for n in (0.03, "0.03 + 0*x")
+    ]
     one, other = (fvsolve.run(case) for case in both)
     assert (one["field.volume"] == other["field.volume"]).all()
 
@@ -334,7 +445,9 @@ def gauged(gauges, probes) -> dict:
 
 
 def test_a_gauge_names_a_point():
-    found = fvsolve.run(gauged(GAUGES, ["field.depth@kerb", "field.depth@3,4"]), {"nodes.field.bed": "0.2*x - 3"})
+    found = fvsolve.run(
+        gauged(GAUGES, ["field.depth@kerb", "field.depth@3,4"]), {"nodes.field.bed": "0.2*x - 3"}
+    )
     assert (found["field.depth@kerb"] == found["field.depth@3,4"]).all()
 
 
@@ -364,11 +477,15 @@ def soil_by_scipy(capacity, first: float, rain, end: float) -> float:
         taken = min(capacity(max(height, 1e-12)), rain(t) + max(depth, 0.0) / 10.0)
         return [rain(t) - taken, taken]
 
-    return solve_ivp(rates, (0.0, end), [first, 1e-9], "LSODA", rtol=1e-8, atol=1e-12, max_step=20.0).y[1, -1]
+    return solve_ivp(
+        rates, (0.0, end), [first, 1e-9], "LSODA", rtol=1e-8, atol=1e-12, max_step=20.0
+    ).y[1, -1]
 
 
-DRY_WET_DRY = {"time": [0.0, 600.0, 601.0, 1500.0, 1501.0, 2700.0, 2701.0, 3600.0],
-               "value": [f"{rate} mm/h" for rate in (4, 4, 90, 90, 0, 0, 60, 60)]}  # fmt: skip
+DRY_WET_DRY = {
+    "time": [0.0, 600.0, 601.0, 1500.0, 1501.0, 2700.0, 2701.0, 3600.0],
+    "value": [f"{rate} mm/h" for rate in (4, 4, 90, 90, 0, 0, 60, 60)],
+}
 
 
 def horton_capacity(height: float) -> float:
@@ -382,8 +499,15 @@ def horton_capacity(height: float) -> float:
 @pytest.mark.parametrize("method", BY_METHOD)
 @pytest.mark.parametrize("soil", [HORTON, GREEN_AMPT], ids=["horton", "green-ampt"])
 def test_capacities_fall_with_the_infiltrated_height_through_dry_and_wet_times(soil, method):
-    capacity = horton_capacity if soil is HORTON else lambda height: CONDUCTIVITY * (1 + SUCTION * DEFICIT / height)
-    times, values = DRY_WET_DRY["time"], [float(text.split()[0]) * MM_PER_HOUR for text in DRY_WET_DRY["value"]]
+    capacity = (
+        horton_capacity
+        if soil is HORTON
+        else lambda height: CONDUCTIVITY * (1 + SUCTION * DEFICIT / height)
+    )
+    times, values = (
+        DRY_WET_DRY["time"],
+        [float(text.split()[0]) * MM_PER_HOUR for text in DRY_WET_DRY["value"]],
+    )
     exact = soil_by_scipy(capacity, 0.0, lambda t: np.interp(t, times, values), 3600.0)
     numerics = {"courant": None, "method": method} | BY_METHOD[method]
     found = fvsolve.run(field(3600.0, numerics, rain=DRY_WET_DRY, infiltration=soil))
@@ -391,21 +515,36 @@ def test_capacities_fall_with_the_infiltrated_height_through_dry_and_wet_times(s
 
 
 STANDING = {
-    "ssp-rk2": {"courant": 0.9}, "ssp-rk3": {"courant": 0.9}, "rk4": {"courant": 0.9},
-    "bogacki-shampine": {"step": 2.5}, "dormand-prince": {"rtol": 1e-4}, "tr-bdf2": {"step": 10.0},
-    "radau-iia-5": {"rtol": 1e-4}, "rodas-4": {"rtol": 1e-4}, "auto": {},
-}  # fmt: skip
+    "ssp-rk2": {"courant": 0.9},
+    "ssp-rk3": {"courant": 0.9},
+    "rk4": {"courant": 0.9},
+    "bogacki-shampine": {"step": 2.5},
+    "dormand-prince": {"rtol": 1e-4},
+    "tr-bdf2": {"step": 10.0},
+    "radau-iia-5": {"rtol": 1e-4},
+    "rodas-4": {"rtol": 1e-4},
+    "auto": {},
+}
 
 
 @pytest.mark.parametrize("method", STANDING)
 def test_green_ampt_under_standing_water_is_its_closed_form(method):
     """The capacity is infinite at the start: F - S ln(1 + F / S) = K t; 22.9 and 84 mm were found in place of 6.19."""
-    exact = {t: brentq(lambda F, t=t: F - 0.0297 * math.log1p(F / 0.0297) - 3.4 * MM_PER_HOUR * t, 1e-9, 1.0)
-             for t in (120.0, 600.0)}  # fmt: skip
+    exact = {
+        t: brentq(
+            lambda F, t=t: F - 0.0297 * math.log1p(F / 0.0297) - 3.4 * MM_PER_HOUR * t, 1e-9, 1.0
+        )
+        for t in (120.0, 600.0)
+    }
     soil = {"model": "green-ampt", "conductivity": "3.4 mm/h", "suction": "110 mm", "deficit": 0.27}
     for size, level in (([100.0, 40.0], 1.0), ([500.0, 200.0], 2.0)):
-        case = field(600.0, {"courant": None, "method": method} | STANDING[method], every=120.0, level=level,
-                     infiltration=soil)  # fmt: skip
+        case = field(
+            600.0,
+            {"courant": None, "method": method} | STANDING[method],
+            every=120.0,
+            level=level,
+            infiltration=soil,
+        )
         case["nodes"]["field"] |= {"size": size}
         found = fvsolve.run(case)
         heights = found["field.infiltrated"] / (size[0] * size[1])

@@ -18,7 +18,8 @@ from fvsolve.parts.raster_systems import are_probably_degrees, epsg_code, stretc
 
 ARC = 1.0 / 3600.0  # second of arc [deg]
 DEGREES = [  # south-west corner, size and number of pixels
-    ((-105.5, 40.1), (0.000833333333, 0.000833333333), (4, 3)),  # the scene of the fault: SRTM, 3 seconds of arc
+    # the scene of the fault: SRTM, 3 seconds of arc
+    ((-105.5, 40.1), (0.000833333333, 0.000833333333), (4, 3)),
     ((7.0, 45.0), (ARC, ARC), (3601, 3601)),  # SRTM, a second of arc
     ((7.0, 45.0), (0.00028, 0.00028), (36, 36)),  # with two digits
     ((-0.2, 51.4), (0.000277777777778, 0.000277777777778), (1440, 720)),  # London, on the meridian
@@ -26,7 +27,8 @@ DEGREES = [  # south-west corner, size and number of pixels
     ((8.0, 52.0), (1.5 * ARC, ARC), (2400, 3600)),  # Copernicus
     ((10.5, 45.5), (ARC / 3.0, ARC / 3.0), (1000, 1000)),  # USGS
     ((10.5, 45.5), (0.0001, 0.0001), (1000, 1000)),
-    ((10.5, 45.5), (0.0008333333333333209, 0.0008333333333333209), (1000, 1000)),  # a quotient of rounded numbers
+    # a quotient of rounded numbers
+    ((10.5, 45.5), (0.0008333333333333209, 0.0008333333333333209), (1000, 1000)),
     ((12.0, 41.0), (0.0166666, 0.0166666), (100, 100)),  # cut off, not rounded
     ((283.0, 41.0), (0.0166667, 0.0166667), (100, 100)),  # to 360 degrees
     ((-180.0, -90.0), (1.0 / 12.0, 1.0 / 12.0), (4320, 2160)),
@@ -57,7 +59,9 @@ def test_zones_of_utm_are_those_of_the_text_books():
         (179.9, -41.0): 32760,
         (355.0, 40.0): 32630,
     }
-    assert {place: utm_code(*place) for place in places} == {place: f"EPSG:{code}" for place, code in places.items()}
+    assert {place: utm_code(*place) for place in places} == {
+        place: f"EPSG:{code}" for place, code in places.items()
+    }
 
 
 def degrees_grid(path, **changes):
@@ -69,10 +73,22 @@ def degrees_grid(path, **changes):
 def test_a_raster_in_degrees_without_a_system_is_refused(crs, tmp_path):
     """Also where the basin states its own system: no raster of UTM lies there."""
     path = str(degrees_grid(tmp_path / "dem.asc"))
-    over = {"size": None, "cells": None, "mesh": {"raster": path, "cell": 0.000833333333}, "level": 2250.0, "crs": crs}
+    over = {
+        "size": None,
+        "cells": None,
+        "mesh": {"raster": path, "cell": 0.000833333333},
+        "level": 2250.0,
+        "crs": crs,
+    }
     text = str(refused(pond({"raster": path}, **over)))
-    assert "dem.asc states no coordinate system, and its numbers look like degrees: pixels of 0.000833333" in text
-    assert "-t_srs EPSG:32613; if they are metres, state a system in dem.prj, for example LOCAL_CS[" in text
+    assert (
+        "dem.asc states no coordinate system, and its numbers look like degrees: pixels of 0.000833333"
+        in text
+    )
+    assert (
+        "-t_srs EPSG:32613; if they are metres, state a system in dem.prj, for example LOCAL_CS["
+        in text
+    )
 
 
 def test_a_raster_that_states_metres_is_read_wherever_it_lies(tmp_path):
@@ -81,30 +97,41 @@ def test_a_raster_that_states_metres_is_read_wherever_it_lies(tmp_path):
     assert read_pixels(path).dx == 0.000833333333
     grid = {"size": 0.000833333333, "corner": (-105.5, 40.1)}
     assert read_pixels(netcdf(tmp_path / "m.nc", heights(3, 4), **grid, wkt="")).metric
-    with pytest.raises(ValueError, match=r"t.tif states no coordinate system.*state a system in the file"):
+    with pytest.raises(
+        ValueError, match=r"t.tif states no coordinate system.*state a system in the file"
+    ):
         read_pixels(geotiff(tmp_path / "t.tif", heights(3, 4), **grid, crs=None))
     assert read_pixels(geotiff(tmp_path / "u.tif", heights(3, 4), **grid, crs="EPSG:32613")).metric
 
 
 WGS = 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],UNIT["degree",0.0174532925199433]]'
 IN_DEGREES = {
-    "wkt": WGS, "wkt of two lines": f"\n {WGS}\n", "with heights": f'COMPD_CS["WGS 84 + EGM96",{WGS},VERT_CS["EGM96"]]',
-    "wkt 2": 'GEOGCRS["WGS 84",ID["EPSG",4326]]', "code": "EPSG:4326\n", "proj": "+proj=longlat +datum=WGS84 +no_defs",
+    "wkt": WGS,
+    "wkt of two lines": f"\n {WGS}\n",
+    "with heights": f'COMPD_CS["WGS 84 + EGM96",{WGS},VERT_CS["EGM96"]]',
+    "wkt 2": 'GEOGCRS["WGS 84",ID["EPSG",4326]]',
+    "code": "EPSG:4326\n",
+    "proj": "+proj=longlat +datum=WGS84 +no_defs",
     "arcinfo": "Projection    GEOGRAPHIC\nDatum         WGS84\nUnits         DD\nZunits        METERS\nParameters\n",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", IN_DEGREES)
 def test_all_forms_of_a_system_in_degrees_are_refused(kind, tmp_path):
     (tmp_path / "dem.prj").write_text(IN_DEGREES[kind])
-    with pytest.raises(ValueError, match=r"dem.asc is in degrees; expected a raster with coordinates in metres"):
+    with pytest.raises(
+        ValueError, match=r"dem.asc is in degrees; expected a raster with coordinates in metres"
+    ):
         read_pixels(ascii_grid(tmp_path / "dem.asc", heights()))
 
 
 def test_a_projected_system_in_feet_is_refused_as_in_a_geotiff(tmp_path):
     metres = f'PROJCS["NAD83 / Texas",{WGS},PROJECTION["Lambert"],UNIT["metre",1]]'
-    for text, fault in {metres: "", metres.replace('"metre",1', '"Foot_US",0.3048006096012192'): "is in Foot_US",
-                        f'COMPD_CS["a",{metres},VERT_CS["b",UNIT["foot",0.3048]]]': ""}.items():  # fmt: skip
+    for text, fault in {
+        metres: "",
+        metres.replace('"metre",1', '"Foot_US",0.3048006096012192'): "is in Foot_US",
+        f'COMPD_CS["a",{metres},VERT_CS["b",UNIT["foot",0.3048]]]': "",
+    }.items():
         (tmp_path / "dem.prj").write_text(text)
         path = ascii_grid(tmp_path / "dem.asc", heights())
         os.utime(path, ns=(time.time_ns(), time.time_ns()))
@@ -116,7 +143,8 @@ def test_a_projected_system_in_feet_is_refused_as_in_a_geotiff(tmp_path):
 
 
 ESRI = (
-    f'PROJCS["WGS_1984_Web_Mercator_Auxiliary_Sphere",{WGS},PROJECTION["Mercator_Auxiliary_Sphere"],UNIT["Meter",1.0]]'
+    f'PROJCS["WGS_1984_Web_Mercator_Auxiliary_Sphere",{WGS},'
+    'PROJECTION["Mercator_Auxiliary_Sphere"],UNIT["Meter",1.0]]'
 )
 
 
@@ -127,17 +155,27 @@ def test_the_mercator_projection_gives_a_note_with_its_stretch(tmp_path):
     assert stretch("EPSG:32633", north) == 1.0 and epsg_code(ESRI) == "EPSG:3857"
     path = ascii_grid(tmp_path / "dem.asc", heights(), corner=(0.0, north - 3.0))
     frame = {"origin": [0.0, north - 3.0]}
-    given = {"a": pond({"raster": str(path)}, crs="EPSG:3857", **frame), "b": pond(0.0, crs="EPSG:900913", **frame),
-             "utm": pond(0.0, crs="EPSG:32633", **frame)}  # fmt: skip
-    notes = {name: [str(note) for note in fvsolve.run(case).warnings] for name, case in given.items()}
+    given = {
+        "a": pond({"raster": str(path)}, crs="EPSG:3857", **frame),
+        "b": pond(0.0, crs="EPSG:900913", **frame),
+        "utm": pond(0.0, crs="EPSG:32633", **frame),
+    }
+    notes = {
+        name: [str(note) for note in fvsolve.run(case).warnings] for name, case in given.items()
+    }
     for name, code in (("a", 3857), ("b", 900913)):
         found = [note for note in notes[name] if "stretches lengths" in note]
-        assert len(found) == 1 and f"EPSG:{code} stretches lengths by 1/cos(latitude): 1.556 times" in found[0]
+        assert (
+            len(found) == 1
+            and f"EPSG:{code} stretches lengths by 1/cos(latitude): 1.556 times" in found[0]
+        )
         assert "at 50 degrees" in found[0]
     assert not any("stretches" in note for note in notes["utm"])
     (tmp_path / "dem.prj").write_text(ESRI)
     os.utime(path, ns=(time.time_ns(), time.time_ns()))
-    assert "EPSG:3857 stretches lengths" in str(fvsolve.run(pond({"raster": str(path)}, **frame)).warnings)
+    assert "EPSG:3857 stretches lengths" in str(
+        fvsolve.run(pond({"raster": str(path)}, **frame)).warnings
+    )
 
 
 def test_decimal_commas_of_a_grid_are_named_with_their_line(tmp_path):
@@ -145,12 +183,16 @@ def test_decimal_commas_of_a_grid_are_named_with_their_line(tmp_path):
     text = path.read_text()
     path.write_text(text.replace(".", ","))
     fault = str(refused(pond({"raster": str(path)})))
-    assert "dem.asc" in fault and 'has a comma; did you mean "0.0"?; expected numbers with decimal points' in fault
+    assert (
+        "dem.asc" in fault
+        and 'has a comma; did you mean "0.0"?; expected numbers with decimal points' in fault
+    )
     head, rows = text[: text.index("-9999") + 6], text[text.index("-9999") + 6 :]
     path.write_text(head + rows.replace(".", ","))
     first = rows.split()[0]
-    assert f'dem.asc, line 7: "{first.replace(".", ",")}" has a comma; did you mean "{first}"?' in str(
-        refused(pond({"raster": str(path)}))
+    assert (
+        f'dem.asc, line 7: "{first.replace(".", ",")}" has a comma; did you mean "{first}"?'
+        in str(refused(pond({"raster": str(path)})))
     )
     path.write_text(text.replace("ncols 20", "ncols 20.5"))
     assert "expected whole numbers of pixels above 0" in str(refused(pond({"raster": str(path)})))
@@ -160,7 +202,9 @@ def test_decimal_commas_of_a_grid_are_named_with_their_line(tmp_path):
 def test_the_words_of_a_unit_are_those_of_its_symbol(unit, tmp_path):
     values = heights()
     plain = bed_of(pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))}))[0]
-    words = bed_of(pond({"raster": str(netcdf(tmp_path / "dem.nc", values, unit=unit)), "unit": unit}))[0]
+    words = bed_of(
+        pond({"raster": str(netcdf(tmp_path / "dem.nc", values, unit=unit)), "unit": unit})
+    )[0]
     assert (words == plain).all()
 
 
@@ -175,7 +219,11 @@ def test_rain_after_cf_falls_as_stated(unit, scale, tmp_path):
             item = file.createVariable(name, "d", (name,))
             item[:], item.units = 0.5 * (np.arange(count) + 0.5), "m"
         item = file.createVariable("pr", "d", ("y", "x"))
-        item[:], item.units, item.standard_name = np.full((12, 20), 1e-5 * scale), unit, "precipitation_flux"
+        item[:], item.units, item.standard_name = (
+            np.full((12, 20), 1e-5 * scale),
+            unit,
+            "precipitation_flux",
+        )
     result = fvsolve.run(pond(0.0, 1.0, ["pond.rained"], rain={"raster": str(path)}))
     assert result["pond.rained"][-1] == approx(1e-5 * 60.0, rel=1e-9)
 
@@ -185,7 +233,12 @@ def test_a_megabyte_of_equal_characters_in_a_raster_is_read_or_refused_in_bounde
     start, count = time.process_time(), 0
     for sign in " 9,\n#a":
         fill = sign * 10**6
-        texts = {fill, fill + head + row, head.replace("ncols 2", "ncols " + fill) + row, head + "1" + fill + "2\n"}
+        texts = {
+            fill,
+            fill + head + row,
+            head.replace("ncols 2", "ncols " + fill) + row,
+            head + "1" + fill + "2\n",
+        }
         for text, projection in product(texts, ("", fill)):
             path = tmp_path / f"{count}.asc"
             path.write_text(text)

@@ -20,11 +20,15 @@ EAST, NORTH = 412000.0, 5650000.0
 def netcdf_4(path, values, size=0.5, corner=(0.0, 0.0), names=("y", "x"), **axis):
     pytest.importorskip("h5netcdf")
     xarray = pytest.importorskip("xarray")
-    axes = {key: low + size * (np.arange(count) + 0.5)
-            for key, low, count in zip(names, corner[::-1], values.shape, strict=True)}  # fmt: skip
+    axes = {
+        key: low + size * (np.arange(count) + 0.5)
+        for key, low, count in zip(names, corner[::-1], values.shape, strict=True)
+    }
     data = xarray.Dataset({"height": (names, values)}, axes)
     data[names[0]].attrs.update(axis)
-    data.transpose(*(names[::-1] if names != ("y", "x") else names)).to_netcdf(path, engine="h5netcdf")
+    data.transpose(*(names[::-1] if names != ("y", "x") else names)).to_netcdf(
+        path, engine="h5netcdf"
+    )
     return path
 
 
@@ -47,7 +51,9 @@ def test_the_volume_below_aligned_rectangles_is_that_of_the_pixels(tmp_path, cel
 
 def test_means_over_graded_rectangles_with_holes_are_exact(tmp_path):
     values = heights()
-    case = pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))}, cells=[7, 5], grading=[3.0, 0.5])
+    case = pond(
+        {"raster": str(ascii_grid(tmp_path / "dem.asc", values))}, cells=[7, 5], grading=[3.0, 0.5]
+    )
     bed, area = bed_of(case)
     assert bed @ area == approx(values.sum() * 0.25, rel=1e-9)
     case = pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))}, holes=[[2, 2, 4, 4]])
@@ -61,7 +67,12 @@ def test_the_volume_below_triangles_is_that_of_the_pixels_to_a_thousandth(tmp_pa
     points, cells = triangles((10.0, 6.0), 0.6)
     mesh = write(tmp_path / "pond.msh", points, cells.tolist(), {"": boundary(cells)})
     bed, area = bed_of(
-        pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))}, size=None, cells=None, mesh={"file": str(mesh)})
+        pond(
+            {"raster": str(ascii_grid(tmp_path / "dem.asc", values))},
+            size=None,
+            cells=None,
+            mesh={"file": str(mesh)},
+        )
     )
     assert bed @ area == approx(values.sum() * 0.25, rel=1e-3)
     flat = ascii_grid(tmp_path / "flat.asc", np.full((12, 20), 1.7))
@@ -114,13 +125,20 @@ def test_rasters_are_fields_of_all_keys(tmp_path):
     ascii_grid(tmp_path / "soil.asc", np.where(classes == 1, 10.0, 2.0))
     ascii_grid(tmp_path / "level.asc", np.where(classes == 1, 3.0, 2.5))
     soil = {"model": "constant", "rate": {"raster": str(tmp_path / "soil.asc"), "unit": "mm/h"}}
-    given = {"manning": {"raster": str(land), "table": {"1": 0.03, "7": 0.06}}, "infiltration": soil,
-             "start": {"level": {"raster": str(tmp_path / "level.asc")}}}  # fmt: skip
-    same = {"manning": step.format(0.03, 0.06), "start": {"level": step.format(3, 2.5)},
-            "infiltration": {"model": "constant", "rate": step.format(10 / 3.6e6, 2 / 3.6e6)}}  # fmt: skip
+    given = {
+        "manning": {"raster": str(land), "table": {"1": 0.03, "7": 0.06}},
+        "infiltration": soil,
+        "start": {"level": {"raster": str(tmp_path / "level.asc")}},
+    }
+    same = {
+        "manning": step.format(0.03, 0.06),
+        "start": {"level": step.format(3, 2.5)},
+        "infiltration": {"model": "constant", "rate": step.format(10 / 3.6e6, 2 / 3.6e6)},
+    }
     probes = ["pond.depth@3.5,3", "pond.infiltrated", "pond.volume"]
     rows = [
-        np.array([fvsolve.run(pond(0.0, 2.0, probes, **keys))[probe] for probe in probes]) for keys in (given, same)
+        np.array([fvsolve.run(pond(0.0, 2.0, probes, **keys))[probe] for probe in probes])
+        for keys in (given, same)
     ]
     assert rows[0] == approx(rows[1], rel=1e-9)
     text = str(refused(pond(0.0, manning={"raster": str(land), "table": {"1": 0.03}})))
@@ -129,8 +147,15 @@ def test_rasters_are_fields_of_all_keys(tmp_path):
 
 def test_a_case_with_rasters_runs_again_from_its_directory(tmp_path):
     path = ascii_grid(tmp_path / "dem.asc", heights(), corner=(EAST, NORTH))
-    case = pond({"raster": str(path)}, probes=["pond.bed@3,3"], origin=[EAST, NORTH], crs=f"EPSG:{UTM}", size=None,
-                cells=None, mesh={"raster": str(path), "cell": "1 m", "outside": "hole"})  # fmt: skip
+    case = pond(
+        {"raster": str(path)},
+        probes=["pond.bed@3,3"],
+        origin=[EAST, NORTH],
+        crs=f"EPSG:{UTM}",
+        size=None,
+        cells=None,
+        mesh={"raster": str(path), "cell": "1 m", "outside": "hole"},
+    )
     first = fvsolve.run(case, out=tmp_path / "run")
     again = fvsolve.run(tmp_path / "run" / "case.toml")
     assert first.ok and (np.array(first["pond.bed@3,3"]) == np.array(again["pond.bed@3,3"])).all()
@@ -141,12 +166,21 @@ def test_a_basin_over_a_raster_has_holes_where_it_lacks_data(tmp_path):
     values[:4, 12:] = np.nan  # an island in the south-east corner, and a pixel at the north
     values[-1, 0] = np.nan
     path = str(ascii_grid(tmp_path / "dem.asc", values, corner=(EAST, NORTH)))
-    over = {"size": None, "cells": None, "origin": [EAST - 10.0, NORTH], "mesh": {"raster": path, "cell": "1 m"}}
+    over = {
+        "size": None,
+        "cells": None,
+        "origin": [EAST - 10.0, NORTH],
+        "mesh": {"raster": path, "cell": "1 m"},
+    }
     over["mesh"]["outside"] = "hole"
-    model = model_of(pond({"raster": path}, patches={"out": {"side": "east", "boundary": "critical"}}, **over))
+    model = model_of(
+        pond({"raster": path}, patches={"out": {"side": "east", "boundary": "critical"}}, **over)
+    )
     mesh = model.meshed[0].mesh
     assert len(mesh.cells) == 60 - 8 - 1 and (mesh.grid.nx, mesh.grid.ny) == (10, 6)
-    assert mesh.points.min(axis=0) == approx([10.0, 0.0]) and mesh.points.max(axis=0) == approx([20.0, 6.0])
+    assert mesh.points.min(axis=0) == approx([10.0, 0.0]) and mesh.points.max(axis=0) == approx(
+        [20.0, 6.0]
+    )
     assert mesh.length[mesh.patch("out")].sum() == approx(4.0)
     whole = np.nansum(values) - np.nansum(values[-2:, :2])
     assert model.meshed[0].bed @ mesh.area == approx(whole * 0.25, rel=1e-12)
@@ -161,14 +195,21 @@ def test_cells_smaller_than_pixels_are_noticed(tmp_path):
     bed = {"raster": str(ascii_grid(tmp_path / "dem.asc", heights()))}
     texts = [str(fvsolve.run(pond(bed, cells=cells)).warnings) for cells in ([20, 12], [40, 24])]
     assert "terraces" not in texts[0] and "missing data" not in texts[0]
-    assert "cells of 0.25 m are smaller than the pixels of dem.asc, so the bed has terraces" in texts[1]
+    assert (
+        "cells of 0.25 m are smaller than the pixels of dem.asc, so the bed has terraces"
+        in texts[1]
+    )
 
 
 def test_a_bed_with_undeclared_missing_data_is_noticed(tmp_path):
     values = heights()
     values[4, 4] = -32768.0
-    (notice,) = fvsolve.run(pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))})).warnings
-    assert "from -81" in str(notice) and "does dem.asc state its value of missing data?" in str(notice)
+    (notice,) = fvsolve.run(
+        pond({"raster": str(ascii_grid(tmp_path / "dem.asc", values))})
+    ).warnings
+    assert "from -81" in str(notice) and "does dem.asc state its value of missing data?" in str(
+        notice
+    )
 
 
 def test_faults_of_rasters_name_place_and_remedy(tmp_path):
@@ -180,7 +221,9 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
 
     none = {"size": None, "cells": None}
     faults = {
-        "does not cover 12 of 72 cells, first at 10.5,0.5 m": pond(grid("dem.asc"), size=[12.0, 6.0], cells=[12, 6]),
+        "does not cover 12 of 72 cells, first at 10.5,0.5 m": pond(
+            grid("dem.asc"), size=[12.0, 6.0], cells=[12, 6]
+        ),
         "or another `origin`": pond({"raster": str(path)}, origin=[1.0, 0.0]),
         "is a raster; expected { raster = ": pond({"file": str(path)}),
         "no such file; a relative": pond({"raster": "dom.asc"}),
@@ -188,47 +231,75 @@ def test_faults_of_rasters_name_place_and_remedy(tmp_path):
         "no georeference: no lines `xllcorner`": pond(grid("free.asc", xllcorner=None)),
         "has 240 numbers": pond(grid("few.asc", nrows=13)),
         "no data in any pixel": pond(grid("void.asc", values * np.nan)),
-        "is in degrees": pond({"raster": str(netcdf(tmp_path / "deg.nc", values, unit="degrees_east"))}),
+        "is in degrees": pond(
+            {"raster": str(netcdf(tmp_path / "deg.nc", values, unit="degrees_east"))}
+        ),
         "has the CRS EPSG:32633, and the basin EPSG:25832": pond(
-            {"raster": str(netcdf(tmp_path / "utm.nc", values))}, crs="EPSG:25832"),
+            {"raster": str(netcdf(tmp_path / "utm.nc", values))}, crs="EPSG:25832"
+        ),
         '"UTM 33" is not a coordinate reference system': pond(0.0, crs="UTM 33"),
         '"EPSG:4326" is in degrees': pond(0.0, crs="EPSG:4326"),
         "cell is missing": pond({"raster": str(path)}, **none, mesh={"raster": str(path)}),
-        "measures 10 m by 6 m; expected smaller cells": pond(0.0, **none, mesh={"raster": str(path), "cell": 20.0}),
+        "measures 10 m by 6 m; expected smaller cells": pond(
+            0.0, **none, mesh={"raster": str(path), "cell": 20.0}
+        ),
         "file and raster are given": pond(0.0, **none, mesh={"raster": str(path), "file": "a.msh"}),
         "are its coordinates in degrees?": pond(grid("deg.asc", cellsize=0.0008)),
-        "bad.nc cannot be read as NetCDF": pond({"raster": str(cut_off(netcdf(tmp_path / "bad.nc", values)))}),
+        "bad.nc cannot be read as NetCDF": pond(
+            {"raster": str(cut_off(netcdf(tmp_path / "bad.nc", values)))}
+        ),
         "nodes.pond: cells without data leave 2 pieces": pond(
-            grid("two.asc", np.where(np.arange(20) == 8, np.nan, values)), **none,
-            mesh={"raster": str(tmp_path / "two.asc"), "cell": 0.5, "outside": "hole"}),
+            grid("two.asc", np.where(np.arange(20) == 8, np.nan, values)),
+            **none,
+            mesh={"raster": str(tmp_path / "two.asc"), "cell": 0.5, "outside": "hole"},
+        ),
         "gives only the outline": pond(None, **none, mesh={"raster": str(path), "cell": 1.0}),
         "is not the number of a class": pond(0.0, manning={"raster": str(path), "table": {"a": 1}}),
-    }  # fmt: skip
+    }
     for text, case in faults.items():
         assert text in str(refused(case)), text
     values[3, 4] = np.nan
     text = str(refused(pond(grid("gap.asc", values))))
-    assert "gap.asc has no data under 1 of 60 cells, first at 2.5,1.5 m; expected data, or `outside" in text
+    assert (
+        "gap.asc has no data under 1 of 60 cells, first at 2.5,1.5 m; expected data, or `outside"
+        in text
+    )
 
 
 def test_a_given_velocity_may_be_a_raster_that_covers_the_basin(tmp_path):
     path = ascii_grid(tmp_path / "u.asc", np.ones((12, 20)))
-    own = {"type": "basin", "physics": "transport", "size": [10.0, 6.0], "cells": [10, 6],
-           "velocity": {"u": {"raster": str(path)}},
-           "patches": {side: {"side": side, "scalars": {"dye": 1.0}} for side in ("west", "east")}}  # fmt: skip
-    case = scene({"pond": own}, {}, 1.0, {"scheme": "upwind"}, ["pond.dye@1,3"], scalars={"dye": {"unit": "mg/l"}})
+    own = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [10.0, 6.0],
+        "cells": [10, 6],
+        "velocity": {"u": {"raster": str(path)}},
+        "patches": {side: {"side": side, "scalars": {"dye": 1.0}} for side in ("west", "east")},
+    }
+    case = scene(
+        {"pond": own},
+        {},
+        1.0,
+        {"scheme": "upwind"},
+        ["pond.dye@1,3"],
+        scalars={"dye": {"unit": "mg/l"}},
+    )
     same = case | {"nodes": {"pond": own | {"velocity": {"u": 1.0}}}}
     rows, expected = (fvsolve.run(one)["pond.dye@1,3"] for one in (case, same))
     assert rows == approx(expected, rel=1e-12) and rows[-1] > 0.1
     own["size"] = [12.0, 6.0]
-    assert "u.asc does not cover x = 10.8 m, y = 0.5 m" in str(refused(case | {"nodes": {"pond": own}}))
+    assert "u.asc does not cover x = 10.8 m, y = 0.5 m" in str(
+        refused(case | {"nodes": {"pond": own}})
+    )
 
 
 def test_faults_of_geotiffs(tmp_path):
     rasterio = pytest.importorskip("rasterio")
     turn = rasterio.Affine(0.4, 0.3, 0.0, 0.3, -0.4, 6.0)
     for text, path in {
-        "has no georeference": geotiff(tmp_path / "a.tif", heights(), transform=rasterio.Affine.identity(), crs=None),
+        "has no georeference": geotiff(
+            tmp_path / "a.tif", heights(), transform=rasterio.Affine.identity(), crs=None
+        ),
         "is turned or mirrored": geotiff(tmp_path / "b.tif", heights(), transform=turn),
         "is in degrees": geotiff(tmp_path / "c.tif", heights(), crs="EPSG:4326"),
     }.items():
@@ -247,7 +318,9 @@ def test_a_missing_extra_is_named_with_its_command(tmp_path, monkeypatch):
     for name in ("rasterio", "h5netcdf"):
         monkeypatch.setitem(sys.modules, name, None)
     for name in ("tif", "nc"):
-        assert 'pip install "fvsolve[gis]"' in str(refused(pond({"raster": str(tmp_path / f"dem.{name}")})))
+        assert 'pip install "fvsolve[gis]"' in str(
+            refused(pond({"raster": str(tmp_path / f"dem.{name}")}))
+        )
 
 
 def test_no_projected_crs_counts_as_degrees_and_every_geographic_crs_does():

@@ -20,7 +20,14 @@ from fvsolve.core.kernels.dtypes import (
     WENO5,
 )
 from fvsolve.features.basins.free_surface.bed_friction import add_capped_friction
-from fvsolve.features.basins.free_surface.surface_grid import PLANS, WORK, FaceFlows, WaterGrid, grid_rates, kerbs_of
+from fvsolve.features.basins.free_surface.surface_grid import (
+    PLANS,
+    WORK,
+    FaceFlows,
+    WaterGrid,
+    grid_rates,
+    kerbs_of,
+)
 from fvsolve.features.basins.free_surface.surface_rows import SURFACE, put_push
 from fvsolve.jit import njit
 
@@ -38,9 +45,15 @@ class Water:
         self.scheme, self.limiter, self.reflect = SCHEMES[scheme], limiter, reflect
         self.bed = np.broadcast_to(bed, (self.ny, self.nx)) - level
         self.plan = np.empty((PLANS, self.nx * self.ny))
-        self.plan[0], self.plan[1] = np.maximum(-self.bed, 0.0).ravel(), np.maximum(self.bed, 0.0).ravel()
+        self.plan[0], self.plan[1] = (
+            np.maximum(-self.bed, 0.0).ravel(),
+            np.maximum(self.bed, 0.0).ravel(),
+        )
         self.work = np.zeros(WORK)
-        self.flow_x, self.flow_y = np.zeros(self.ny * (self.nx + 1)), np.zeros((self.ny + 1) * self.nx)
+        self.flow_x, self.flow_y = (
+            np.zeros(self.ny * (self.nx + 1)),
+            np.zeros((self.ny + 1) * self.nx),
+        )
         self.friction, self.hold = None, lambda y: None
 
     def state(self, h, qx=0.0, qy=0.0):
@@ -52,13 +65,19 @@ class Water:
         a, b = y.reshape(3, -1), out.reshape(3, -1)
         spacing = self.kx, self.ky
         kerbs = kerbs_of(self.bed)
-        grid = WaterGrid(G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan, kerbs)
+        grid = WaterGrid(
+            G, self.scheme, self.limiter, self.nx, self.ny, *spacing, self.reflect, self.plan, kerbs
+        )
         flows = FaceFlows(self.flow_x, self.flow_y, NONE)
-        rate = grid_rates(grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None, None)
+        rate = grid_rates(
+            grid, 0, self.ny, (a[0], a[1], a[2]), flows, self.work, (b[0], b[1], b[2]), None, None
+        )
         if self.friction is not None:
             law, c = self.friction
             c = np.full(self.plan[0].size, c)
-            rate += add_capped_friction(law, G, c, 1e3, self.plan[0], a[0], (a[1], a[2]), (a[1], a[2]), (b[1], b[2]))
+            rate += add_capped_friction(
+                law, G, c, 1e3, self.plan[0], a[0], (a[1], a[2]), (a[1], a[2]), (b[1], b[2])
+            )
         return rate
 
     def depth(self, y):
@@ -102,7 +121,10 @@ def middles(x):
 def means(function, x):
     """Averages of a function over cells, by Gauss's rule with five points."""
     nodes, weights = np.polynomial.legendre.leggauss(5)
-    return sum(0.5 * w * function(middles(x) + 0.5 * np.diff(x) * s) for s, w in zip(nodes, weights, strict=True))
+    return sum(
+        0.5 * w * function(middles(x) + 0.5 * np.diff(x) * s)
+        for s, w in zip(nodes, weights, strict=True)
+    )
 
 
 def slope(errors):
@@ -114,7 +136,11 @@ def slope(errors):
 def test_a_lake_lies_at_rest_around_dry_islands_on_a_graded_grid(scheme):
     x, y = graded(40, 10.0, 5.0), graded(30, 8.0, 0.3)
     mx, my = np.meshgrid(middles(x), middles(y))
-    bed = 0.2 * np.sin(3.0 * mx) * np.cos(2.0 * my) + 1.4 * np.exp(-((mx - 4.0) ** 2 + (my - 5.0) ** 2)) - 0.7
+    bed = (
+        0.2 * np.sin(3.0 * mx) * np.cos(2.0 * my)
+        + 1.4 * np.exp(-((mx - 4.0) ** 2 + (my - 5.0) ** 2))
+        - 0.7
+    )
     bed[5:9, 20:26] = 0.4  # an island with cliffs
     water = Water(x, y, bed, scheme=scheme)
     assert 20 < (water.plan[0] == 0.0).sum() < 500
@@ -137,7 +163,11 @@ def test_mirrored_and_turned_water_has_the_same_bits(scheme):
     nx, ny = 17, 12
     x, y = graded(nx, 5.0, 3.0), graded(ny, 4.0, 2.0)
     bed = rng.random((ny, nx)) * 0.5 - np.where(rng.random((ny, nx)) < 0.7, 1.0, 0.3)
-    h = np.where(rng.random((ny, nx)) < 0.2, 0.0, 0.2 * rng.random((ny, nx)) + 0.5 * (rng.random((ny, 1)) < 0.5))
+    h = np.where(
+        rng.random((ny, nx)) < 0.2,
+        0.0,
+        0.2 * rng.random((ny, nx)) + 0.5 * (rng.random((ny, 1)) < 0.5),
+    )
     u, v = rng.standard_normal((2, ny, nx))
     out = np.empty((3, ny, nx))
     water = Water(x, y, bed, scheme=scheme)
@@ -166,13 +196,22 @@ def test_flows_through_faces_sum_to_the_change_of_depth_and_none_pass_a_wall(sch
     assert found == approx(out[0], abs=1e-13 * abs(out[0]).max())
 
 
-@pytest.mark.parametrize(("scheme", "courant"), [("upwind", 0.5), ("muscl", 0.45), ("upwind5", 0.16), ("weno5", 0.16)])
+@pytest.mark.parametrize(
+    ("scheme", "courant"), [("upwind", 0.5), ("muscl", 0.45), ("upwind5", 0.16), ("weno5", 0.16)]
+)
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_no_depth_falls_below_zero_over_a_random_bed(scheme, courant, seed):
     """With `muscl` and the limit itself, 0.5, a quarter of all random fields reach -5e-6 m: bounds mix two cells."""
     rng = np.random.default_rng(seed)
     for limiter in range(MONOTONIZED_CENTRAL + 1):
-        water = Water(even(24, 2.0), even(20, 2.0), rng.random((20, 24)), level=0.3, scheme=scheme, limiter=limiter)
+        water = Water(
+            even(24, 2.0),
+            even(20, 2.0),
+            rng.random((20, 24)),
+            level=0.3,
+            scheme=scheme,
+            limiter=limiter,
+        )
         h = np.where(rng.random((20, 24)) < 0.5, 0.0, rng.random((20, 24)) ** 3)
         y, k = water.state(h, *(h * rng.standard_normal((2, 20, 24)))), np.empty((3, 20, 24))
         total = water.depth(y).sum()
@@ -194,7 +233,9 @@ def bump(x):
 
 
 @pytest.mark.in_turn
-@pytest.mark.parametrize(("scheme", "low"), [("upwind", 0.9), ("muscl", 1.9), ("upwind5", 4.5), ("weno5", 4.5)])
+@pytest.mark.parametrize(
+    ("scheme", "low"), [("upwind", 0.9), ("muscl", 1.9), ("upwind5", 4.5), ("weno5", 4.5)]
+)
 @pytest.mark.parametrize("way", ["east", "north"])
 def test_smooth_flow_over_a_bed_has_the_order_of_the_scheme(scheme, low, way):
     """Steady flow by Bernoulli around the bump, before waves from the walls arrive."""
@@ -247,11 +288,15 @@ def channel(q, out, jump, x):
         return q * q / a + 0.5 * G * a * a - q * q / b - 0.5 * G * b * b
 
     at = brentq(surplus, 11.3, 12.0)
-    fast = np.where(x < at, bernoulli(q, up, parabola(x), fast=True), bernoulli(q, down, parabola(x)))
+    fast = np.where(
+        x < at, bernoulli(q, up, parabola(x), fast=True), bernoulli(q, down, parabola(x))
+    )
     return np.where(x < 10.0, bernoulli(q, up, parabola(x)), fast)
 
 
-@pytest.mark.parametrize(("q", "out", "jump", "low"), [(4.42, 2.0, False, 1.9), (0.18, 0.33, True, 1.0)])
+@pytest.mark.parametrize(
+    ("q", "out", "jump", "low"), [(4.42, 2.0, False, 1.9), (0.18, 0.33, True, 1.0)]
+)
 def test_flow_over_a_bump_settles_to_bernoulli_and_its_jump(q, out, jump, low):
     """L1 error for given flow at the west and depth at the east; limiters steeper than minmod ring at a jump."""
     errors = []
@@ -283,8 +328,13 @@ def thacker(kind, x, y, t):
     else:
         w, a = math.sqrt(8.0 * G * deep), (1.0 - 0.64) / (1.0 + 0.64)
         part = 1.0 - a * math.cos(w * t)
-        surface = deep * (math.sqrt(1.0 - a * a) / part - 1.0 - r2 * ((1.0 - a * a) / part**2 - 1.0))
-        u, v = (0.5 * w * a * math.sin(w * t) / part) * x, (0.5 * w * a * math.sin(w * t) / part) * y
+        surface = deep * (
+            math.sqrt(1.0 - a * a) / part - 1.0 - r2 * ((1.0 - a * a) / part**2 - 1.0)
+        )
+        u, v = (
+            (0.5 * w * a * math.sin(w * t) / part) * x,
+            (0.5 * w * a * math.sin(w * t) / part) * y,
+        )
     h = np.maximum(surface + deep * (1.0 - r2), 0.0)
     return h, h * u, h * v, 2.0 * math.pi / w
 
@@ -307,7 +357,9 @@ def test_water_swings_in_thackers_bowls_for_three_periods(kind, scheme):
         y = water.advance(water.state(*start), 3.0 * period, watch=watch)
         assert least[0] > -1e-15
         assert water.depth(y).sum() == approx(start[0].sum(), rel=1e-12)
-        errors.append(abs(water.depth(y) - thacker(kind, mx, my, 3.0 * period)[0]).sum() / start[0].sum())
+        errors.append(
+            abs(water.depth(y) - thacker(kind, mx, my, 3.0 * period)[0]).sum() / start[0].sum()
+        )
     assert slope(errors) > 1.7
 
 
@@ -319,7 +371,9 @@ def test_flow_down_a_slope_approaches_the_normal_flow(law, coefficient):
     water = Water(x, np.array([0.0, 1.0]), -tilt * middles(x), level=-20.0)
     water.friction = law, coefficient
     y = water.advance(water.state(h), end)
-    normal = math.sqrt(tilt) / coefficient if law == MANNING else math.sqrt(8.0 * G * tilt / coefficient)
+    normal = (
+        math.sqrt(tilt) / coefficient if law == MANNING else math.sqrt(8.0 * G * tilt / coefficient)
+    )
     middle = slice(110, 130)
     assert water.depth(y)[0, middle] == approx(h, rel=1e-10)
     assert y[1, 0, middle] == approx(normal * math.tanh(G * tilt * end / normal), rel=1e-4)
@@ -328,7 +382,9 @@ def test_flow_down_a_slope_approaches_the_normal_flow(law, coefficient):
 def test_friction_of_films_is_bounded_and_takes_no_more_than_there_is():
     h = np.array([0.0, 1e-12, 1e-6, 1e-4, 1e-2, 1.0])
     q, none, out = h * 2.0, np.zeros(6), np.zeros((2, 6))
-    rate = add_capped_friction(MANNING, G, np.full(6, 0.03), 50.0, none, h, (q, -q), (q, -q), (out[0], out[1]))
+    rate = add_capped_friction(
+        MANNING, G, np.full(6, 0.03), 50.0, none, h, (q, -q), (q, -q), (out[0], out[1])
+    )
     assert 90.0 < rate <= 100.0 and np.array_equal(out[0], -out[1]) and not out[:, 0].any()
     assert np.all(-out[0] <= 50.0 * q)
     assert -out[0, 5] == approx(G * 0.03**2 * math.hypot(2.0, 2.0) * 2.0, rel=1e-3)
@@ -336,10 +392,16 @@ def test_friction_of_films_is_bounded_and_takes_no_more_than_there_is():
 
 def test_a_wave_leaves_by_an_open_side_and_comes_back_from_a_wall():
     left = {}
-    for name, reflect in (("wall", NONE), ("ones", np.ones(2 * 103)), ("open", np.r_[np.zeros(6), np.ones(200)])):
+    for name, reflect in (
+        ("wall", NONE),
+        ("ones", np.ones(2 * 103)),
+        ("open", np.r_[np.zeros(6), np.ones(200)]),
+    ):
         x = even(100, 20.0)
         water = Water(x, even(3, 1.0), np.full((3, 100), -1.0), reflect=reflect)
-        y = water.advance(water.state(1.0 + 0.01 * np.exp(-(((middles(x) - 10.0) / 1.0) ** 2))[None]), 6.0)
+        y = water.advance(
+            water.state(1.0 + 0.01 * np.exp(-(((middles(x) - 10.0) / 1.0) ** 2))[None]), 6.0
+        )
         left[name] = y
     assert np.array_equal(left["wall"], left["ones"])
     assert abs(left["wall"][0]).max() > 4e-3
@@ -372,10 +434,14 @@ def test_no_water_flows_through_a_wall_to_the_last_bit(scheme):
 
 @pytest.mark.parametrize("limiter", [MINMOD, VAN_LEER, MONOTONIZED_CENTRAL])
 @pytest.mark.parametrize("reflect", [NONE, np.zeros(2 * (9 + 7))], ids=["walls", "open"])
-def test_rows_without_kerbs_or_films_have_the_rates_of_all_rows_treated_as_kerbs(limiter, reflect, monkeypatch):
+def test_rows_without_kerbs_or_films_have_the_rates_of_all_rows_treated_as_kerbs(
+    limiter, reflect, monkeypatch
+):
     """`kerbs_of` only saves work: with every row treated, all bits of the rates are the same."""
     random = np.random.default_rng(4)
-    bed = np.where(random.random((7, 9)) < 0.3, 0.05, 0.0) * (np.arange(7) % 3 == 0)[:, None] + 0.02 * np.arange(9)
+    bed = np.where(random.random((7, 9)) < 0.3, 0.05, 0.0) * (np.arange(7) % 3 == 0)[
+        :, None
+    ] + 0.02 * np.arange(9)
     water = Water(np.arange(10.0), np.arange(8.0), bed, -1.0, limiter=limiter, reflect=reflect)
     water.plan[0] = 0.0
     water.plan[1] = bed.ravel() - bed.min()

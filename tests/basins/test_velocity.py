@@ -20,13 +20,28 @@ MUSCL = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk3", "courant
 # Name: (parameters, velocities u, v (x, y) as in its source).
 VELOCITIES = {
     "constant": ({"u": 2.0, "v": -3.0}, lambda x, y: (2.0 + 0 * x, -3.0 + 0 * x)),
-    "rotation": ({"centre": (0.3, 0.6), "angular_velocity": 2.0}, lambda x, y: (-2.0 * (y - 0.6), 2.0 * (x - 0.3))),
-    "swirl": ({}, lambda x, y: (np.sin(PI * x) ** 2 * np.sin(2 * PI * y), -(np.sin(PI * y) ** 2) * np.sin(2 * PI * x))),
+    "rotation": (
+        {"centre": (0.3, 0.6), "angular_velocity": 2.0},
+        lambda x, y: (-2.0 * (y - 0.6), 2.0 * (x - 0.3)),
+    ),
+    "swirl": (
+        {},
+        lambda x, y: (
+            np.sin(PI * x) ** 2 * np.sin(2 * PI * y),
+            -(np.sin(PI * y) ** 2) * np.sin(2 * PI * x),
+        ),
+    ),
     "shear": ({"rate": 3.0, "y0": 0.5, "u": 1.0}, lambda x, y: (1.0 + 3.0 * (y - 0.5), 0 * x)),
-    "parabolic": ({"speed": 2.0, "south": 0.5, "north": 2.5}, lambda x, y: (2.0 * 1.5 * (1.0 - (y - 1.5) ** 2), 0 * x)),
+    "parabolic": (
+        {"speed": 2.0, "south": 0.5, "north": 2.5},
+        lambda x, y: (2.0 * 1.5 * (1.0 - (y - 1.5) ** 2), 0 * x),
+    ),
     "cellular": (
         {"speed": 2.0, "width": 0.5, "height": 1.0},
-        lambda x, y: (2.0 * np.sin(2 * PI * x) * np.cos(PI * y), -4.0 * np.cos(2 * PI * x) * np.sin(PI * y)),
+        lambda x, y: (
+            2.0 * np.sin(2 * PI * x) * np.cos(PI * y),
+            -4.0 * np.cos(2 * PI * x) * np.sin(PI * y),
+        ),
     ),
 }
 
@@ -43,7 +58,9 @@ def integral(mesh, velocity):
     total = 0.0
     for at, weight in zip(*np.polynomial.legendre.leggauss(6), strict=True):
         place = 0.5 * (1.0 - at) * a + 0.5 * (1.0 + at) * b
-        total = total + 0.5 * weight * np.sum(np.stack(velocity(*place.T), axis=1) * mesh.normal, axis=1)
+        total = total + 0.5 * weight * np.sum(
+            np.stack(velocity(*place.T), axis=1) * mesh.normal, axis=1
+        )
     return total * mesh.length
 
 
@@ -61,7 +78,9 @@ def test_every_name_is_tried():
 
 
 @pytest.mark.parametrize("name", VELOCITIES)
-def test_flows_by_name_are_the_integrals_of_their_velocity_and_leave_no_divergence_to_the_bit(name, mixed):
+def test_flows_by_name_are_the_integrals_of_their_velocity_and_leave_no_divergence_to_the_bit(
+    name, mixed
+):
     parameters, velocity = VELOCITIES[name]
     flows = face_flows(mixed, {"expression": name, **parameters})
     assert flows == approx(integral(mixed, velocity), rel=1e-6, abs=1e-6)
@@ -83,11 +102,16 @@ def test_random_stream_functions_leave_no_divergence_to_the_bit(mixed):
 def test_flows_of_a_grid_go_east_and_north(cells):
     mesh = rectangle((2.0, 1.0), cells, grading=(1.0, 1.0), patches={"in": "west", "top": "north"})
     nx, ny = cells
-    x, y = grid_flows(mesh, face_flows(mesh, {"expression": "rotation", "centre": (0.0, 0.0), "angular_velocity": 2.0}))
+    x, y = grid_flows(
+        mesh,
+        face_flows(mesh, {"expression": "rotation", "centre": (0.0, 0.0), "angular_velocity": 2.0}),
+    )
     dx, dy = 2.0 / nx, 1.0 / ny
     middle = -2.0 * (np.arange(ny) + 0.5) * dy
     assert x.reshape(ny, nx + 1) == approx(np.tile(middle[:, None] * dy, nx + 1))
-    assert y.reshape(ny + 1, nx) == approx(np.tile(2.0 * (np.arange(nx) + 0.5) * dx * dx, (ny + 1, 1)))
+    assert y.reshape(ny + 1, nx) == approx(
+        np.tile(2.0 * (np.arange(nx) + 0.5) * dx * dx, (ny + 1, 1))
+    )
 
 
 def test_flows_of_a_grid_want_a_full_rectangle(mixed):
@@ -99,30 +123,47 @@ def test_flows_of_a_grid_want_a_full_rectangle(mixed):
 
 def written(path, header, *columns):
     """Write a CSV file of columns and return it as { file }."""
-    rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*map(np.ravel, columns), strict=True))
+    rows = "\n".join(
+        ",".join(map(repr, map(float, row))) for row in zip(*map(np.ravel, columns), strict=True)
+    )
     path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
     return {"file": str(path)}
 
 
 def test_velocities_from_a_file_are_interpolated_linearly(tmp_path, mixed):
     x, y = np.meshgrid(np.linspace(-1.0, 2.0, 5), np.linspace(0.5, 2.5, 4))
-    flows = face_flows(mixed, written(tmp_path / "v.csv", "x, y, u, v", x, y, 1.0 + 2.0 * x - y, x + 3.0 * y))
-    assert flows == approx(integral(mixed, lambda x, y: (1.0 + 2.0 * x - y, x + 3.0 * y)), abs=1e-12)
+    flows = face_flows(
+        mixed, written(tmp_path / "v.csv", "x, y, u, v", x, y, 1.0 + 2.0 * x - y, x + 3.0 * y)
+    )
+    assert flows == approx(
+        integral(mixed, lambda x, y: (1.0 + 2.0 * x - y, x + 3.0 * y)), abs=1e-12
+    )
 
 
 def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
     x, y = np.meshgrid(np.linspace(-1.0, 2.0, 31), np.linspace(0.5, 2.5, 21))
     flows = face_flows(mixed, written(tmp_path / "psi.csv", "psi,x,y", np.sin(x) * np.cos(y), x, y))
     assert np.all(divergence(mixed, flows) == 0.0)
-    assert flows == approx(integral(mixed, lambda x, y: (-np.sin(x) * np.sin(y), -np.cos(x) * np.cos(y))), abs=0.01)
+    assert flows == approx(
+        integral(mixed, lambda x, y: (-np.sin(x) * np.sin(y), -np.cos(x) * np.cos(y))), abs=0.01
+    )
 
 
 @pytest.mark.parametrize(
     "velocity, words",
     [
-        ({"expression": "rotaton"}, 'unknown velocity "rotaton"; expected .*; did you mean "rotation"'),
-        ({"expression": "rotation", "centre": (0, 0)}, "needs values of more parameters: angular_velocity"),
-        ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no parameter slope; expected rate, u, y0"),
+        (
+            {"expression": "rotaton"},
+            'unknown velocity "rotaton"; expected .*; did you mean "rotation"',
+        ),
+        (
+            {"expression": "rotation", "centre": (0, 0)},
+            "needs values of more parameters: angular_velocity",
+        ),
+        (
+            {"expression": "shear", "rate": 1.0, "slope": 2.0},
+            "has no parameter slope; expected rate, u, y0",
+        ),
         ({"expression": "swirl", "size": 0.0}, "not finite at"),
         ({"stream": np.zeros(3)}, r"expected a value for each of 20 corners"),
         ({}, "velocity has nothing; expected one of expression, file, stream"),
@@ -144,7 +185,10 @@ def test_velocities_that_are_impossible_are_refused_with_the_expected_form(veloc
         ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is not a number in column "psi"'),
         ("x,y,psi\n0,0,1\n1,0,2\n", "too few points (2); expected at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
-        ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not enclose 9 of 20 positions of the mesh, the first"),
+        (
+            "x,y,psi\n0,0,1\n1,0,2\n0,1,3\n",
+            "do not enclose 9 of 20 positions of the mesh, the first",
+        ),
     ],
 )
 def test_files_that_do_not_do_are_refused_with_the_line(tmp_path, text, words):
@@ -166,7 +210,13 @@ def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
             write_msh(tmp_path / "sheet.msh", *triangles((1.0, 1.0), 1.5 / cells), {})
             shape = {"mesh": {"file": str(tmp_path / "sheet.msh")}}
         velocity = {"expression": "swirl", "period": 1.0}
-        sheet = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": BUMP}, **shape}
+        sheet = {
+            "type": "basin",
+            "physics": "transport",
+            "velocity": velocity,
+            "scalars": {"dye": BUMP},
+            **shape,
+        }
         case = scene({"sheet": sheet}, {}, 1.0, MUSCL, [], 0.5, scalars={"dye": {}})
         model = model_of(case)
         start = fvsolve.initial_state(model)
@@ -176,14 +226,21 @@ def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
 
 def carrying(velocity, mesh=None, **more) -> dict:
     """Return a case of a scalar in a given velocity, in a closed basin."""
-    pool = {"type": "basin", "physics": "transport", "velocity": velocity, "scalars": {"dye": "where(x < 1, 1, 0)"}}
+    pool = {
+        "type": "basin",
+        "physics": "transport",
+        "velocity": velocity,
+        "scalars": {"dye": "where(x < 1, 1, 0)"},
+    }
     pool |= {"mesh": {"file": str(mesh)}} if mesh else more
     return scene({"pool": pool}, {}, 0.1, MUSCL, [], 0.1) | {"scalars": {"dye": {}}}
 
 
 @pytest.mark.parametrize("key", ["u", "level"])
 def test_an_advected_scalar_starts_without_a_flow_of_its_own(key):
-    case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
+    case = carrying(
+        {"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0}
+    )
     with pytest.raises(CaseError, match=f'start.{key}: does not apply to physics "transport"'):
         fvsolve.load(case)
 
@@ -208,7 +265,10 @@ def test_a_field_that_is_closed_but_for_rounding_passes_no_outline(velocity, len
 ])  # fmt: skip
 def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
     points, cells = triangles((4.0, 1.0), 0.25)
-    turn, away = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]]), np.array([100.0, 50.0])
+    turn, away = (
+        np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]]),
+        np.array([100.0, 50.0]),
+    )
     ends = {"in": lambda x, y: along(x, y) < 1e-6, "out": lambda x, y: along(x, y) > 4.0 - 1e-6}
 
     def along(x, y):
@@ -229,15 +289,23 @@ def test_a_stream_that_passes_the_outline_by_little_is_still_refused():
         model_of(case)
 
 
-@pytest.mark.parametrize(("stream", "leak"), [("x*y*(2 - x)", "y = 1 m"), ("y", "x = [02] m"), ("0.1*x", "y = [01] m")])
+@pytest.mark.parametrize(
+    ("stream", "leak"), [("x*y*(2 - x)", "y = 1 m"), ("y", "x = [02] m"), ("0.1*x", "y = [01] m")]
+)
 def test_a_wall_that_leaks_is_named_and_not_the_hole_behind_it(stream, leak):
-    case = carrying({"stream": stream}, size=[2.0, 1.0], cells=[20, 10], holes=[[0.8, 0.4, 1.2, 0.6]])
+    case = carrying(
+        {"stream": stream}, size=[2.0, 1.0], cells=[20, 10], holes=[[0.8, 0.4, 1.2, 0.6]]
+    )
     with pytest.raises(CaseError, match=f"nodes.pool.velocity: .*outline at .*{leak}"):
         model_of(case)
 
 
 def test_a_hole_that_leaks_alone_is_named():
-    case = carrying({"stream": "where((x - 1)**2 + (y - 0.5)**2 < 0.09, x, 0)"}, size=[2.0, 1.0], cells=[20, 10],
-                    holes=[[0.8, 0.4, 1.2, 0.6]])  # fmt: skip
+    case = carrying(
+        {"stream": "where((x - 1)**2 + (y - 0.5)**2 < 0.09, x, 0)"},
+        size=[2.0, 1.0],
+        cells=[20, 10],
+        holes=[[0.8, 0.4, 1.2, 0.6]],
+    )
     with pytest.raises(CaseError, match=r"outline at x = (0\.[89]|1)[\d.]* m, y = 0\.[456]"):
         model_of(case)

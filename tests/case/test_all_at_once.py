@@ -47,12 +47,26 @@ ODD: dict[tuple, Any] = {  # path of a key -> invalid value
 def whole() -> dict:
     """Case with keys in every section."""
     case = placed()
-    case["nodes"] |= {"top": {"type": "junction", "on": "main", "at": "2.2 km"},
-                      "end": {"type": "tank", "area": 10.0, "level": 5.0, "elevation": 20.0}}  # fmt: skip
+    case["nodes"] |= {
+        "top": {"type": "junction", "on": "main", "at": "2.2 km"},
+        "end": {"type": "tank", "area": 10.0, "level": 5.0, "elevation": 20.0},
+    }
     case["nodes"]["sea"]["pressure"] = {"signal": "tide"}
     case["links"] |= {
-        "tail": {"type": "pipe", "from": "gate", "to": "end", "length": 100.0, "diameter": 0.3, "wave_speed": 1e3},
-        "pump": {"type": "pump", "from": "end", "to": "sea", "curve": {"flow": [0.1], "head": [20.0]}},
+        "tail": {
+            "type": "pipe",
+            "from": "gate",
+            "to": "end",
+            "length": 100.0,
+            "diameter": 0.3,
+            "wave_speed": 1e3,
+        },
+        "pump": {
+            "type": "pump",
+            "from": "end",
+            "to": "sea",
+            "curve": {"flow": [0.1], "head": [20.0]},
+        },
     }
     probes = ["gate.pressure", "main.head@2 km", "main-2.flow@0", "hole.flow", "way.pressure@0.2"]
     case["output"] |= {"units": {"pressure": "barg"}, "probes": probes}
@@ -61,10 +75,12 @@ def whole() -> dict:
         "scalars": {"dye": {"unit": "g"}},
         "defaults": {"pipe": {"minor_loss": 1.0}},
         "routes": {"way": {"pipes": ["main", "tail"]}},
-        "limits": {"high": {"on": "way", "maximum": "30 bar"},
-                   "quick": {"on": ["main", "tail"], "quantity": "velocity", "maximum": "9 m/s"}},
+        "limits": {
+            "high": {"on": "way", "maximum": "30 bar"},
+            "quick": {"on": ["main", "tail"], "quantity": "velocity", "maximum": "9 m/s"},
+        },
         "expect": {"max(gate.pressure)": {"value": 1e6, "rtol": 10.0}},
-    }  # fmt: skip
+    }
 
 
 def faults(*paths: tuple) -> set[tuple[str, str]]:
@@ -88,7 +104,9 @@ def test_a_fault_in_each_section_gives_a_message_each_and_all_come_at_once() -> 
     assert faults(*ODD) == set().union(*alone)
 
 
-@pytest.mark.parametrize("first", [path for path in ODD if path[0] in ("nodes", "links", "numerics", "routes")])
+@pytest.mark.parametrize(
+    "first", [path for path in ODD if path[0] in ("nodes", "links", "numerics", "routes")]
+)
 def test_no_fault_hides_or_makes_another(first: tuple) -> None:
     for other in ODD:
         assert faults(first, other) == faults(first) | faults(other), other
@@ -101,25 +119,44 @@ def test_faults_that_follow_from_another_are_not_reported() -> None:
     case["links"]["tap"]["to"] = "see"  # and no other link joins the sea
     del case["links"]["pump"], case["links"]["safe"]
     error = refused(case)
-    assert [one.place for one in error.faults] == ["links.main.diameter", "nodes.gate.type", "links.tap.to"]
+    assert [one.place for one in error.faults] == [
+        "links.main.diameter",
+        "nodes.gate.type",
+        "links.tap.to",
+    ]
 
 
 @pytest.mark.parametrize("cells", [[10**7, 10**7], "many"])
 def test_a_basin_without_a_mesh_hides_nothing(cells: Any) -> None:
     with pytest.raises(fvsolve.CaseError) as error:
-        fvsolve.load("basin-draining", {"nodes.pool.cells": cells, "output.units": {"pressure": "m3/h"},
-                                        "limits.high": {"on": "outsied", "maximum": 1.0}})  # fmt: skip
+        fvsolve.load(
+            "basin-draining",
+            {
+                "nodes.pool.cells": cells,
+                "output.units": {"pressure": "m3/h"},
+                "limits.high": {"on": "outsied", "maximum": 1.0},
+            },
+        )
     assert sorted(one.place for one in error.value.faults) == [
-        "limits.high.on", "nodes.pool.cells", "output.units.pressure"]  # fmt: skip
+        "limits.high.on",
+        "nodes.pool.cells",
+        "output.units.pressure",
+    ]
 
 
 def keys_of(table: Any, above: tuple = ()) -> Iterator[tuple]:
-    for key, value in table.items() if isinstance(table, dict) else enumerate(table if isinstance(table, list) else ()):
+    for key, value in (
+        table.items()
+        if isinstance(table, dict)
+        else enumerate(table if isinstance(table, list) else ())
+    ):
         yield (*above, key)
         yield from keys_of(value, (*above, key))
 
 
-@pytest.mark.parametrize("name", ["pumping-main", "plastic-main", "bend-force", "basin-draining", "closed-cylinder"])
+@pytest.mark.parametrize(
+    "name", ["pumping-main", "plastic-main", "bend-force", "basin-draining", "closed-cylinder"]
+)
 def test_every_invalid_value_is_reported_at_its_own_place_only(name: str) -> None:
     base = tomllib.loads((DOCS.parent / "cases" / f"{name}.toml").read_text(encoding="utf-8"))
     for path in keys_of(base):
@@ -133,11 +170,18 @@ def test_every_invalid_value_is_reported_at_its_own_place_only(name: str) -> Non
         except fvsolve.CaseError as error:
             places = [re.sub(r'["\]]', "", one.place.replace("[", ".")) for one in error.faults]
             own = ".".join(map(str, path))
-            assert all(one.startswith(own) or own.startswith(f"{one}.") for one in places), (own, str(error))
+            assert all(one.startswith(own) or own.startswith(f"{one}.") for one in places), (
+                own,
+                str(error),
+            )
 
 
 def test_an_exact_solution_without_a_viscosity_is_refused_with_the_reason() -> None:
     case = tomllib.loads((DOCS.parent / "cases" / "laminar-line.toml").read_text(encoding="utf-8"))
     del case["fluid"]["viscosity"]
-    case["nodes"]["valve"]["demand"] = {"time": [0.0, 1.0, 2.0], "value": [1e-5, 1e-5, 0.0], "kind": "smooth"}
+    case["nodes"]["valve"]["demand"] = {
+        "time": [0.0, 1.0, 2.0],
+        "value": [1e-5, 1e-5, 0.0],
+        "kind": "smooth",
+    }
     refused(case, "viscosity is missing")

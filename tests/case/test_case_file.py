@@ -43,24 +43,46 @@ def test_the_text_of_the_design_is_read_into_the_case(scene):
     main, valve = case.links["main"], case.links["valve"]
     assert main.kind == "pipe" and main.ports == {"from": "lake", "to": "gate"}
     assert (main.length, main.diameter, main.wave_speed, main.cells) == (914.4, 0.3048, 1219.2, 200)
-    assert (main.friction.model, main.friction.roughness, main.friction.factor) == ("steady", 0.00026, None)
+    assert (main.friction.model, main.friction.roughness, main.friction.factor) == (
+        "steady",
+        0.00026,
+        None,
+    )
     assert (main.wall, main.minor_loss, main.initial_flow) == (None, 0.0, None)
     assert valve.flow_area() == 0.6 * 0.001768
     assert valve.opening.kind == "ramp" and valve.opening.exponent == 1.0
     assert valve.opening.time.tolist() == [1.0, 1.05] and valve.opening.value.tolist() == [1.0, 0.0]
     numerics = case.numerics
-    assert (numerics.start, numerics.end, numerics.initial, numerics.courant) == (0.0, 10.0, "steady", 0.9)
+    assert (numerics.start, numerics.end, numerics.initial, numerics.courant) == (
+        0.0,
+        10.0,
+        "steady",
+        0.9,
+    )
     assert (numerics.step, numerics.rtol, numerics.cell_time) == (None, None, None)
     assert (numerics.scheme, numerics.limiter, numerics.method) == ("muscl", "van-leer", "ssp-rk3")
     assert numerics.below_vapor == "continue"
     assert (case.output.every, case.output.fields, case.output.units) == (0.01, 50, {})
     assert [probe.text for probe in case.output.probes] == [
-        "gate.pressure", "gate.head", "valve.flow", "main.pressure@0.5"
-    ]  # fmt: skip
+        "gate.pressure",
+        "gate.head",
+        "valve.flow",
+        "main.pressure@0.5",
+    ]
     half = case.output.probes[3]
-    assert (half.part, half.name, half.quantity, half.fraction) == ("links", "main", "pressure", 0.5)
+    assert (half.part, half.name, half.quantity, half.fraction) == (
+        "links",
+        "main",
+        "pressure",
+        0.5,
+    )
     claim = case.expect["max(gate.pressure)"]
-    assert (claim.function, claim.probe.text, claim.time, claim.value) == ("max", "gate.pressure", None, 1.0751e6)
+    assert (claim.function, claim.probe.text, claim.time, claim.value) == (
+        "max",
+        "gate.pressure",
+        None,
+        1.0751e6,
+    )
     assert (claim.rtol, claim.atol) == (1e-2, 0.0)
     assert case.properties.density == 1000 and case.fluid.viscosity == approx(1e-3)
     assert not case.elevations_stated and case.elevation("gate") == 0.0
@@ -81,54 +103,110 @@ def test_the_case_is_frozen(scene):
 def dressed(tmp_path, **changes):
     """File of a case that uses nearly every key."""
     (tmp_path / "in").mkdir(exist_ok=True)
-    (tmp_path / "in" / "stroke.csv").write_text("# measured\nt [ms],opening [%]\n0,100\n500,40\n900,0\n")
+    (tmp_path / "in" / "stroke.csv").write_text(
+        "# measured\nt [ms],opening [%]\n0,100\n500,40\n900,0\n"
+    )
     (tmp_path / "stroke.csv").write_text("t [s];demand [l/s]\n0;1\n2;3\n")
     (tmp_path / "rig.csv").write_text("t [s],H [m],p [barg]\n0,45,4.4\n1,46,4.5\n1,47,4.6\n")
     case = {
         "title": 'A "dressed" case\n\\ of two lines',
         "ambient_pressure": "0.9 bar",
         "gravity": 9.81,
-        "fluid": {"name": "user", "density": 870, "bulk_modulus": 1.5e9, "viscosity": "32 cSt", "law": "log"},
+        "fluid": {
+            "name": "user",
+            "density": 870,
+            "bulk_modulus": 1.5e9,
+            "viscosity": "32 cSt",
+            "law": "log",
+        },
         "nodes": {
             "lake": {"type": "reservoir", "head": {"signal": "tide"}},
             "tower": {
-                "type": "tank", "elevation": 3, "area": {"level": [0, 1, 2], "area": [1, 2, "4 m2"]},
-                "level": "1.5 m", "height": 2,
+                "type": "tank",
+                "elevation": 3,
+                "area": {"level": [0, 1, 2], "area": [1, 2, "4 m2"]},
+                "level": "1.5 m",
+                "height": 2,
             },
-            "gate": {"type": "junction", "elevation": 1, "demand": {"file": "stroke.csv", "kind": "smooth"}},
+            "gate": {
+                "type": "junction",
+                "elevation": 1,
+                "demand": {"file": "stroke.csv", "kind": "smooth"},
+            },
             "well": {
-                "type": "inflow", "elevation": 1,
+                "type": "inflow",
+                "elevation": 1,
                 "flow": {"time": [0, 1], "value": ["1 l/s", 0], "kind": "step"},
             },
-            "bell": {"type": "chamber", "elevation": 0, "volume": "50 l", "initial_pressure": "2 barg"},
+            "bell": {
+                "type": "chamber",
+                "elevation": 0,
+                "volume": "50 l",
+                "initial_pressure": "2 barg",
+            },
         },
         "links": {
             "main": {
-                "type": "pipe", "from": "lake", "to": "gate", "length": 100, "diameter": 0.1, "minor_loss": 2,
-                "wall": {"youngs_modulus": "120 GPa", "thickness": "2 mm"}, "initial_flow": "1 l/s",
+                "type": "pipe",
+                "from": "lake",
+                "to": "gate",
+                "length": 100,
+                "diameter": 0.1,
+                "minor_loss": 2,
+                "wall": {"youngs_modulus": "120 GPa", "thickness": "2 mm"},
+                "initial_flow": "1 l/s",
                 "friction": {"model": "hazen-williams", "coefficient": 120},
             },
             "stiff": {
-                "type": "pipe", "from": "well", "to": "gate", "length": 10, "diameter": 0.1, "wall": "rigid",
+                "type": "pipe",
+                "from": "well",
+                "to": "gate",
+                "length": 10,
+                "diameter": 0.1,
+                "wall": "rigid",
             },
-            "riser": {"type": "rigid-column", "from": "gate", "to": "tower", "length": 10, "diameter": 0.1},
+            "riser": {
+                "type": "rigid-column",
+                "from": "gate",
+                "to": "tower",
+                "length": 10,
+                "diameter": 0.1,
+            },
             "gate": {
-                "type": "valve", "from": "gate", "to": "bell", "Kv": 3, "opening": {"file": "in/stroke.csv"},
+                "type": "valve",
+                "from": "gate",
+                "to": "bell",
+                "Kv": 3,
+                "opening": {"file": "in/stroke.csv"},
                 "characteristic": {"opening": [0, 0.5, 1], "flow_area": [0, 0.2, 1]},
             },
             "hole": {
-                "type": "orifice", "from": "bell", "to": "tower", "loss_coefficient": 2.4,
-                "diameter": "10 mm", "laminar_reynolds": 10,
+                "type": "orifice",
+                "from": "bell",
+                "to": "tower",
+                "loss_coefficient": 2.4,
+                "diameter": "10 mm",
+                "laminar_reynolds": 10,
                 "opening": {"start": 1, "duration": 2, "value": [1, 0], "exponent": 1.5},
                 "characteristic": "equal-percentage",
             },
         },
         "signals": {"tide": {"time": [0, 3600], "value": ["4 m", "5 m"], "kind": "smooth"}},
-        "numerics": {"start": -1, "end": "1 min", "rtol": 1e-7, "cell_time": "2 ms", "below_vapor": "stop"},
+        "numerics": {
+            "start": -1,
+            "end": "1 min",
+            "rtol": 1e-7,
+            "cell_time": "2 ms",
+            "below_vapor": "stop",
+        },
         "output": {
             "units": {"pressure": "barg", "flow": "l/s"},
             "probes": [
-                "tower.level", "nodes.gate.head", "links.gate.flow", "main.velocity@0.25", "main.flow",
+                "tower.level",
+                "nodes.gate.head",
+                "links.gate.flow",
+                "main.velocity@0.25",
+                "main.flow",
             ],
         },
         "expect": {
@@ -136,10 +214,15 @@ def dressed(tmp_path, **changes):
             "final(bell.gauge_pressure)": {"value": "2 bar", "atol": "10 mbar"},
         },
         "compare": {
-            "nodes.gate.head": {"file": "rig.csv", "time": "t [s]", "value": "H [m]", "shift": "12 ms"},
+            "nodes.gate.head": {
+                "file": "rig.csv",
+                "time": "t [s]",
+                "value": "H [m]",
+                "shift": "12 ms",
+            },
             "gate.pressure": {"file": "rig.csv", "value": "p"},
         },
-    }  # fmt: skip
+    }
     case.update(changes)
     path = tmp_path / "dressed.toml"
     from fvsolve.case.text import write
@@ -161,7 +244,11 @@ def test_every_form_is_understood(tmp_path):
     assert case.nodes["tower"].area.area.tolist() == [1, 2, 4]
     assert case.fluid.viscosity == approx(32e-6 * 870)
     hole = case.links["hole"]
-    assert hole.kind == "orifice" and hole.opening.exponent == 1.5 and hole.characteristic == "equal-percentage"
+    assert (
+        hole.kind == "orifice"
+        and hole.opening.exponent == 1.5
+        and hole.characteristic == "equal-percentage"
+    )
     assert hole.flow_area() == approx(np.pi / 4 * 0.01**2 / np.sqrt(2.4))
     assert case.elevations_stated and case.elevation("tower") == 3
     assert case.elevation("lake") == 1  # no elevation stated: that at the far end of its first link
@@ -169,7 +256,10 @@ def test_every_form_is_understood(tmp_path):
     assert (claim.function, claim.time, claim.value, claim.atol) == ("at", 0.5, 1.5, 1e-3)
     assert case.expect["final(bell.gauge_pressure)"].value == 2e5
     rig = case.compare["gate.pressure"]
-    assert rig.v.tolist() == approx([5.3e5, 5.4e5, 5.5e5]) and (rig.time, rig.value) == ("t [s]", "p [barg]")
+    assert rig.v.tolist() == approx([5.3e5, 5.4e5, 5.5e5]) and (rig.time, rig.value) == (
+        "t [s]",
+        "p [barg]",
+    )
     assert case.compare["nodes.gate.head"].shift == 0.012
     assert case.output.units == {"pressure": "barg", "flow": "l/s", "gauge_pressure": "barg"}
     assert case.numerics.method == "auto"  # default with rtol
@@ -184,7 +274,8 @@ def test_wave_speed_and_cells(tmp_path):
     assert case.wave_speed("stiff") == approx(np.sqrt(1.5e9 / 870))
     assert case.links["main"].cells == round(100 / case.wave_speed("main") / 2e-3)
     alike = load(case, set={"numerics": {"end": 1, "rtol": 1e-6}})
-    assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)  # equal travel times of cells
+    # equal travel times of cells
+    assert (alike.links["main"].cells, alike.links["stiff"].cells) == (100, 8)
 
 
 def test_the_resolved_case_describes_the_same_case(tmp_path):
@@ -204,7 +295,10 @@ def test_a_dict_and_its_file_give_equal_cases(scene):
     given = tomllib.loads(DETAILED)
     case = load(given)
     assert case == load(scene) and case.path is None and case.name == "case"
-    given["links"]["valve"]["opening"] = {"time": np.array([0.0, 1.0]), "value": np.array([1.0, 0.0])}
+    given["links"]["valve"]["opening"] = {
+        "time": np.array([0.0, 1.0]),
+        "value": np.array([1.0, 0.0]),
+    }
     given["links"]["main"]["cells"] = np.int64(10)
     given["fluid"]["density"] = np.float64(999.0)
     case = load(given)
@@ -225,21 +319,45 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ("links.main.cells", 400, lambda case: case.links["main"].cells == 400),
         ("links.main.length", "1 km", lambda case: case.links["main"].length == 1000),
         ("links.main.initial_flow", "20 l/s", lambda case: case.links["main"].initial_flow == 0.02),
-        ("links.main.friction", '{ model = "none" }', lambda case: case.links["main"].friction.model == "none"),
-        ("links.main.friction.model", "quasi-steady", lambda case: case.links["main"].friction.roughness == 0.00026),
+        (
+            "links.main.friction",
+            '{ model = "none" }',
+            lambda case: case.links["main"].friction.model == "none",
+        ),
+        (
+            "links.main.friction.model",
+            "quasi-steady",
+            lambda case: case.links["main"].friction.roughness == 0.00026,
+        ),
         ("links.valve.opening", "0.5", lambda case: case.links["valve"].opening.first == 0.5),
-        ("links.valve.opening.duration", "2", lambda case: case.links["valve"].opening.time[1] == 3.0),
+        (
+            "links.valve.opening.duration",
+            "2",
+            lambda case: case.links["valve"].opening.time[1] == 3.0,
+        ),
         ("numerics.scheme", "upwind", lambda case: case.numerics.scheme == "upwind"),
         ("numerics.initial", "rest", lambda case: case.numerics.initial == "rest"),
         ("gravity", "0", lambda case: case.gravity == 0),
         ("output.probes", '["gate.pressure"]', lambda case: len(case.output.probes) == 1),
         ("output.units.flow", "l/s", lambda case: case.output.units["flow"] == "l/s"),
-        ('expect."max(gate.pressure)".rtol', "0.5", lambda case: case.expect["max(gate.pressure)"].rtol == 0.5),
+        (
+            'expect."max(gate.pressure)".rtol',
+            "0.5",
+            lambda case: case.expect["max(gate.pressure)"].rtol == 0.5,
+        ),
         # a key replaces its alternative
-        ("numerics.step", "1 ms", lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None),
+        (
+            "numerics.step",
+            "1 ms",
+            lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None,
+        ),
         ("links.main.wall", "rigid", lambda case: case.links["main"].wave_speed is None),
         ("nodes.lake.pressure", "4 barg", lambda case: case.nodes["lake"].head is None),
-        ("links.main.friction.factor", "0.02", lambda case: case.links["main"].friction.roughness is None),
+        (
+            "links.main.friction.factor",
+            "0.02",
+            lambda case: case.links["main"].friction.roughness is None,
+        ),
         # a whole part may be added
         (
             "links.bypass",
@@ -263,15 +381,23 @@ def test_without_pipes_the_error_is_controlled():
     case = load(two_tanks())
     assert (case.numerics.rtol, case.numerics.method, case.numerics.courant) == (1e-6, "auto", None)
     assert [probe.text for probe in case.output.probes] == [
-        "a.pressure", "a.head", "a.level", "b.pressure", "b.head", "b.level", "hole.flow"
-    ]  # fmt: skip
+        "a.pressure",
+        "a.head",
+        "a.level",
+        "b.pressure",
+        "b.head",
+        "b.level",
+        "hole.flow",
+    ]
 
 
 def test_a_ramp_without_duration_is_a_jump():
     given = two_tanks()
     given["links"]["hole"]["opening"] = {"start": 2, "duration": 0, "value": [1, 0]}
     opening = load(given).links["hole"].opening
-    assert opening.kind == "step" and opening.time[1] == 2.0 and opening.value.tolist() == [1.0, 0.0]
+    assert (
+        opening.kind == "step" and opening.time[1] == 2.0 and opening.value.tolist() == [1.0, 0.0]
+    )
     assert load(load(given).table()) == load(given)
 
 
@@ -287,13 +413,16 @@ def test_a_single_point_is_a_constant():
         ({"area": "10 cm2"}, 0.61 * 1e-3 * np.sqrt(2e5 / 1000)),
         ({"diameter": 0.1, "loss_coefficient": 4}, np.pi / 400 / 2 * np.sqrt(2e5 / 1000)),
         ({"Kv": 36}, 0.01),  # m3/h at 1 bar
-        ({"Cv": 100}, 100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016)),  # gpm at 1 psi
+        # gpm at 1 psi
+        ({"Cv": 100}, 100 * 3.785411784e-3 / 60 * np.sqrt(1e5 / 6894.757293168361 * 0.999016)),
     ],
 )
 def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
     given = two_tanks()
     given["links"]["hole"] = {"type": "valve", "from": "a", "to": "b", **size}
-    assert load(given).links["hole"].flow_area() * np.sqrt(2 * 1e5 / 1000) == approx(flow, rel=1e-12)
+    assert load(given).links["hole"].flow_area() * np.sqrt(2 * 1e5 / 1000) == approx(
+        flow, rel=1e-12
+    )
 
 
 def test_references_of_the_schema_have_unshared_meanings():
@@ -311,7 +440,10 @@ def test_references_of_the_schema_have_unshared_meanings():
 
     assert expanded({**made, "$defs": {name: defs[name] for name in unshared["$defs"]}}) == unshared
     assert json.loads(schema_text(made)) == made
-    models = [*Control.kinds.values(), *(model for group in KINDS.values() for model in group.values())]
+    models = [
+        *Control.kinds.values(),
+        *(model for group in KINDS.values() for model in group.values()),
+    ]
     keys = sum(len([*model.keys()]) for model in models)
     assert len(schema_text(made).splitlines()) < 10.1 * keys and len(schema_text(made)) < 0.7 * len(
         schema_text(unshared)
@@ -320,7 +452,11 @@ def test_references_of_the_schema_have_unshared_meanings():
 
 def test_a_parts_key_is_documented_with_its_unit():
     made = schema()
-    pipe = next(one for one in made["properties"]["links"]["additionalProperties"]["anyOf"] if one["title"] == "Pipe")
+    pipe = next(
+        one
+        for one in made["properties"]["links"]["additionalProperties"]["anyOf"]
+        if one["title"] == "Pipe"
+    )
     assert pipe["required"] == [
         "type",
         "from",
@@ -336,10 +472,14 @@ def test_the_schema_requires_links_except_with_a_basin_or_a_body():
     made = schema()
     assert made["if"]["required"] == ["nodes"] and made["if"]["not"] == {"required": ["controls"]}
     (group,) = made["if"]["properties"]
-    excluded = made["if"]["properties"][group]["additionalProperties"]["properties"]["type"]["not"]["enum"]
+    excluded = made["if"]["properties"][group]["additionalProperties"]["properties"]["type"]["not"][
+        "enum"
+    ]
     for path in folders.CASES.glob("*.toml"):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-        plain = "controls" not in table and all(one["type"] not in excluded for one in table[group].values())
+        plain = "controls" not in table and all(
+            one["type"] not in excluded for one in table[group].values()
+        )
         first, without = made["anyOf"][:2]
         kinds = without["properties"][group]["additionalProperties"]["properties"]["type"]["enum"]
         fluid = first["required"] if "fluid" in table else without["required"]
@@ -349,8 +489,20 @@ def test_the_schema_requires_links_except_with_a_basin_or_a_body():
 
 def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
     page = folders.page("case-file")
-    models = [*KINDS["nodes"].values(), *KINDS["links"].values(), FluidSpec, Numerics, Output, Friction, Wall]
-    keys = {key for model in models for key in model.keys()} | set(KINDS["nodes"]) | set(KINDS["links"])
+    models = [
+        *KINDS["nodes"].values(),
+        *KINDS["links"].values(),
+        FluidSpec,
+        Numerics,
+        Output,
+        Friction,
+        Wall,
+    ]
+    keys = (
+        {key for model in models for key in model.keys()}
+        | set(KINDS["nodes"])
+        | set(KINDS["links"])
+    )
     assert [key for key in sorted(keys) if not re.search(rf"\b{re.escape(key)}\b", page)] == []
     example = tomllib.loads(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1])
     assert load({**example, "fluid": tomllib.loads(DETAILED)["fluid"]}).links["main"].cells == 100
@@ -365,46 +517,73 @@ def headings(page: str) -> dict[str, str]:
 def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
     found = headings(folders.page("parts"))
     found["orifice"] += found["valve"]
-    found |= {name: text + found["valve"] for name, text in found.items() if "see [valve](#valve)" in text}
+    found |= {
+        name: text + found["valve"] for name, text in found.items() if "see [valve](#valve)" in text
+    }
     every = {"nodes": found["Every node"], "links": found["Every link"]}
-    wanted = {kind: (model, every[group]) for group in KINDS for kind, model in KINDS[group].items()}
+    wanted = {
+        kind: (model, every[group]) for group in KINDS for kind, model in KINDS[group].items()
+    }
     wanted |= {"numerics": (Numerics, ""), "output": (Output, ""), "friction": (Friction, "")}
     for name, (model, shared) in wanted.items():
         text = shared + found[name]
-        assert [key for key in model.keys() if not re.search(rf"^\|.*`{key}`.*\|", text, re.MULTILINE)] == [], name
+        assert [
+            key for key in model.keys() if not re.search(rf"^\|.*`{key}`.*\|", text, re.MULTILINE)
+        ] == [], name
     assert all(key in found["pipe"] for key in Wall.keys())
-    assert all(f"`{key}`" in found["expect and compare"] for key in [*expect_keys("flow"), *COMPARE_KEYS])
+    assert all(
+        f"`{key}`" in found["expect and compare"] for key in [*expect_keys("flow"), *COMPARE_KEYS]
+    )
 
 
 def test_the_page_of_the_parts_has_the_defaults():
     page = folders.page("parts")
     said = {
-        name: dict(re.findall(r"^\| `(\w+)` \| .* \| (.*?) \| (?:value|profile|cells|shape) \|", one, re.MULTILINE))
+        name: dict(
+            re.findall(
+                r"^\| `(\w+)` \| .* \| (.*?) \| (?:value|profile|cells|shape) \|", one, re.MULTILINE
+            )
+        )
         for name, one in headings(page).items()
     }
     case = load(two_tanks())
-    assert [float(said["The case"][key]) for key in ("ambient_pressure", "gravity")] == [101325.0, case.gravity]
+    assert [float(said["The case"][key]) for key in ("ambient_pressure", "gravity")] == [
+        101325.0,
+        case.gravity,
+    ]
     told, output = said["numerics"], said["output"]
     for key in ("initial", "limiter", "below_vapor"):
         assert told[key] == f'`"{Numerics.model_fields[key].default}"`'
     assert float(told["start"]) == case.numerics.start
     assert told["scheme"] == f"{defaults.DEFAULT_SCHEME} (with cavitation {defaults.CAVITY_SCHEME})"
-    with_rtol, with_cavities = f"with rtol {defaults.DEFAULT_METHOD_RTOL}", f"with cavitation {defaults.CAVITY_METHOD}"
+    with_rtol, with_cavities = (
+        f"with rtol {defaults.DEFAULT_METHOD_RTOL}",
+        f"with cavitation {defaults.CAVITY_METHOD}",
+    )
     in_basins = f"with scalars or friction in basins {defaults.DEFAULT_METHOD_SSP}"
-    assert told["method"] == f"{defaults.DEFAULT_METHOD} ({with_rtol}, {with_cavities}, {in_basins})"
+    assert (
+        told["method"] == f"{defaults.DEFAULT_METHOD} ({with_rtol}, {with_cavities}, {in_basins})"
+    )
     assert told["courant"].startswith(f"{defaults.DEFAULT_COURANT} ")
     assert told["courant"].endswith(f"(with cavitation {defaults.CAVITY_COURANT})")
     assert float(told["rtol"].split()[0]) == case.numerics.rtol
     assert told["cell_time"].endswith(f"/ {defaults.DEFAULT_CELLS}")
-    assert output["every"].endswith(f"/ {defaults.DEFAULT_ROWS}") and int(output["fields"]) == case.output.fields
+    assert (
+        output["every"].endswith(f"/ {defaults.DEFAULT_ROWS}")
+        and int(output["fields"]) == case.output.fields
+    )
     hole = case.links["hole"]
     assert float(said["valve"]["discharge_coefficient"]) == hole.discharge_coefficient
-    assert float(said["valve"]["opening"]) == hole.opening.first and said["valve"]["characteristic"] == '`"linear"`'
+    assert (
+        float(said["valve"]["opening"]) == hole.opening.first
+        and said["valve"]["characteristic"] == '`"linear"`'
+    )
 
 
 def test_shipped_cases_point_editors_to_the_schema():
     folder = folders.CASES
-    assert json.loads((folder / "schema.json").read_text()) == schema()  # to update: fvsolve schema > cases/schema.json
+    # to update: fvsolve schema > cases/schema.json
+    assert json.loads((folder / "schema.json").read_text()) == schema()
     for path in folder.glob("*.toml"):
         assert path.read_text(encoding="utf-8").startswith("#:schema schema.json\n"), path.name
 

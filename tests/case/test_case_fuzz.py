@@ -15,14 +15,24 @@ from fvsolve.case.text import key_lines, write
 from fvsolve.errors import CaseError
 
 CASES = sorted(folders.CASES.glob("*.toml"))
-SEEDS = [tomllib.loads(DETAILED), two_tanks(), tomllib.loads(DETAILED + TANK), tomllib.loads(DETAILED + CHAMBER)]
-DESIGN = {"limits": {"top": {"on": "main", "minimum": "vacuum", "maximum": "20 bar"},
-                     "quick": {"on": ["main-2"], "quantity": "velocity", "maximum": 3}},
-          "routes": {"way": {"pipes": ["main"]}},
-          "expect": {"max(main.head)": {"value": 1, "rtol": 1}}}  # fmt: skip
+SEEDS = [
+    tomllib.loads(DETAILED),
+    two_tanks(),
+    tomllib.loads(DETAILED + TANK),
+    tomllib.loads(DETAILED + CHAMBER),
+]
+DESIGN = {
+    "limits": {
+        "top": {"on": "main", "minimum": "vacuum", "maximum": "20 bar"},
+        "quick": {"on": ["main-2"], "quantity": "velocity", "maximum": 3},
+    },
+    "routes": {"way": {"pipes": ["main"]}},
+    "expect": {"max(main.head)": {"value": 1, "rtol": 1}},
+}
 SEEDS += [placed(bends=[1800.0], **DESIGN)] * 3  # this case has more keys
 SEEDS += [tomllib.loads(path.read_text(encoding="utf-8")) for path in CASES]
-SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]  # without CoolProp, which is not tested here
+# without CoolProp, which is not tested here
+SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]
 
 WORDS = st.sampled_from(
     """0 bar|-1 barg|3 kg|20 C|1e999 m|5 m|2 m3/h|gate|lake|main|a|valve.flow||.|@
@@ -32,9 +42,16 @@ WORDS = st.sampled_from(
     |1,5 m|5""".split("|")
 )
 SCALARS = st.one_of(
-    WORDS, st.text(max_size=8), st.booleans(), st.integers(), st.floats(), st.just(10**400), st.none(),
-    st.dates(), st.sampled_from([0, 1, -1, 1e-300, 1e300]),
-)  # fmt: skip
+    WORDS,
+    st.text(max_size=8),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.just(10**400),
+    st.none(),
+    st.dates(),
+    st.sampled_from([0, 1, -1, 1e-300, 1e300]),
+)
 KEYS = st.one_of(
     st.text(max_size=6),
     st.sampled_from(
@@ -44,13 +61,21 @@ KEYS = st.one_of(
     ),
 )
 VALUES = st.recursive(
-    SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3), max_leaves=6
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
+    max_leaves=6,
 )
 
 
 def places(table, path=()):
     """Every key path of nested tables and lists."""
-    items = table.items() if isinstance(table, dict) else enumerate(table) if isinstance(table, list) else ()
+    items = (
+        table.items()
+        if isinstance(table, dict)
+        else enumerate(table)
+        if isinstance(table, list)
+        else ()
+    )
     for key, value in items:
         yield (*path, key)
         yield from places(value, (*path, key))
@@ -124,7 +149,9 @@ def test_a_spoiled_file_is_a_case_or_faults(tmp_path, case):
 @given(text=st.text(), cut=st.integers(0, len(DETAILED)), drop=st.integers(0, 12))
 def test_a_file_with_noise_is_a_case_or_faults(tmp_path, text, cut, drop):
     path = tmp_path / "case.toml"
-    path.write_bytes((DETAILED[:cut] + text + DETAILED[cut + drop :]).encode("utf-8", "surrogatepass"))
+    path.write_bytes(
+        (DETAILED[:cut] + text + DETAILED[cut + drop :]).encode("utf-8", "surrogatepass")
+    )
     case_or_faults(path)
 
 
@@ -137,13 +164,20 @@ def test_a_file_of_bytes_is_faults(tmp_path, data):
 
 
 @examples(150)
-@given(seed=st.sampled_from(SEEDS), key=st.lists(KEYS, min_size=1, max_size=4), value=VALUES | st.text())
+@given(
+    seed=st.sampled_from(SEEDS),
+    key=st.lists(KEYS, min_size=1, max_size=4),
+    value=VALUES | st.text(),
+)
 def test_any_setting_is_a_case_or_faults(seed, key, value):
     case_or_faults(seed, set={".".join(key): value})
 
 
 @examples(150)
-@given(data=st.binary(max_size=80) | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace")))
+@given(
+    data=st.binary(max_size=80)
+    | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace"))
+)
 def test_any_schedule_file_is_a_schedule_or_faults(tmp_path, data):
     (tmp_path / "x.csv").write_bytes(data)
     (tmp_path / "case.toml").write_text(DETAILED)

@@ -33,14 +33,23 @@ def form(model) -> tuple:
     """Sizes, names and integers of a model."""
     motion = motion_of(model)
     of_motion = {} if motion is None else motion.tables()._asdict()
-    tables = {name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
-              for name, table in {**model.tables._asdict(), **of_motion}.items()}  # fmt: skip
+    tables = {
+        name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
+        for name, table in {**model.tables._asdict(), **of_motion}.items()
+    }
     tables["integers"] = model.tables.integers.tobytes()
     if (network := network_of(model)) is not None:
         tables["network"] = network.arrays(network.conducting)[0].tobytes()
-    names = (model.state_names, model.node_names, model.link_names, model.valve_names, model.column_names,
-             () if motion is None else (motion.piston_names, motion.mass_names), model.events,
-             [probe.text for probe in model.probes])  # fmt: skip
+    names = (
+        model.state_names,
+        model.node_names,
+        model.link_names,
+        model.valve_names,
+        model.column_names,
+        () if motion is None else (motion.piston_names, motion.mass_names),
+        model.events,
+        [probe.text for probe in model.probes],
+    )
     return tables, names, model.shapes
 
 
@@ -85,10 +94,19 @@ class Trial:
         for keys, _ in leaves(table):
             words = tuple(key for key in keys if isinstance(key, str))
             declared = declaration(words)
-            value = self.of_signals.setdefault(words[2:], declared) if words[0] == "signals" else declared
+            value = (
+                self.of_signals.setdefault(words[2:], declared)
+                if words[0] == "signals"
+                else declared
+            )
             self.values.append(value)
             often[id(value)] += 1
-            several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 2
+            several = (
+                self.every
+                and name not in LARGE
+                and often[id(value)] == 1
+                and self.cases[id(value)] < 2
+            )
             several = several and len(self.done) % 9 == 0
             new = name not in LARGE or not self.cases[id(value)]
             if several or (id(value) not in self.done and new):
@@ -97,7 +115,9 @@ class Trial:
 
     def key(self, name: str, table: dict, before, said: str, keys: tuple, value) -> None:
         values = others(table, keys, value, self.every)
-        for to in () if self.every and said == SHAPE else reversed(values) if self.every else values:
+        for to in (
+            () if self.every and said == SHAPE else reversed(values) if self.every else values
+        ):
             try:
                 found = observed_class(before, fvsolve.build(fvsolve.load(moved(table, keys, to))))
             except FvsolveError:
@@ -144,12 +164,28 @@ def test_keys_of_no_shipped_case_change_no_more_than_declared():
 
 def test_losses_alike_are_another_shape_where_a_pipe_joins():
     """With equal losses in both directions the root has a closed form; in the shipped case a column joins the tank."""
-    tank = {"type": "tank", "area": 2.0, "level": 3.0, "connection": {"diameter": 0.1, "loss_in": 1.0, "loss_out": 1.5}}
-    case = scene({"lake": reservoir(2e5), "tank": tank}, {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4)}, 1.0, {})
+    tank = {
+        "type": "tank",
+        "area": 2.0,
+        "level": 3.0,
+        "connection": {"diameter": 0.1, "loss_in": 1.0, "loss_out": 1.5},
+    }
+    case = scene(
+        {"lake": reservoir(2e5), "tank": tank},
+        {"main": pipe("lake", "tank", 100.0, 0.1, 1000.0, 4)},
+        1.0,
+        {},
+    )
     before = fvsolve.build(fvsolve.load(case))
     for key, other in (("loss_in", 1.5), ("loss_out", 1.0)):
-        after = fvsolve.build(fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other)))
-        assert observed_class(before, after) == "shape" == changes(before.case, f"nodes.tank.connection.{key}")
+        after = fvsolve.build(
+            fvsolve.load(moved(case, ("nodes", "tank", "connection", key), other))
+        )
+        assert (
+            observed_class(before, after)
+            == "shape"
+            == changes(before.case, f"nodes.tank.connection.{key}")
+        )
 
 
 def test_a_regulating_valve_that_acts_at_once_is_another_shape():
@@ -158,11 +194,23 @@ def test_a_regulating_valve_that_acts_at_once_is_another_shape():
     ends = {"length": 100.0, "diameter": 0.1, "friction": flat}
     links = {
         "a": {"type": "pipe", "from": "lake", "to": "j", **ends},
-        "v": {"type": "pressure-reducing", "from": "j", "to": "k", "set_pressure": "1.5 bar", "time_constant": 5.0,
-              "diameter": 0.1, "loss_coefficient": 1.0},
+        "v": {
+            "type": "pressure-reducing",
+            "from": "j",
+            "to": "k",
+            "set_pressure": "1.5 bar",
+            "time_constant": 5.0,
+            "diameter": 0.1,
+            "loss_coefficient": 1.0,
+        },
         "b": {"type": "pipe", "from": "k", "to": "sea", **ends},
-    }  # fmt: skip
-    nodes = {"lake": reservoir(3e5), "j": {"type": "junction"}, "k": {"type": "junction"}, "sea": reservoir(1.2e5)}
+    }
+    nodes = {
+        "lake": reservoir(3e5),
+        "j": {"type": "junction"},
+        "k": {"type": "junction"},
+        "sea": reservoir(1.2e5),
+    }
     case = scene(nodes, links, 1.0, {"pipe_model": "quasi-steady"})
     after = fvsolve.build(fvsolve.load(moved(case, ("links", "v", "time_constant"), 0.0)))
     before = fvsolve.build(fvsolve.load(case))
@@ -182,22 +230,33 @@ def test_effect_of_a_key_depends_on_the_case_where_its_part_states_so():
     """Classes depend on stated cells, on the target of a signal, and on unsteady friction."""
     case = fvsolve.load("valve-closure")
     for key, said in {
-        "links.valve.area": "profile", "links.main.length": "profile", "links.main.cells": "shape", "title": "value",
-        "links.valve.discharge_coefficient": "profile", "fluid.bulk_modulus": "profile", "nodes.gate.position": "value",
-        "links.main.friction.model": "shape", "numerics.courant": "value", "links.valve.opening.start": "profile",
+        "links.valve.area": "profile",
+        "links.main.length": "profile",
+        "links.main.cells": "shape",
+        "title": "value",
+        "links.valve.discharge_coefficient": "profile",
+        "fluid.bulk_modulus": "profile",
+        "nodes.gate.position": "value",
+        "links.main.friction.model": "shape",
+        "numerics.courant": "value",
+        "links.valve.opening.start": "profile",
         '"expect"."max(gate.pressure)".value': "value",
-    }.items():  # fmt: skip
+    }.items():
         assert changes(case, key) == said, key
     left_out = raw_case("valve-closure")
     del left_out["links"]["main"]["cells"]
     assert changes(fvsolve.load(left_out), "links.main.length") == "shape"
     past = fvsolve.load("laminar-line")
-    assert changes(past, "fluid.viscosity") == "shape" and changes(past, "numerics.courant") == "value"
+    assert (
+        changes(past, "fluid.viscosity") == "shape" and changes(past, "numerics.courant") == "value"
+    )
     assert changes(fvsolve.load("rigid-column"), "signals.stroke.value") == "profile"
 
 
 def test_a_key_that_is_not_there_changes_nothing_but_is_named():
-    with pytest.raises(FvsolveError, match='unknown key "links.valve.aera"; expected a key of the case'):
+    with pytest.raises(
+        FvsolveError, match='unknown key "links.valve.aera"; expected a key of the case'
+    ):
         changes(fvsolve.load("valve-closure"), "links.valve.aera")
     with pytest.raises(FvsolveError, match='unknown key "signals.strok.value"'):
         changes(fvsolve.load("rigid-column"), "signals.strok.value")

@@ -123,7 +123,12 @@ GONE = object()  # in place of a value: the key is removed
 
 FUNCTION = {"type": "function", "inputs": {"h": "tower.level"}, "formula": "0.1*h"}
 TABLE = {"type": "table", "input": "tower.level", "table": {"input": [3, 5], "output": [1, 0.1]}}
-LAG = {"type": "transfer-function", "input": "tower.level", "numerator": [0.1], "denominator": [10, 1]}
+LAG = {
+    "type": "transfer-function",
+    "input": "tower.level",
+    "numerator": [0.1],
+    "denominator": [10, 1],
+}
 CONSTANT = {"type": "function", "formula": "0.1"}
 PLAIN = {"controls": GONE, "links.inlet.opening": 0.3}  # the scene without blocks
 MIDDLE = {  # a junction between valves, whose pressure has no state
@@ -180,7 +185,9 @@ def matches(text, pattern):
 
 def with_block(**keys):
     """Change of the scene: these keys of the block "level"; None removes a key."""
-    return {f"controls.level.{key}": GONE if value is None else value for key, value in keys.items()}
+    return {
+        f"controls.level.{key}": GONE if value is None else value for key, value in keys.items()
+    }
 
 
 # blocks -------------------------------------------------------------------------------------------------------------
@@ -229,19 +236,36 @@ def test_a_fault_of_a_block_has_a_message_with_its_remedy(changes, message):
 
 @pytest.mark.parametrize("key", ["setpoint", "gain"])
 def test_a_unit_that_depends_on_a_faulty_input_gives_no_second_fault(key):
-    assert only_fault(with_block(input="tower.lvel", **{key: "3 bar"})).startswith("controls.level.input: ")
+    assert only_fault(with_block(input="tower.lvel", **{key: "3 bar"})).startswith(
+        "controls.level.input: "
+    )
 
 
 @pytest.mark.parametrize(
     "keys, message",
     [
-        ({"gain": "0.8 1/s"}, 'controls.level.gain: "0.8 1/s" has the unit 1/s; expected a number in 1/m'),
-        ({"gain": "0.8 zz"}, 'controls.level.gain: "0.8 zz": unknown unit "zz"; expected a number in 1/m'),
-        ({"gain": "much"}, 'controls.level.gain: "much" is not a number with a unit; expected a number in 1/m'),
+        (
+            {"gain": "0.8 1/s"},
+            'controls.level.gain: "0.8 1/s" has the unit 1/s; expected a number in 1/m',
+        ),
+        (
+            {"gain": "0.8 zz"},
+            'controls.level.gain: "0.8 zz": unknown unit "zz"; expected a number in 1/m',
+        ),
+        (
+            {"gain": "much"},
+            'controls.level.gain: "much" is not a number with a unit; expected a number in 1/m',
+        ),
         ({"gain": True}, "controls.level.gain: true is true or false; expected a number*"),
-        ({"setpoint": "4 bar"}, 'controls.level.setpoint: "4 bar" is a pressure; expected a level, for example "2 m"'),
+        (
+            {"setpoint": "4 bar"},
+            'controls.level.setpoint: "4 bar" is a pressure; expected a level, for example "2 m"',
+        ),
         ({"limits": ["0 m", 1]}, 'controls.level.limits[0]: "0 m" is a length; expected a number*'),
-        ({"input": "outlet.flow", "setpoint": "1 l/s"}, 'controls.level.gain: "0.8 1/m" has *; expected *'),
+        (
+            {"input": "outlet.flow", "setpoint": "1 l/s"},
+            'controls.level.gain: "0.8 1/m" has *; expected *',
+        ),
     ],
 )
 def test_units_fit_between_probe_setpoint_gain_limits_and_driven_key(keys, message):
@@ -256,7 +280,9 @@ def test_the_unit_of_a_setpoint_is_that_of_the_block_that_it_follows():
 
 def test_a_control_cannot_drive_keys_of_unlike_units():
     town = {"nodes.town.head": {"control": "level"}, "controls.level.limits": [0, 1]}
-    text = "controls.level: drives a head and a number; expected keys of one unit, or a block for each"
+    text = (
+        "controls.level: drives a head and a number; expected keys of one unit, or a block for each"
+    )
     assert only_fault(town) == text
     outer = {"controls.outer": CONSTANT, "links.outlet.opening": {"control": "outer"}}
     assert only_fault(with_block(setpoint={"control": "outer"}) | outer).startswith(
@@ -307,7 +333,11 @@ def test_a_signal_does_not_follow_a_control():
 
 @pytest.mark.parametrize("group", ["nodes", "links"])
 def test_no_node_and_no_link_is_named_controls(group):
-    part = {"type": "junction", "elevation": 0.0} if group == "nodes" else tomllib.loads(LEVEL)["links"]["outlet"]
+    part = (
+        {"type": "junction", "elevation": 0.0}
+        if group == "nodes"
+        else tomllib.loads(LEVEL)["links"]["outlet"]
+    )
     text = f'{group}.controls: "controls" is the name of the blocks; expected another name'
     assert text in faults({f"{group}.controls": part})
 
@@ -318,7 +348,8 @@ def test_no_node_and_no_link_is_named_controls(group):
 def test_blocks_that_pass_on_at_once_do_not_form_a_cycle():
     plant = {"type": "function", "inputs": {"x": "controls.pi"}, "formula": "2*x"}
     text = (
-        "controls.plant: pi, plant read each other at once, so none can decide first; give [controls.plant] a `filter`"
+        "controls.plant: pi, plant read each other at once, so none can decide "
+        "first; give [controls.plant] a `filter`"
     )
     assert only_fault({"controls.plant": plant}, LOOP) == text
     fvsolve.load(edited(LOOP, {"controls.plant": plant | {"filter": "1 s"}}))
@@ -326,21 +357,37 @@ def test_blocks_that_pass_on_at_once_do_not_form_a_cycle():
 
 def test_a_block_does_not_read_its_own_output_at_once():
     own = {"type": "function", "inputs": {"x": "controls.own"}, "formula": "0.5*x"}
-    assert only_fault({"controls.own": own}, LOOP).startswith("controls.own: own reads its own output at once; give")
+    assert only_fault({"controls.own": own}, LOOP).startswith(
+        "controls.own: own reads its own output at once; give"
+    )
 
 
 def test_each_cycle_is_a_fault_of_its_own():
     chain = {"a": "b", "b": "a", "c": "d", "d": "c", "e": "d"}
-    blocks = {f"controls.{name}": {"type": "function", "inputs": {"x": f"controls.{other}"}, "formula": "2*x"}
-              for name, other in chain.items()}  # fmt: skip
-    assert [text.partition(",")[0] for text in faults(blocks, LOOP)] == ["controls.a: a", "controls.c: c"]
+    blocks = {
+        f"controls.{name}": {
+            "type": "function",
+            "inputs": {"x": f"controls.{other}"},
+            "formula": "2*x",
+        }
+        for name, other in chain.items()
+    }
+    assert [text.partition(",")[0] for text in faults(blocks, LOOP)] == [
+        "controls.a: a",
+        "controls.c: c",
+    ]
 
 
 def test_a_filter_is_no_remedy_for_setpoints_that_follow_each_other():
     pi = {"type": "pi", "input": "controls.plant", "gain": 1}
-    blocks = {"controls.a": pi | {"setpoint": {"control": "b"}}, "controls.b": pi | {"setpoint": {"control": "a"}}}
+    blocks = {
+        "controls.a": pi | {"setpoint": {"control": "b"}},
+        "controls.b": pi | {"setpoint": {"control": "a"}},
+    }
     text = only_fault(blocks, LOOP)
-    assert text.endswith("a `filter` does not act on setpoints; expected a setpoint from outside of the cycle")
+    assert text.endswith(
+        "a `filter` does not act on setpoints; expected a setpoint from outside of the cycle"
+    )
 
 
 def test_blocks_without_parts_need_no_fluid_and_parts_do():
@@ -351,16 +398,24 @@ def test_blocks_without_parts_need_no_fluid_and_parts_do():
     with pytest.raises(CaseError, match=re.escape(text)):  # an earlier case lends it no fluid
         fvsolve.load(alone, {f"nodes.tower.{key}": value for key, value in tank.items()})
     with pytest.raises(CaseError, match=re.escape(text)):
-        fvsolve.load({key: value for key, value in tomllib.loads(LOOP).items() if key != "controls"})
-    assert faults({"nodes.tower": tank, "fluid.name": "water"}, LOOP) == ["nodes.tower: no link touches it"]
+        fvsolve.load(
+            {key: value for key, value in tomllib.loads(LOOP).items() if key != "controls"}
+        )
+    assert faults({"nodes.tower": tank, "fluid.name": "water"}, LOOP) == [
+        "nodes.tower: no link touches it"
+    ]
 
 
 def test_a_loop_through_the_network_without_a_state_needs_a_filter():
-    text = "mid.pressure may follow at once from what the control drives, a loop without a state; give"
+    text = (
+        "mid.pressure may follow at once from what the control drives, a loop without a state; give"
+    )
     assert only_fault(BY_PRESSURE) == f"controls.level.input: {text} [controls.level] a `filter`"
     through = with_block(input="controls.f", setpoint=2e5, gain=-1e-6)
     through |= {"controls.f": {"type": "function", "inputs": {"p": "mid.pressure"}, "formula": "p"}}
-    assert only_fault(BY_PRESSURE | through) == f"controls.f.inputs.p: {text} [controls.f] a `filter`"
+    assert (
+        only_fault(BY_PRESSURE | through) == f"controls.f.inputs.p: {text} [controls.f] a `filter`"
+    )
 
 
 def test_a_loop_on_a_pressure_with_a_filter_starts_balanced():
@@ -371,9 +426,17 @@ def test_a_loop_on_a_pressure_with_a_filter_starts_balanced():
 def test_a_speed_without_limits_is_balanced_from_full_speed():
     """At rest the pump gives no flow to a demand, so that a search from 0 finds no start."""
     curve = {"flow": [0, 0.05, 0.08], "head": [60, 50, 34.4]}
-    pump = {"type": "pump", "from": "source", "to": "mid", "speed": {"control": "level"}, "curve": curve}
+    pump = {
+        "type": "pump",
+        "from": "source",
+        "to": "mid",
+        "speed": {"control": "level"},
+        "curve": curve,
+    }
     case = edited(LEVEL, BY_PRESSURE | {"links": {"pump": pump}, "nodes.mid.demand": "30 l/s"})
-    case["nodes"] = {name: node for name, node in case["nodes"].items() if name in ("source", "mid")}
+    case["nodes"] = {
+        name: node for name, node in case["nodes"].items() if name in ("source", "mid")
+    }
     case["controls"]["level"] |= {"setpoint": "7 bar", "gain": "0.1 1/bar", "filter": "1 s"}
     model = fvsolve.build(fvsolve.load(case))
     assert blocks_of(model)["start"][0] > 0.5
@@ -382,7 +445,9 @@ def test_a_speed_without_limits_is_balanced_from_full_speed():
 
 def test_a_cascade_starts_balanced():
     outer = {"controls.outer": {"type": "function", "formula": "4"}}
-    model = fvsolve.build(fvsolve.load(edited(LEVEL, with_block(setpoint={"control": "outer"}) | outer)))
+    model = fvsolve.build(
+        fvsolve.load(edited(LEVEL, with_block(setpoint={"control": "outer"}) | outer))
+    )
     assert sorted(blocks_of(model)["start"]) == pytest.approx([0.25, 4.0])
 
 
@@ -390,23 +455,36 @@ def test_a_cascade_starts_balanced():
     "changes, state",
     [
         (with_block(setpoint="4.5 m"), ": the input is 4 m, but the setpoint 4.5 m"),
-        (BY_PRESSURE | with_block(filter="1 s", setpoint="9 bar"), ": the input is *, but the setpoint 9e+05 Pa"),
+        (
+            BY_PRESSURE | with_block(filter="1 s", setpoint="9 bar"),
+            ": the input is *, but the setpoint 9e+05 Pa",
+        ),
         ({"links.outlet.area": "1 m2"}, ""),  # the outlet takes more than the inlet can supply
         ({"controls.level": LAG | {"denominator": [1, 0]}}, ": the input is 4 m, but not 0"),
     ],
 )
 def test_a_loop_without_balance_requires_its_initial_output(changes, state):
     text = (
-        f"controls.level: no output of level balances the start{state}; give the key `initial`, the output at the start"
+        f"controls.level: no output of level balances the start{state}; give "
+        "the key `initial`, the output at the start"
     )
     assert matches(only_fault(changes), text)
 
 
 def test_each_block_without_balance_has_a_fault_and_a_relay_without_state_too():
-    second = {"type": "pi", "input": "tower.level", "setpoint": "5 m", "gain": 1, "integral_time": 3}
+    second = {
+        "type": "pi",
+        "input": "tower.level",
+        "setpoint": "5 m",
+        "gain": 1,
+        "integral_time": 3,
+    }
     relay = {"type": "relay", "input": "tower.level", "on": 3, "off": 5}
-    changes = with_block(setpoint="4.5 m") | {"controls.second": second, "controls.relay": relay,
-                                              "links.outlet.opening": {"control": "second"}}  # fmt: skip
+    changes = with_block(setpoint="4.5 m") | {
+        "controls.second": second,
+        "controls.relay": relay,
+        "links.outlet.opening": {"control": "second"},
+    }
     found = sorted(faults(changes))
     start = "no output of {} balances the start: the input is 4 m, but the setpoint"
     assert [text.partition(";")[0] for text in found] == [
@@ -419,13 +497,33 @@ def test_each_block_without_balance_has_a_fault_and_a_relay_without_state_too():
 def test_a_block_that_drives_nothing_is_named():
     idle = 'controls.level: drives no key; write { control = "level" } where it acts'
     assert only_fault({"links.inlet.opening": 0.3}) == idle
-    assert only_fault({"links.inlet.opening": 0.3, "output.probes": ["controls.level.output"]}) == idle
+    assert (
+        only_fault({"links.inlet.opening": 0.3, "output.probes": ["controls.level.output"]}) == idle
+    )
     spare = {"controls.spare": FUNCTION}
-    texts = [[notice.text for notice in fvsolve.build(fvsolve.load(edited(LEVEL, spare | more))).warnings]
-             for more in ({}, {"output.probes": ["controls.spare.output"]},
-                          {"controls.sum": {"type": "function", "inputs": {"x": "controls.spare"}, "formula": "x"},
-                           "output.probes": ["controls.sum.output"]})]  # fmt: skip
-    assert texts == [['controls.spare: drives no key; write { control = "spare" } where it acts'], [], []]
+    texts = [
+        [
+            notice.text
+            for notice in fvsolve.build(fvsolve.load(edited(LEVEL, spare | more))).warnings
+        ]
+        for more in (
+            {},
+            {"output.probes": ["controls.spare.output"]},
+            {
+                "controls.sum": {
+                    "type": "function",
+                    "inputs": {"x": "controls.spare"},
+                    "formula": "x",
+                },
+                "output.probes": ["controls.sum.output"],
+            },
+        )
+    ]
+    assert texts == [
+        ['controls.spare: drives no key; write { control = "spare" } where it acts'],
+        [],
+        [],
+    ]
 
 
 @pytest.mark.parametrize("key", ["contol", "formla", "singal", "fle"])
@@ -446,7 +544,8 @@ def test_a_relay_is_refused_in_a_state_that_its_input_contradicts():
     drives = {"links.inlet.opening": {"control": "level"}}
     text = only_fault(drives | {"controls.level": relay | {"initial": 1}})
     assert matches(
-        text, "controls.level: `initial` is 1, but its input is 4 m at the start, with `on` at 1 m and `off`*"
+        text,
+        "controls.level: `initial` is 1, but its input is 4 m at the start, with `on` at 1 m and `off`*",
     )
     assert text.endswith("expected 0, or leave this key out")
     fvsolve.build(fvsolve.load(edited(LEVEL, drives | {"controls.level": relay | {"initial": 0}})))
@@ -455,7 +554,9 @@ def test_a_relay_is_refused_in_a_state_that_its_input_contradicts():
 def test_a_function_beyond_the_range_of_its_key_gives_a_notice_at_the_start():
     tall = edited(LEVEL, {"controls.level": FUNCTION | {"formula": "2.5*h - 0.5"}})
     (notice,) = fvsolve.build(fvsolve.load(tall)).warnings
-    assert notice.text.startswith("controls.level: its output at the start, 9.5, is beyond its limits")
+    assert notice.text.startswith(
+        "controls.level: its output at the start, 9.5, is beyond its limits"
+    )
     assert notice.text.endswith("it is limited to 1")
     stated = {**tall, "controls": {"level": tall["controls"]["level"] | {"limits": [0, 1]}}}
     assert not fvsolve.build(fvsolve.load(stated)).warnings
@@ -477,37 +578,69 @@ def test_with_its_initial_output_a_loop_may_start_out_of_balance():
     ],
 )  # fmt: skip
 def test_a_control_of_a_pressure_or_a_head_needs_limits(changes, place, words):
-    assert only_fault(changes) == f"{place}: {words} needs bounds; give `limits` in [controls.level]"
+    assert (
+        only_fault(changes) == f"{place}: {words} needs bounds; give `limits` in [controls.level]"
+    )
 
 
 def test_limits_of_a_pressure_are_absolute_pressures_of_a_liquid():
     vacuum = only_fault(BY_SOURCE | with_block(limits=["-2 barg", "6 barg"]))
-    assert matches(vacuum, 'controls.level.limits[0]: "-2 barg" is -9.868e+04 Pa absolute, a vacuum')
+    assert matches(
+        vacuum, 'controls.level.limits[0]: "-2 barg" is -9.868e+04 Pa absolute, a vacuum'
+    )
     boiling = BY_SOURCE | with_block(limits=["1 mbar", "6 bar"]) | {"fluid.vapor_pressure": 2339}
-    text = 'controls.level.limits[0]: "1 mbar" is absolute, not above the vapour pressure of 2339 Pa*'
+    text = (
+        'controls.level.limits[0]: "1 mbar" is absolute, not above the vapour pressure of 2339 Pa*'
+    )
     assert matches(only_fault(boiling), text)
     fvsolve.build(fvsolve.load(edited(LEVEL, BY_SOURCE | with_block(limits=["0 barg", "6 barg"]))))
 
 
 def test_a_set_flow_follows_a_control_within_limits_above_0():
-    valve = {"type": "flow-control", "from": "source", "to": "tower", "area": "20 cm2", "time_constant": 1}
-    changes = {"links.inlet": valve | {"set_flow": {"control": "level"}}, "controls.level": CONSTANT}
-    assert only_fault(changes).startswith("links.inlet.set_flow.control: a flow needs bounds; give `limits`")
+    valve = {
+        "type": "flow-control",
+        "from": "source",
+        "to": "tower",
+        "area": "20 cm2",
+        "time_constant": 1,
+    }
+    changes = {
+        "links.inlet": valve | {"set_flow": {"control": "level"}},
+        "controls.level": CONSTANT,
+    }
+    assert only_fault(changes).startswith(
+        "links.inlet.set_flow.control: a flow needs bounds; give `limits`"
+    )
     changes["controls.level"] = CONSTANT | {"limits": [0, 1]}
-    assert only_fault(changes).endswith("[0, 1] goes beyond what the driven keys may be; expected values above 0")
+    assert only_fault(changes).endswith(
+        "[0, 1] goes beyond what the driven keys may be; expected values above 0"
+    )
 
 
 def test_a_pressure_dependent_demand_follows_a_control_with_limits():
-    junction = {"type": "junction", "elevation": 0.0, "required_pressure": "2 bar", "demand": {"control": "level"}}
-    changes = MIDDLE | {"nodes.mid": junction, "links.inlet.opening": 0.3, "controls.level.gain": 0.1}
+    junction = {
+        "type": "junction",
+        "elevation": 0.0,
+        "required_pressure": "2 bar",
+        "demand": {"control": "level"},
+    }
+    changes = MIDDLE | {
+        "nodes.mid": junction,
+        "links.inlet.opening": 0.3,
+        "controls.level.gain": 0.1,
+    }
     text = "nodes.mid.demand: follows a control without `limits`, which `required_pressure` needs; expected limits of"
     assert only_fault(changes) == f"{text} at least 0"
 
 
-@pytest.mark.parametrize("text, key", [(BASIN, "nodes.flume.patches.paddle.travel"), (BODY, "nodes.arm.joint.angle")])
+@pytest.mark.parametrize(
+    "text, key", [(BASIN, "nodes.flume.patches.paddle.travel"), (BODY, "nodes.arm.joint.angle")]
+)
 def test_a_moving_wall_or_joint_follows_no_control(text, key):
     found = only_fault({"controls.a": CONSTANT, key: {"control": "a"}}, text)
-    assert found.startswith(f"{key}: cannot follow a control, because the motion needs its slopes; expected a schedule")
+    assert found.startswith(
+        f"{key}: cannot follow a control, because the motion needs its slopes; expected a schedule"
+    )
 
 
 @pytest.mark.parametrize("text", [BASIN, BODY])
@@ -524,13 +657,17 @@ def test_a_driven_joint_follows_no_formula_with_kinks(formula):
 
 
 def test_a_driven_joint_follows_no_formula_that_jumps():
-    assert "at t = 1 s it jumps" in only_fault({"nodes.arm.joint.angle": "where(t < 1, 0, 1)"}, BODY)
+    assert "at t = 1 s it jumps" in only_fault(
+        {"nodes.arm.joint.angle": "where(t < 1, 0, 1)"}, BODY
+    )
 
 
 @pytest.mark.parametrize("formula", ["0.1*where(t < 1, 0, 1)", "0.1*(sin(9*t) > 0.5)"])
 def test_a_wall_follows_no_formula_that_jumps(formula):
     found = only_fault({"nodes.flume.patches.paddle.travel": formula}, BASIN)
-    assert found.startswith("nodes.flume.patches.paddle.travel: jumps, and a wall has a finite speed; expected")
+    assert found.startswith(
+        "nodes.flume.patches.paddle.travel: jumps, and a wall has a finite speed; expected"
+    )
 
 
 def test_a_wall_may_follow_a_formula_with_kinks():
@@ -540,14 +677,21 @@ def test_a_wall_may_follow_a_formula_with_kinks():
 def test_a_node_named_joint_may_follow_a_control():
     node = {"type": "reservoir", "head": {"control": "level"}, "elevation": 0.0}
     block = {"type": "function", "formula": "20", "limits": ["1 m", "30 m"]}
-    changes = {"nodes.joint": node, "nodes.source": GONE, "links.inlet.from": "joint", "links.inlet.opening": 0.3}
+    changes = {
+        "nodes.joint": node,
+        "nodes.source": GONE,
+        "links.inlet.from": "joint",
+        "links.inlet.opening": 0.3,
+    }
     fvsolve.load(edited(LEVEL, changes | {"controls.level": block}))
 
 
 def test_a_pump_that_trips_does_not_follow_a_control():
     case = fvsolve.load("pump-trip")
     pump = next(name for name, link in case.links.items() if link.kind == "pump")
-    with pytest.raises(CaseError, match=f"links.{pump}.speed: cannot follow a control if the machine trips"):
+    with pytest.raises(
+        CaseError, match=f"links.{pump}.speed: cannot follow a control if the machine trips"
+    ):
         fvsolve.load(case, {"controls.a": CONSTANT, f"links.{pump}.speed": {"control": "a"}})
 
 
@@ -563,7 +707,10 @@ def test_a_pump_that_trips_does_not_follow_a_control():
         ("0.1*x", "is not a formula of t: x is unknown; known are *"),
         ("sin(t, 2)", "is not a formula of t: sin has 2 arguments; expected sin(a)"),
         ("min(t)", "is not a formula of t: min has 1 argument; expected min(a, b, ...)"),
-        ("where(t < 1, 0)", "is not a formula of t: where has 2 arguments; expected where(condition, a, b)"),
+        (
+            "where(t < 1, 0)",
+            "is not a formula of t: where has 2 arguments; expected where(condition, a, b)",
+        ),
         ("0.5*sin(t", "is not a formula of t: a bracket is not closed"),
         ("t or 1", "is not a formula of t: unknown operator or; did you mean max(a, b)?"),
         ("0.5*cos(t) m", "is not a formula of t: *; numbers in a formula are in SI, without units"),
@@ -575,11 +722,16 @@ def test_a_pump_that_trips_does_not_follow_a_control():
     ],
 )
 def test_a_formula_that_cannot_be_the_value_of_its_key_is_refused(formula, message):
-    assert matches(only_fault(PLAIN | {"links.inlet.opening": formula}), f'links.inlet.opening: "{formula}" {message}')
+    assert matches(
+        only_fault(PLAIN | {"links.inlet.opening": formula}),
+        f'links.inlet.opening: "{formula}" {message}',
+    )
 
 
 def test_a_formula_does_not_compare_for_equality():
-    text = 'links.inlet.opening: "where(t == 3, 1, 0)": t == 3 compares for equality; expected < or >'
+    text = (
+        'links.inlet.opening: "where(t == 3, 1, 0)": t == 3 compares for equality; expected < or >'
+    )
     assert only_fault(PLAIN | {"links.inlet.opening": "where(t == 3, 1, 0)"}) == text
 
 
@@ -596,16 +748,23 @@ def test_a_formula_does_not_compare_for_equality():
     ],
 )
 def test_a_formula_with_a_unit_is_checked_in_this_unit(table, message):
-    assert matches(only_fault(PLAIN | {"links.inlet.opening": table}), f"links.inlet.opening.{message}")
+    assert matches(
+        only_fault(PLAIN | {"links.inlet.opening": table}), f"links.inlet.opening.{message}"
+    )
 
 
 def test_a_formula_and_its_unit_have_faults_of_their_own():
     found = faults(PLAIN | {"links.inlet.opening": {"formula": "sn(t)", "unit": "bar"}})
-    assert [text.partition(":")[0] for text in found] == ["links.inlet.opening.unit", "links.inlet.opening.formula"]
+    assert [text.partition(":")[0] for text in found] == [
+        "links.inlet.opening.unit",
+        "links.inlet.opening.formula",
+    ]
 
 
 def test_a_formula_of_a_pressure_stays_above_the_vapour_pressure():
-    changes = PLAIN | {"nodes.source": {"type": "reservoir", "pressure": "1e5*sin(t)", "elevation": 0.0}}
+    changes = PLAIN | {
+        "nodes.source": {"type": "reservoir", "pressure": "1e5*sin(t)", "elevation": 0.0}
+    }
     text = '"1e5*sin(t)" falls to -* Pa absolute; expected values above the vapour pressure of * Pa'
     assert matches(only_fault(changes), f"nodes.source.pressure: {text}")
 
@@ -629,10 +788,14 @@ def test_with_faulty_times_of_the_run_a_formula_gives_no_second_fault():
 def test_a_formula_that_leaves_its_range_between_even_samples_is_refused(frequency, end):
     """All even samples of the run fall on the same phase of the wave."""
     text = f"0.9 + 0.3*sin(2*pi*{frequency}*t)"
-    assert "links.inlet.opening" in only_fault(PLAIN | {"links.inlet.opening": text, "numerics.end": end})
+    assert "links.inlet.opening" in only_fault(
+        PLAIN | {"links.inlet.opening": text, "numerics.end": end}
+    )
 
 
-@pytest.mark.parametrize("formula", ["0.5 + 0.5*sin(2*pi*t/11)", "t < 3", "min(1, t/10)", "exp(-t)", "t^0.5/100"])
+@pytest.mark.parametrize(
+    "formula", ["0.5 + 0.5*sin(2*pi*t/11)", "t < 3", "min(1, t/10)", "exp(-t)", "t^0.5/100"]
+)
 def test_a_formula_within_the_range_of_its_key_is_legal(formula):
     fvsolve.build(fvsolve.load(edited(LEVEL, PLAIN | {"links.inlet.opening": formula})))
 
@@ -663,7 +826,9 @@ def test_a_formula_within_the_range_of_its_key_is_legal(formula):
     ],
 )  # fmt: skip
 def test_a_fault_of_a_function_has_a_message(keys, message):
-    found = [text for text in faults({"controls.level": FUNCTION | keys}) if "h is unknown" not in text]
+    found = [
+        text for text in faults({"controls.level": FUNCTION | keys}) if "h is unknown" not in text
+    ]
     assert len(found) == 1
     assert matches(found[0], f"controls.level.{message}")
 
@@ -674,8 +839,12 @@ def test_an_input_that_the_formula_does_not_use_is_legal():
 
 
 def test_a_formula_is_finite_if_the_blocks_that_it_reads_are_at_rest():
-    blocks = {"controls.level": {"type": "function", "inputs": {"a": "controls.b"}, "formula": "1/a"}}
-    model = fvsolve.build(fvsolve.load(edited(LEVEL, blocks | {"controls.b": {"type": "function", "formula": "2"}})))
+    blocks = {
+        "controls.level": {"type": "function", "inputs": {"a": "controls.b"}, "formula": "1/a"}
+    }
+    model = fvsolve.build(
+        fvsolve.load(edited(LEVEL, blocks | {"controls.b": {"type": "function", "formula": "2"}}))
+    )
     assert sorted(blocks_of(model)["start"]) == pytest.approx([0.5, 2.0])
 
 
@@ -721,7 +890,11 @@ def test_a_fault_of_a_transfer_function_has_a_message(keys, message):
         ([3], [1], "input: has one value; expected two or more"),
         ([3, 2], [1, 0], "input: inputs out of order: 2 comes after 3; expected rising inputs"),
         ([3, 3], [1, 0], "input: inputs out of order: 3 comes after 3; expected rising inputs"),
-        ([3, 4, 5], [1, 0], "output: has length 2, but `input` has length 3; expected equal lengths"),
+        (
+            [3, 4, 5],
+            [1, 0],
+            "output: has length 2, but `input` has length 3; expected equal lengths",
+        ),
         (["3 bar", 5], [1, 0], 'input[0]: "3 bar" is a pressure; expected a level*'),
         ([3, 5], ["1 m", 0], 'output[0]: "1 m" is a length; expected a number*'),
     ],
@@ -741,14 +914,24 @@ def test_a_table_of_a_block_has_two_lists():
 
 def test_all_faults_of_a_file_come_at_once_each_with_its_line(tmp_path):
     text = LEVEL.replace('control = "level"', 'control = "levl"').replace('"0.8 1/m"', '"0.8 1/s"')
-    text = text.replace("opening = 0.5", 'opening = "2*t"').replace('"120 s"', "0\nlimits = [1, 0]\ninitial = 3")
+    text = text.replace("opening = 0.5", 'opening = "2*t"').replace(
+        '"120 s"', "0\nlimits = [1, 0]\ninitial = 3"
+    )
     (tmp_path / "scene.toml").write_text(text)
     with pytest.raises(CaseError) as caught:
         fvsolve.load(tmp_path / "scene.toml")
     lines = text.splitlines()
-    found = {fault.place.rpartition(".")[2]: lines[fault.line - 1].partition(" ")[0] for fault in caught.value.faults}
-    assert found == {"control": "opening", "opening": "opening", "gain": "gain", "integral_time": "integral_time",
-                     "limits": "limits"}  # fmt: skip
+    found = {
+        fault.place.rpartition(".")[2]: lines[fault.line - 1].partition(" ")[0]
+        for fault in caught.value.faults
+    }
+    assert found == {
+        "control": "opening",
+        "opening": "opening",
+        "gain": "gain",
+        "integral_time": "integral_time",
+        "limits": "limits",
+    }
 
 
 def test_a_fault_of_the_start_has_the_line_of_its_block(tmp_path):
@@ -777,7 +960,14 @@ def test_a_gain_has_a_unit_or_is_in_si(gain):
     "block",
     [
         {},
-        with_block(type="pid", derivative_time=1.0, filter="1 s", limits=[0.1, 0.9], initial=0.3, tracking_time="9 s"),
+        with_block(
+            type="pid",
+            derivative_time=1.0,
+            filter="1 s",
+            limits=[0.1, 0.9],
+            initial=0.3,
+            tracking_time="9 s",
+        ),
         {"controls.level": LAG},
         {"controls.level": FUNCTION},
         {"controls.level": FUNCTION | {"unit": "%", "formula": "20 + h"}},
@@ -793,28 +983,59 @@ def test_a_case_with_controls_or_formulas_reads_back_as_an_equal_case(block):
     case = fvsolve.load(edited(LEVEL, block))
     again = fvsolve.load(tomllib.loads(case.resolved()))
     assert again == case
-    assert [item.control for item in again.controls.values()] == [item.control for item in case.controls.values()]
+    assert [item.control for item in again.controls.values()] == [
+        item.control for item in case.controls.values()
+    ]
 
 
 def calls_to_read(blocks):
     """Number of function calls that reading a case takes, with as many latches and functions for each, and pipes."""
-    nodes = {f"n{k}": {"type": "junction", "elevation": 0.0, "position": [k, 0.0]} for k in range(60)}
+    nodes = {
+        f"n{k}": {"type": "junction", "elevation": 0.0, "position": [k, 0.0]} for k in range(60)
+    }
     nodes["n0"] = {"type": "reservoir", "head": 10.0}
-    links = {f"p{k}": {"type": "pipe", "from": f"n{k}", "to": f"n{k + 1}", "length": 100.0, "diameter": 0.1,
-                       "wave_speed": 1000.0} for k in range(59)}  # fmt: skip
+    links = {
+        f"p{k}": {
+            "type": "pipe",
+            "from": f"n{k}",
+            "to": f"n{k + 1}",
+            "length": 100.0,
+            "diameter": 0.1,
+            "wave_speed": 1000.0,
+        }
+        for k in range(59)
+    }
     controls = {}
     for k in range(blocks):
         controls |= {
             f"set-{k}": {"type": "function", "formula": "0"},
             f"reset-{k}": {"type": "function", "formula": "t"},
         }
-        controls[f"b{k}"] = {"type": "latch", "set": f"controls.set-{k}", "reset": f"controls.reset-{k}", "initial": 0}
-        links[f"v{k}"] = {"type": "valve", "from": f"n{k}", "to": f"n{k + 1}", "diameter": 0.1,
-                          "opening": {"control": f"b{k}"}}  # fmt: skip
+        controls[f"b{k}"] = {
+            "type": "latch",
+            "set": f"controls.set-{k}",
+            "reset": f"controls.reset-{k}",
+            "initial": 0,
+        }
+        links[f"v{k}"] = {
+            "type": "valve",
+            "from": f"n{k}",
+            "to": f"n{k + 1}",
+            "diameter": 0.1,
+            "opening": {"control": f"b{k}"},
+        }
     profile = cProfile.Profile()
     profile.enable()
-    case = fvsolve.load({"schema": 1, "fluid": {"name": "Water"}, "nodes": nodes, "links": links, "controls": controls,
-                         "numerics": {"end": 1.0, "cell_time": 0.01}})  # fmt: skip
+    case = fvsolve.load(
+        {
+            "schema": 1,
+            "fluid": {"name": "Water"},
+            "nodes": nodes,
+            "links": links,
+            "controls": controls,
+            "numerics": {"end": 1.0, "cell_time": 0.01},
+        }
+    )
     profile.disable()
     assert len(case.controls) == 3 * blocks and not case.unread_blocks
     return pstats.Stats(profile).total_calls

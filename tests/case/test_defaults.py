@@ -59,8 +59,12 @@ def file(tmp_path):
 def spelled_out():
     common = {"type": "pipe", "diameter": 0.3, "friction": {"model": "steady", "factor": 0.02}}
     one = {
-        "from": "lake", "to": "mid", "length": 1000, "cells": 30, "wall": {"youngs_modulus": 170e9, "thickness": 7e-3},
-    }  # fmt: skip
+        "from": "lake",
+        "to": "mid",
+        "length": 1000,
+        "cells": 30,
+        "wall": {"youngs_modulus": 170e9, "thickness": 7e-3},
+    }
     two = {"from": "mid", "to": "end", "length": 500, "cells": 10, "wave_speed": 900}
     return {"one": common | one, "two": common | two}
 
@@ -76,7 +80,11 @@ def test_defaults_equal_keys_in_every_pipe(file):
 def test_a_pipe_s_own_key_wins_and_so_does_its_alternative(file):
     pipes = load(file()).links
     assert pipes["two"].cells == 10 and pipes["one"].cells == 30
-    assert pipes["two"].wave_speed == 900 and pipes["two"].wall is None and pipes["one"].wall.thickness == 7e-3
+    assert (
+        pipes["two"].wave_speed == 900
+        and pipes["two"].wall is None
+        and pipes["one"].wall.thickness == 7e-3
+    )
     own = load(file(("length = 500", "length = 500\nnominal = 'DN100'"))).links["two"]
     assert own.diameter == pytest.approx(0.10226)
 
@@ -88,10 +96,12 @@ def test_settings_and_sweeps_reach_them(file):
     moved = load(case, {"links.two.length": 600})
     assert moved.links["two"].length == 600 and moved.links["one"] == case.links["one"]
     stiff = load(case, {"defaults.pipe.wave_speed": 1000}).links["one"]
-    assert stiff.wave_speed == 1000 and stiff.wall is None  # a setting replaces its alternative in the defaults
+    # a setting replaces its alternative in the defaults
+    assert stiff.wave_speed == 1000 and stiff.wall is None
     assert load(case, {"links.one.wave_speed": 1100}).links["one"].wall is None
     assert (
-        changes(case, "defaults.pipe.cells") == "shape" and changes(case, "defaults.pipe.friction.factor") == "profile"
+        changes(case, "defaults.pipe.cells") == "shape"
+        and changes(case, "defaults.pipe.friction.factor") == "profile"
     )
     rows = sweep(file(), {"defaults.pipe.cells": [40, 60]}).rows
     assert [row["ok"] for row in rows] == [True, True] and rows[0]["steps"] < rows[1]["steps"]
@@ -113,20 +123,35 @@ def test_a_fault_is_named_where_it_stands_and_once(file, changed, place, said):
     assert len(found) == 1, error
     line = 1 + TEXT[: TEXT.index(changed[0])].count("\n") + changed[1].count("\n")
     assert found[0].line == line
-    assert [one for one in error.faults if one.place.startswith("links.") and said in one.message] == []
+    assert [
+        one for one in error.faults if one.place.startswith("links.") and said in one.message
+    ] == []
 
 
 def test_the_schema_knows_them():
     found = schema()["properties"]["defaults"]["properties"]["pipe"]
-    assert "cells" in found["properties"] and "from" not in found["properties"] and "required" not in found
+    assert (
+        "cells" in found["properties"]
+        and "from" not in found["properties"]
+        and "required" not in found
+    )
 
 
 def test_pieces_of_a_pipe_that_is_cut_have_them_once(file):
     """A loss in the defaults is shared among the pieces, not given to each of them."""
-    placed = '[nodes.end]\ntype = "junction"\n[nodes.gauge]\ntype = "junction"\non = "one"\nat = "400 m"'
-    case = load(file(('[nodes.end]\ntype = "junction"', placed), ("cells = 30", "cells = 30\nminor_loss = 2.0")))
+    placed = (
+        '[nodes.end]\ntype = "junction"\n[nodes.gauge]\ntype = "junction"\non = "one"\nat = "400 m"'
+    )
+    case = load(
+        file(
+            ('[nodes.end]\ntype = "junction"', placed),
+            ("cells = 30", "cells = 30\nminor_loss = 2.0"),
+        )
+    )
     pieces = [case.links["one-1"], case.links["one-2"]]
-    assert [one.cells for one in pieces] == [12, 18] and sum(one.minor_loss for one in pieces) == pytest.approx(2.0)
+    assert [one.cells for one in pieces] == [12, 18] and sum(
+        one.minor_loss for one in pieces
+    ) == pytest.approx(2.0)
     assert all(one.wall.thickness == 7e-3 for one in pieces)
     error = refused(file(('[nodes.end]\ntype = "junction"', placed), ("7 mm", "7 kg")))
     assert [one.place for one in error.faults] == ["defaults.pipe.wall.thickness"]

@@ -83,15 +83,27 @@ def opening(text):
 
 BAD = {
     # names and keys
-    "unknown table": (swap("[numerics]", "[numeric]"), 'line 40: numeric: unknown key; did you mean "numerics"?'),
-    "missing table": (swap('[numerics]\nend = "10 s"\ncourant = 0.9\n', ""), "[numerics] is missing"),
+    "unknown table": (
+        swap("[numerics]", "[numeric]"),
+        'line 40: numeric: unknown key; did you mean "numerics"?',
+    ),
+    "missing table": (
+        swap('[numerics]\nend = "10 s"\ncourant = 0.9\n', ""),
+        "[numerics] is missing",
+    ),
     "missing fluid": (SCENE[SCENE.index("[nodes.lake]") :], "[fluid] is missing"),
-    "unknown key": (add("links.main", "lenth = 3"), 'line 23: links.main.lenth: unknown key; did you mean "length"?'),
+    "unknown key": (
+        add("links.main", "lenth = 3"),
+        'line 23: links.main.lenth: unknown key; did you mean "length"?',
+    ),
     "unknown key, nothing near": (
         add("numerics", "zzz = 3"),
         "numerics.zzz: unknown key; keys are below_vapor, cell_time, courant, delay_tolerance, ",
     ),
-    "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: expected one of length, profile"),
+    "missing key": (
+        swap('length = "914.4 m"\n', ""),
+        "line 22: links.main: expected one of length, profile",
+    ),
     "unknown type": (
         swap('"valve"', '"vavle"'),
         'line 33: links.valve.type: unknown type "vavle"; types are altitude-valve, bearing, bushing, c',
@@ -107,8 +119,14 @@ BAD = {
     ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
     "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: unknown type 3"),
-    "bad name": (swap("[nodes.gate]", '[nodes."ga te"]'), 'nodes."ga te": "ga te" is not a valid name'),
-    "a part that is no table": (swap("[nodes.lake]", "[nodes]\nx = 3\n[nodes.lake]"), "nodes.x: 3 is not a table"),
+    "bad name": (
+        swap("[nodes.gate]", '[nodes."ga te"]'),
+        'nodes."ga te": "ga te" is not a valid name',
+    ),
+    "a part that is no table": (
+        swap("[nodes.lake]", "[nodes]\nx = 3\n[nodes.lake]"),
+        "nodes.x: 3 is not a table",
+    ),
     "nodes that are no table": (
         "nodes = 3\n" + SCENE[SCENE.index("[fluid]") : SCENE.index("[nodes.lake]")],
         "nodes: 3",
@@ -123,22 +141,48 @@ BAD = {
         swap('from = "lake"', 'from = "lak"'),
         'line 24: links.main.from: no place named "lak"; places are',
     ),
-    "a link as a place": (swap('to = "outfall"', 'to = "main"'), 'links.valve.to: "main" is a link'),
-    "place that is no text": (swap('from = "lake"', "from = 3"), "line 24: links.main.from: 3 is not text"),
-    "joined to itself": (swap('to = "gate"', 'to = "lake"'), 'line 25: links.main.to: joins "lake" to itself'),
-    "loose node": (SCENE + '[nodes.x]\ntype = "tank"\narea = 1\nlevel = 1', "line 46: nodes.x: no link touches it"),
-    "disconnected": (SCENE + ISLAND, "links: disconnected network of 2 parts: gate, lake, outfall | c, d"),
+    "a link as a place": (
+        swap('to = "outfall"', 'to = "main"'),
+        'links.valve.to: "main" is a link',
+    ),
+    "place that is no text": (
+        swap('from = "lake"', "from = 3"),
+        "line 24: links.main.from: 3 is not text",
+    ),
+    "joined to itself": (
+        swap('to = "gate"', 'to = "lake"'),
+        'line 25: links.main.to: joins "lake" to itself',
+    ),
+    "loose node": (
+        SCENE + '[nodes.x]\ntype = "tank"\narea = 1\nlevel = 1',
+        "line 46: nodes.x: no link touches it",
+    ),
+    "disconnected": (
+        SCENE + ISLAND,
+        "links: disconnected network of 2 parts: gate, lake, outfall | c, d",
+    ),
     "nothing fixes the pressure": (
-        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace('"reservoir"\npressure = "0 barg"', '"junction"'),
+        swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace(
+            '"reservoir"\npressure = "0 barg"', '"junction"'
+        ),
         "nodes: nothing fixes the pressure; expected a reservoir, tank or chamber",
     ),
-    "only rigid columns": (SCENE + RIGID, "nodes.c: only rigid columns join this node, so nothing sets its pressure"),
+    "only rigid columns": (
+        SCENE + RIGID,
+        "nodes.c: only rigid columns join this node, so nothing sets its pressure",
+    ),
     "a demand above its pressure between rigid columns": (
-        SCENE + RIGID.replace('type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'),
+        SCENE
+        + RIGID.replace(
+            'type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'
+        ),
         "nothing sets its pressure, since its demand is constant above its required_pressure",
     ),
     # exclusive keys
-    "two step settings": (add("numerics", "step = 1e-3"), "numerics.step: courant and step are given; keep one"),
+    "two step settings": (
+        add("numerics", "step = 1e-3"),
+        "numerics.step: courant and step are given; keep one",
+    ),
     "pressure and head": (
         add("nodes.lake", "pressure = 2e5"),
         "nodes.lake.head: pressure and head are given; keep one",
@@ -147,19 +191,34 @@ BAD = {
         swap('head = "45.72 m"\n', ""),
         "line 11: nodes.lake: expected one of pressure, head",
     ),
-    "two sizes of a valve": (add("links.valve", "diameter = 1"), "links.valve.diameter: area and diameter are given"),
-    "two laws of a valve": (add("links.valve", "Kv = 1"), "links.valve.Kv: discharge_coefficient and Kv are given"),
+    "two sizes of a valve": (
+        add("links.valve", "diameter = 1"),
+        "links.valve.diameter: area and diameter are given",
+    ),
+    "two laws of a valve": (
+        add("links.valve", "Kv = 1"),
+        "links.valve.Kv: discharge_coefficient and Kv are given",
+    ),
     "Kv with an area": (
         swap("discharge_coefficient = 0.6", "Kv = 1"),
         "links.valve.area: Kv already gives the size; leave the key `area` out",
     ),
-    "no size": (swap('area = "0.001768 m2"\n', ""), "links.valve: discharge_coefficient needs area or diameter"),
+    "no size": (
+        swap('area = "0.001768 m2"\n', ""),
+        "links.valve: discharge_coefficient needs area or diameter",
+    ),
     "no size at all": (
         swap('area = "0.001768 m2"\ndischarge_coefficient = 0.6\n', ""),
         "line 32: links.valve: size is missing; expected area, diameter, Kv or Cv",
     ),
-    "wall and wave speed": (add("links.main", 'wall = "rigid"'), "links.main.wall: wave_speed and wall are given"),
-    "roughness and factor": (swap('"0.26 mm" }', "1e-4, factor = 0.02 }"), "friction.factor: roughness and factor are"),
+    "wall and wave speed": (
+        add("links.main", 'wall = "rigid"'),
+        "links.main.wall: wave_speed and wall are given",
+    ),
+    "roughness and factor": (
+        swap('"0.26 mm" }', "1e-4, factor = 0.02 }"),
+        "friction.factor: roughness and factor are",
+    ),
     "friction without number": (
         swap(', roughness = "0.26 mm"', ""),
         "links.main.friction: expected one of roughness, factor",
@@ -177,17 +236,38 @@ BAD = {
         swap('"914.4 m"', '"-914.4 m"'),
         'links.main.length: "-914.4 m" is out of range; expected a value above 0',
     ),
-    "zero size": (swap('"304.8 mm"', "0"), "line 27: links.main.diameter: 0 is out of range; expected a value above 0"),
-    "infinite size": (swap('"914.4 m"', "inf"), "links.main.length: inf is not finite; expected a length"),
-    "size not a number": (swap('"914.4 m"', "nan"), "links.main.length: nan is not finite; expected a length"),
-    "size that is true": (swap('"914.4 m"', "true"), "links.main.length: true is true or false; expected a length"),
-    "no unit": (swap('"914.4 m"', '"914.4"'), '"914.4" has no unit; did you mean "914.4 m", or the bare number 914.4?'),
-    "wrong unit": (swap('"304.8 mm"', '"304.8 kg"'), '"304.8 kg" is a mass; expected a length, for example "300 mm"'),
+    "zero size": (
+        swap('"304.8 mm"', "0"),
+        "line 27: links.main.diameter: 0 is out of range; expected a value above 0",
+    ),
+    "infinite size": (
+        swap('"914.4 m"', "inf"),
+        "links.main.length: inf is not finite; expected a length",
+    ),
+    "size not a number": (
+        swap('"914.4 m"', "nan"),
+        "links.main.length: nan is not finite; expected a length",
+    ),
+    "size that is true": (
+        swap('"914.4 m"', "true"),
+        "links.main.length: true is true or false; expected a length",
+    ),
+    "no unit": (
+        swap('"914.4 m"', '"914.4"'),
+        '"914.4" has no unit; did you mean "914.4 m", or the bare number 914.4?',
+    ),
+    "wrong unit": (
+        swap('"304.8 mm"', '"304.8 kg"'),
+        '"304.8 kg" is a mass; expected a length, for example "300 mm"',
+    ),
     "zero cells": (
         swap("cells = 200", "cells = 0"),
         "links.main.cells: 0 is out of range; expected a value between 1 and",
     ),
-    "half a cell": (swap("cells = 200", "cells = 2.5"), "links.main.cells: 2.5 is not a whole number"),
+    "half a cell": (
+        swap("cells = 200", "cells = 2.5"),
+        "links.main.cells: 2.5 is not a whole number",
+    ),
     "too many cells": (
         swap("cells = 200\n", "").replace("courant = 0.9", "cell_time = 1e-12"),
         "numerics.cell_time: would cut main into 7.5e+11 cells",
@@ -204,16 +284,28 @@ BAD = {
         swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
         'links.main.wall: "soft" is not a wall; expected "rigid"',
     ),
-    "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
-    "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; expected 2"),
+    "gauge modulus": (
+        swap('"2.2 GPa"', '"2.2 barg"'),
+        'fluid.bulk_modulus: "2.2 barg" is a gauge pressure',
+    ),
+    "position": (
+        add("nodes.gate", "position = [1]"),
+        "nodes.gate.position: [1] has 1 values; expected 2",
+    ),
     # pressures
     "vacuum": (
         swap('"0 barg"', '"0 bar"'),
         'nodes.outfall.pressure: "0 bar" is absolute, a vacuum; did you mean "0 barg"?',
     ),
-    "vacuum in psi": (swap('"0 barg"', '"-3 psi"'), '"-3 psi" is absolute, a vacuum; did you mean "-3 psig"?'),
+    "vacuum in psi": (
+        swap('"0 barg"', '"-3 psi"'),
+        '"-3 psi" is absolute, a vacuum; did you mean "-3 psig"?',
+    ),
     "vacuum, bare": (swap('"0 barg"', "0"), "nodes.outfall.pressure: 0 is absolute, a vacuum"),
-    "vacuum in gauge": (swap('"0 barg"', '"-2 barg"'), '"-2 barg" is -9.868e+04 Pa absolute, a vacuum'),
+    "vacuum in gauge": (
+        swap('"0 barg"', '"-2 barg"'),
+        '"-2 barg" is -9.868e+04 Pa absolute, a vacuum',
+    ),
     "below vapour pressure": (
         swap('"0 barg"', '"0.02 bar"'),
         '"0.02 bar" is absolute, not above the vapour pressure of 2339 Pa; did you mean "0.02 barg"?',
@@ -243,7 +335,10 @@ BAD = {
         'ambient_pressure = "0 bar"\n' + SCENE,
         'ambient_pressure: "0 bar" is not an absolute pressure above 0',
     ),
-    "vacuum of the fluid": (add("fluid", 'pressure = "0 bar"'), 'fluid.pressure: "0 bar" is absolute, a vacuum'),
+    "vacuum of the fluid": (
+        add("fluid", 'pressure = "0 bar"'),
+        'fluid.pressure: "0 bar" is absolute, a vacuum',
+    ),
     # the fluid: errors of fluid.py are reported with their key
     "fluid without density": (swap("density = 998\n", ""), "fluid.density:"),
     "density law": (add("fluid", 'law = "cubic"'), 'fluid.law: no density law named "cubic"'),
@@ -315,18 +410,30 @@ BAD = {
         opening('{ time = [0, 1], value = [1, 0], kind = "cubic" }'),
         'no kind of schedule named "cubic"',
     ),
-    "schedule key": (opening("{ tme = [0, 1], value = [1, 0] }"), 'opening.tme: unknown key; did you mean "time"?'),
-    "schedule without times": (opening("{ value = [1, 0] }"), "links.valve.opening: time is missing"),
+    "schedule key": (
+        opening("{ tme = [0, 1], value = [1, 0] }"),
+        'opening.tme: unknown key; did you mean "time"?',
+    ),
+    "schedule without times": (
+        opening("{ value = [1, 0] }"),
+        "links.valve.opening: time is missing",
+    ),
     "ramp of three values": (
         opening("{ start = 0, duration = 1, value = [1, 0, 1] }"),
         "opening.value: [1, 0, 1] has 3 values",
     ),
-    "ramp backwards": (opening("{ start = 0, duration = -1, value = [1, 0] }"), "opening.duration: -1 is out of range"),
+    "ramp backwards": (
+        opening("{ start = 0, duration = -1, value = [1, 0] }"),
+        "opening.duration: -1 is out of range",
+    ),
     "ramp of exponent 0": (
         opening("{ start = 0, duration = 1, value = [1, 0], exponent = 0 }"),
         "opening.exponent: 0 is out",
     ),
-    "unknown signal": (opening('{ signal = "x" }'), 'opening.signal: no signal named "x"; [signals] has none'),
+    "unknown signal": (
+        opening('{ signal = "x" }'),
+        'opening.signal: no signal named "x"; [signals] has none',
+    ),
     "signal with more keys": (opening('{ signal = "x", time = [1] }'), "opening.time: unknown key"),
     "a signal at fault": (
         opening('{ signal = "x" }') + "[signals.x]\ntime = [0, 1]\nvalue = [2, 3]\n",
@@ -336,14 +443,23 @@ BAD = {
         opening('{ signal = "x" }') + '[signals.x]\nsignal = "x"\n',
         'signal "x" refers to another signal',
     ),
-    "an unused signal at fault": (SCENE + "[signals.x]\ntime = [1]\n", "signals.x: value is missing"),
-    "schedule file missing": (opening('{ file = "strok.csv" }'), 'opening.file: "strok.csv": there is no such file'),
+    "an unused signal at fault": (
+        SCENE + "[signals.x]\ntime = [1]\n",
+        "signals.x: value is missing",
+    ),
+    "schedule file missing": (
+        opening('{ file = "strok.csv" }'),
+        'opening.file: "strok.csv": there is no such file',
+    ),
     "schedule file, nearest": (
         opening('{ file = "god.csv" }'),
         '"god.csv": there is no such file; did you mean "good.csv"?',
     ),
     "schedule file is a folder": (opening('{ file = "." }'), 'opening.file: ".": is a directory'),
-    "schedule file without header": (opening('{ file = "bare.csv" }'), "bare.csv has no header; expected for example"),
+    "schedule file without header": (
+        opening('{ file = "bare.csv" }'),
+        "bare.csv has no header; expected for example",
+    ),
     "schedule file empty": (
         opening('{ file = "empty.csv" }'),
         "empty.csv has no rows; expected a header and rows of numbers",
@@ -368,8 +484,14 @@ BAD = {
         opening('{ file = "back.csv" }'),
         "back.csv: times out of order: 0.0 comes after 1.0; expected rising times",
     ),
-    "schedule file, out of range": (opening('{ file = "wide.csv" }'), "opening.file: 2.0 is out of range"),
-    "schedule file, not text": (opening('{ file = "noise.csv" }'), "noise.csv is not UTF-8 or UTF-16 text"),
+    "schedule file, out of range": (
+        opening('{ file = "wide.csv" }'),
+        "opening.file: 2.0 is out of range",
+    ),
+    "schedule file, not text": (
+        opening('{ file = "noise.csv" }'),
+        "noise.csv is not UTF-8 or UTF-16 text",
+    ),
     # characteristic
     "characteristic": (
         add("links.valve", 'characteristic = "linar"'),
@@ -385,14 +507,23 @@ BAD = {
     ),
     # numerics
     "no end": (swap('end = "10 s"\n', ""), "line 40: numerics: end is missing"),
-    "end before start": (add("numerics", "start = 20"), "numerics.end: 10 s is not after the start at 20 s"),
+    "end before start": (
+        add("numerics", "start = 20"),
+        "numerics.end: 10 s is not after the start at 20 s",
+    ),
     "scheme": (
         add("numerics", 'scheme = "muscle"'),
         'numerics.scheme: no scheme named "muscle"; did you mean "muscl"?',
     ),
-    "limiter": (add("numerics", 'limiter = "vanleer"'), 'no limiter named "vanleer"; did you mean "van-leer"?'),
+    "limiter": (
+        add("numerics", 'limiter = "vanleer"'),
+        'no limiter named "vanleer"; did you mean "van-leer"?',
+    ),
     "method": (add("numerics", 'method = "rk5"'), 'no method named "rk5"; did you mean "rk4"?'),
-    "start": (add("numerics", 'initial = "stead"'), 'no start named "stead"; did you mean "steady"?'),
+    "start": (
+        add("numerics", 'initial = "stead"'),
+        'no start named "stead"; did you mean "steady"?',
+    ),
     "no error estimate": (
         swap("courant = 0.9", 'rtol = 1e-6\nmethod = "rk4"'),
         'numerics.rtol: method "rk4" estimates no error; use "bogacki-shampine" or "dormand-prince"',
@@ -464,8 +595,14 @@ BAD = {
         SCENE + '[expect]\n"mx(gate.pressure)" = { value = 1 }',
         'expect."mx(gate.pressure)": is not a claim; expected max',
     ),
-    "claim of nothing": (SCENE + '[expect]\n"max(gat.pressure)" = { value = 1, rtol = 1 }', 'no part named "gat"'),
-    "claim without value": (SCENE + '[expect]\n"max(gate.head)" = { rtol = 1 }', "value is missing"),
+    "claim of nothing": (
+        SCENE + '[expect]\n"max(gat.pressure)" = { value = 1, rtol = 1 }',
+        'no part named "gat"',
+    ),
+    "claim without value": (
+        SCENE + '[expect]\n"max(gate.head)" = { rtol = 1 }',
+        "value is missing",
+    ),
     "claim without tolerance": (
         SCENE + '[expect]\n"max(gate.head)" = { value = 1 }',
         "tolerance is missing; expected rtol, atol",
@@ -474,8 +611,14 @@ BAD = {
         SCENE + '[expect]\n"max(gate.head)" = { value = "1 bar", rtol = 1 }',
         "is a pressure; expected a head",
     ),
-    "claim without time": (SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }', "expected at(PROBE, TIME)"),
-    "claim with a time": (SCENE + '[expect]\n"max(gate.head, 3)" = { value = 1, rtol = 1 }', "expected max(PROBE)"),
+    "claim without time": (
+        SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }',
+        "expected at(PROBE, TIME)",
+    ),
+    "claim with a time": (
+        SCENE + '[expect]\n"max(gate.head, 3)" = { value = 1, rtol = 1 }',
+        "expected max(PROBE)",
+    ),
     "claim at no time": (
         SCENE + '[expect]\n"at(gate.head, 3 m)" = { value = 1, rtol = 1 }',
         '"3 m" is a length; expected a time',
@@ -530,7 +673,10 @@ BAD = {
         swap('name = "user"', 'name = "Water"\ntemperature = 20'),
         'outside the range of Water, 0.01 degC to 1726.85 degC; a bare number is in K, did you mean "20 degC"?',
     ),
-    "a hose": (swap('type = "pipe"', 'type = "hose"'), 'links.main.type: unknown type "hose"; use a "pipe" with'),
+    "a hose": (
+        swap('type = "pipe"', 'type = "hose"'),
+        'links.main.type: unknown type "hose"; use a "pipe" with',
+    ),
     "a filter": (
         swap('type = "valve"', 'type = "Filter"'),
         'links.valve.type: unknown type "Filter"; use an "orifice"',
@@ -548,9 +694,15 @@ BAD = {
         "an unquoted name has no blank; write wave_speed",
     ),
     # TOML
-    "syntax": (swap("end = ", "end "), "line 41: TOML: expected '=' after a key in a key/value pair: "),
+    "syntax": (
+        swap("end = ", "end "),
+        "line 41: TOML: expected '=' after a key in a key/value pair: ",
+    ),
     "a key twice": (add("links.main", "cells = 3"), 'TOML: this key is given twice: "cells = 200"'),
-    "a table twice": (SCENE + "[numerics]\n", 'line 46: TOML: this table is given twice: "[numerics]"'),
+    "a table twice": (
+        SCENE + "[numerics]\n",
+        'line 46: TOML: this table is given twice: "[numerics]"',
+    ),
     "nested too deep": ("x = " + "[" * 5000 + "]" * 5000, "nested too deep"),
     "a number of 5000 digits": ("x = " + "1" * 5000, "TOML: "),
 }
@@ -587,7 +739,12 @@ def test_the_scene_itself_has_no_fault(tmp_path):
 
 
 def test_all_faults_come_at_once(tmp_path):
-    text = swap('"914.4 m"', "-1").replace('"304.8 mm"', '"3 kg"').replace("0.6", "7").replace('"10 s"', '"10 m"')
+    text = (
+        swap('"914.4 m"', "-1")
+        .replace('"304.8 mm"', '"3 kg"')
+        .replace("0.6", "7")
+        .replace('"10 s"', '"10 m"')
+    )
     text = text.replace("gate.pressure", "gat.pressure").replace('to = "outfall"', 'to = "outfal"')
     found = faults(text, tmp_path)
     for key in (
@@ -602,13 +759,25 @@ def test_all_faults_come_at_once(tmp_path):
 
 
 SET = {
-    "no such link": ({"links.mian.cells": 4}, '--set links.mian.cells: no link named "mian"; did you mean "main"?'),
+    "no such link": (
+        {"links.mian.cells": 4},
+        '--set links.mian.cells: no link named "mian"; did you mean "main"?',
+    ),
     "no such node": ({"nodes.x.head": 4}, '--set nodes.x.head: no node named "x"'),
-    "no such key": ({"links.main.cell": 4}, '--set links.main.cell: unknown key; did you mean "cells"?'),
+    "no such key": (
+        {"links.main.cell": 4},
+        '--set links.main.cell: unknown key; did you mean "cells"?',
+    ),
     "no such table": ({"numeric.end": 4}, '--set numeric: unknown key; did you mean "numerics"?'),
     "below a value": ({"title.x": 4}, '--set title.x: "title" is "A valve shuts", not a table'),
-    "no fit": ({"links.main.cells": "many"}, '--set links.main.cells: "many" is not a whole number'),
-    "two steps": ({"numerics.step": 1, "numerics.rtol": 1}, "--set numerics.rtol: step and rtol are given; keep one"),
+    "no fit": (
+        {"links.main.cells": "many"},
+        '--set links.main.cells: "many" is not a whole number',
+    ),
+    "two steps": (
+        {"numerics.step": 1, "numerics.rtol": 1},
+        "--set numerics.rtol: step and rtol are given; keep one",
+    ),
     "no such method": (
         {"numerics.rtol": 1e-5, "numerics.method": "rk4"},
         '--set numerics.rtol: method "rk4" estimates no',
@@ -622,7 +791,9 @@ def test_an_override_at_fault_is_named(name, tmp_path):
     assert message in faults(SCENE, tmp_path, set=settings)
 
 
-SHUT = SCENE.replace('type = "junction"', 'type = "junction"\ndemand = 0.1').replace("[links.main]", "[links.sluice]")
+SHUT = SCENE.replace('type = "junction"', 'type = "junction"\ndemand = 0.1').replace(
+    "[links.main]", "[links.sluice]"
+)
 SHUT = SHUT.replace('type = "pipe"', 'type = "valve"\nopening = 0\narea = 0.1').replace(
     "value = [1.0, 0.0]", "value = [0, 1]"
 )
@@ -635,14 +806,22 @@ CANNOT_START = {
         {},
         "line 15: nodes.gate: no steady state: the inflow here is 30 m3/s, but every path out is shut",
     ),
-    "a demand behind shut valves": (SHUT, {}, "line 15: nodes.gate: no steady state: the demand here is 0.1 m3/s, but"),
+    "a demand behind shut valves": (
+        SHUT,
+        {},
+        "line 15: nodes.gate: no steady state: the demand here is 0.1 m3/s, but",
+    ),
     "unequal heads and no friction": (
-        SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),
+        SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace(
+            '"junction"', '"reservoir"\nhead = 3'
+        ),
         {},
         "line 23: links.main: no steady state: this pipe has no friction",
     ),
     "what moves": (
-        SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace('"junction"', '"tank"\nlevel = 1\narea = 1'),
+        SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace(
+            '"junction"', '"tank"\nlevel = 1\narea = 1'
+        ),
         {},
         'line 44: numerics.initial: "equilibrium" expects that nothing moves',
     ),
@@ -677,7 +856,9 @@ def test_a_case_that_cannot_start_has_its_lines_too(name, tmp_path):
     for case in (path, load(path)):
         with pytest.raises(CaseError) as caught:
             run(case, set=settings)
-        assert re.match(r"scene.toml: \d faults?\n", str(caught.value)) and f"  {message}" in str(caught.value)
+        assert re.match(r"scene.toml: \d faults?\n", str(caught.value)) and f"  {message}" in str(
+            caught.value
+        )
 
 
 def test_a_dict_that_cannot_start_has_faults_without_lines():
@@ -687,12 +868,24 @@ def test_a_dict_that_cannot_start_has_faults_without_lines():
 
 def test_a_study_is_no_case_and_names_its_command(tmp_path):
     (tmp_path / "plan.toml").write_text('case = "main.toml"\n[events.trip.links.pump]\ntrip = 1\n')
-    refused(tmp_path / "plan.toml", "1 fault\n  is a study of a case; fvsolve study plan.toml runs it")
+    refused(
+        tmp_path / "plan.toml", "1 fault\n  is a study of a case; fvsolve study plan.toml runs it"
+    )
 
 
 def test_a_material_that_is_none_hides_no_class_that_is_none():
-    pipe = {"links.main": {"type": "pipe", "from": "lake", "to": "gate", "length": 900, "nominal": "DN300",
-                           "material": "ductil-iron", "class": "Q9", "friction": {"model": "none"}}}  # fmt: skip
+    pipe = {
+        "links.main": {
+            "type": "pipe",
+            "from": "lake",
+            "to": "gate",
+            "length": 900,
+            "nominal": "DN300",
+            "material": "ductil-iron",
+            "class": "Q9",
+            "friction": {"model": "none"},
+        }
+    }
     error = refused(tomllib.loads(SCENE), set=pipe)
     assert [one.place for one in error.faults] == ["links.main.class", "links.main.material"]
 

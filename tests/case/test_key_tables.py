@@ -15,7 +15,8 @@ def test_the_tables_of_the_page_are_those_of_the_declarations():
 
 def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
     named = [name for _, name, _ in MARK.findall(page_of("parts"))]
-    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}  # a valve under another name
+    # a valve under another name
+    assert {*KINDS["nodes"], *KINDS["links"]} - {*named} == {"orifice"}
     assert len(named) == len({*named})
     assert [line.split(" | ")[0] for line in key_table("chamber").splitlines()[2:]] == [
         "| `volume`",
@@ -25,7 +26,10 @@ def test_every_part_has_a_table_on_the_page_and_every_table_a_row_a_key():
 
 def test_defaults_of_keys_have_a_column():
     rows = key_table("accumulator").splitlines()
-    assert "| `initial_pressure` | Pa | that of the steady state | profile | gas pressure at the start |" in rows
+    assert (
+        "| `initial_pressure` | Pa | that of the steady state | profile | gas pressure at the start |"
+        in rows
+    )
     words = "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air"
     assert f"| `exponent` | -, at least 1 | 1.2 | profile | {words} |" in rows
 
@@ -35,7 +39,10 @@ def test_writing_a_page_leaves_its_prose_alone(tmp_path):
     path.write_text("Before.\n\n<!-- keys: frame -->\nold\n<!-- end -->\n\nAfter.\n")
     main([str(path)])
     before, table, after = path.read_text().partition(key_table("frame"))
-    assert (before, after) == ("Before.\n\n<!-- keys: frame -->\n", "<!-- end -->\n\nAfter.\n") and table
+    assert (before, after) == (
+        "Before.\n\n<!-- keys: frame -->\n",
+        "<!-- end -->\n\nAfter.\n",
+    ) and table
 
 
 def test_parts_without_keys_are_named():

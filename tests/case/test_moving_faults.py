@@ -66,6 +66,12 @@ def test_a_bushing_that_holds_nothing_is_a_fault():
 def test_a_level_below_the_whole_bed_is_noted():
     low = fine({"pool": {**POOL, "bed": "1 + 0.1 * x"}})
     (told,) = [one for one in low.warnings if one.key == "level"]
-    assert (told.place, told.value) == ("nodes.pool", 0.5) and told.limit == pytest.approx(1.0, abs=0.02)
-    for wet in (POOL, {**POOL, "bed": "0.45 + 0.1 * x"}, {**POOL, "bed": "1", "start": {"level": "1.1"}}):
+    assert (told.place, told.value) == ("nodes.pool", 0.5) and told.limit == pytest.approx(
+        1.0, abs=0.02
+    )
+    for wet in (
+        POOL,
+        {**POOL, "bed": "0.45 + 0.1 * x"},
+        {**POOL, "bed": "1", "start": {"level": "1.1"}},
+    ):
         assert not [one for one in fine({"pool": wet}).warnings if one.key == "level"]

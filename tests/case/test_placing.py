@@ -16,19 +16,33 @@ def part(start: str, end: str, low: float, high: float) -> dict:
     inner = [x for x in HILL["chainage"] if low < x < high]
     z = np.interp([low, *inner, high], HILL["chainage"], HILL["elevation"]).tolist()
     share = (high - low) / LENGTH
-    return main(length=high - low, cells=round(CELLS * share), minor_loss=3.0 * share,
-                profile={"chainage": [low, *inner, high], "elevation": z}) | {"from": start, "to": end}  # fmt: skip
+    return main(
+        length=high - low,
+        cells=round(CELLS * share),
+        minor_loss=3.0 * share,
+        profile={"chainage": [low, *inner, high], "elevation": z},
+    ) | {"from": start, "to": end}
 
 
 def divided_pipe() -> dict:
     cuts = [1000.0, 1500.0, 2200.0, 2950.0, 3500.0, 4000.0]
     names = [("lake", "a"), ("b", "top"), ("top", "c"), ("c", "d"), ("d", "gate")]
     pipes = {f"p{k}": part(*names[k], cuts[k], cuts[k + 1]) for k in range(5)}
-    z = dict(zip("abcd", np.interp([1500.0, 1500.0, 2950.0, 3500.0], HILL["chainage"], HILL["elevation"]), strict=True))
-    nodes = {name: junction(elevation=float(one)) for name, one in z.items()} | {"top": VENT | {"elevation": 65.0}}
+    z = dict(
+        zip(
+            "abcd",
+            np.interp([1500.0, 1500.0, 2950.0, 3500.0], HILL["chainage"], HILL["elevation"]),
+            strict=True,
+        )
+    )
+    nodes = {name: junction(elevation=float(one)) for name, one in z.items()} | {
+        "top": VENT | {"elevation": 65.0}
+    }
     links = pipes | {
-        "half": GATE | {"from": "a", "to": "b"}, "hole": HOLE | {"from": "c"}, "safe": SAFE | {"from": "d"},
-    }  # fmt: skip
+        "half": GATE | {"from": "a", "to": "b"},
+        "hole": HOLE | {"from": "c"},
+        "safe": SAFE | {"from": "d"},
+    }
     return line(nodes, links)
 
 
@@ -61,20 +75,31 @@ def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
     assert [wide.links[f"main-{k}"].diameter for k in range(1, 6)] == [0.5] * 5
     assert (wide.links["main-2"].cells, wide.links["main-1"].cells) == (30, 10)
     again = fvsolve.load(wide, {"links.hole.at": "2.8 km"})
-    assert again.links["main-2"].cells == 30 and again.links["main-4"].length == pytest.approx(700.0)
-    assert changes(case, "links.main-2.diameter") == changes(case, "links.main.diameter") == "profile"
+    assert again.links["main-2"].cells == 30 and again.links["main-4"].length == pytest.approx(
+        700.0
+    )
     assert (
-        changes(case, "links.main.length") == changes(case, "links.hole.at") == changes(case, "nodes.top.at") == "shape"
+        changes(case, "links.main-2.diameter") == changes(case, "links.main.diameter") == "profile"
+    )
+    assert (
+        changes(case, "links.main.length")
+        == changes(case, "links.hole.at")
+        == changes(case, "nodes.top.at")
+        == "shape"
     )
     found = sweep(placed(), {"links.main.diameter": [0.4, 0.5]}, set={"numerics.end": 0.5})
     assert [row["ok"] for row in found.rows] == [True, True]
 
 
-STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}  # not at faces of the whole pipe
+# not at faces of the whole pipe
+STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}
 RESTATED = {
-    "as it is": {}, "by cell_time": {"cells": None}, "no profile": {"profile": None},
-    "a delay line": {"pipe_model": "delay-line"}, "a few cells": {"cells": 3},
-}  # fmt: skip
+    "as it is": {},
+    "by cell_time": {"cells": None},
+    "no profile": {"profile": None},
+    "a delay line": {"pipe_model": "delay-line"},
+    "a few cells": {"cells": 3},
+}
 
 
 @pytest.mark.parametrize("unit", ["m", "km", "ft"])
@@ -97,7 +122,9 @@ def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: st
             node.pop("elevation", None)
     made = fvsolve.load(case)
     found = [made.links[f"main-{k}"] for k in range(1, 6)][:: -1 if turned else 1]
-    assert [one.length for one in found] == pytest.approx([3.0, 17.0, 1931.0, 1046.5, 2.5], abs=1e-6)
+    assert [one.length for one in found] == pytest.approx(
+        [3.0, 17.0, 1931.0, 1046.5, 2.5], abs=1e-6
+    )
     size = LENGTH / main.get("cells", LENGTH / 50.0)
     assert [one.cells for one in found] == [max(1, int(one.length / size + 0.5)) for one in found]
     assert not [note for note in made.notices if note.key == "at"]
@@ -106,7 +133,11 @@ def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: st
 def test_steps_are_hardly_shorter_where_parts_stand_between_cells() -> None:
     """Pieces longer than a few cells have cells of nearly the given size."""
     near = placed()
-    near["links"]["half"]["at"], near["links"]["hole"]["at"], near["links"]["safe"]["at"] = 1523.0, 2951.0, 3489.0
+    near["links"]["half"]["at"], near["links"]["hole"]["at"], near["links"]["safe"]["at"] = (
+        1523.0,
+        2951.0,
+        3489.0,
+    )
     found = [link for link in fvsolve.load(near).links.values() if link.kind == "pipe"]
     assert min(one.length / one.cells for one in found) > 0.93 * LENGTH / CELLS
     assert sum(one.cells for one in found) == pytest.approx(CELLS, abs=2)
@@ -120,14 +151,18 @@ def test_a_junction_that_gives_nothing_changes_nothing(law: str) -> None:
         case["fluid"]["law"] = law
         case["numerics"] |= {"scheme": "upwind", "step": 0.01}
     one, other = fvsolve.run(plain), fvsolve.run(cut)
-    off = np.max(np.abs(one["gate.pressure"] - other["gate.pressure"])) / np.ptp(one["gate.pressure"])
+    off = np.max(np.abs(one["gate.pressure"] - other["gate.pressure"])) / np.ptp(
+        one["gate.pressure"]
+    )
     assert off <= (1e-12 if law == "linear" else 1e-5)
 
 
 def test_without_a_profile_it_lies_on_the_straight_line() -> None:
     said = main()
     del said["profile"]
-    case = fvsolve.load(line({"spot": {"type": "junction", "on": "main", "at": "750 m"}}, {"main": said}))
+    case = fvsolve.load(
+        line({"spot": {"type": "junction", "on": "main", "at": "750 m"}}, {"main": said})
+    )
     assert case.nodes["spot"].elevation == pytest.approx(27.5)
     flat = line({"spot": {"type": "junction", "on": "main", "at": "750 m"}}, {"main": said})
     for node in flat["nodes"].values():
@@ -136,10 +171,18 @@ def test_without_a_profile_it_lies_on_the_straight_line() -> None:
 
 
 def test_probes_count_along_the_whole_pipe() -> None:
-    probes = ["main.pressure@0.5", "main.pressure@2500 m", "main.flow", "main-3.head@2.3 km", "main.velocity@1"]
+    probes = [
+        "main.pressure@0.5",
+        "main.pressure@2500 m",
+        "main.flow",
+        "main-3.head@2.3 km",
+        "main.velocity@1",
+    ]
     found = fvsolve.run(placed(output={"probes": probes, "every": 0.1}))
     assert np.array_equal(found["main.pressure@0.5"], found["main.pressure@2500 m"])
-    whole = fvsolve.run(line({}, {"main": main()}, output={"probes": probes[:2] + ["main.flow@1 km"], "every": 0.1}))
+    whole = fvsolve.run(
+        line({}, {"main": main()}, output={"probes": probes[:2] + ["main.flow@1 km"], "every": 0.1})
+    )
     assert np.array_equal(whole["main.pressure@0.5"], whole["main.pressure@2500 m"])
 
 
@@ -176,7 +219,10 @@ def test_each_fault_is_named_once(change, told: str) -> None:
 
 def test_two_nodes_at_a_place_become_a_single_node() -> None:
     nodes = {name: {"type": "junction", "on": "main", "at": 2500.0} for name in ("spot", "stop")}
-    refused(line(nodes, {"main": main()}), "spot has the same place; leave out spot or stop, or change `at`")
+    refused(
+        line(nodes, {"main": main()}),
+        "spot has the same place; leave out spot or stop, or change `at`",
+    )
 
 
 @pytest.mark.parametrize("cells", [7, 8])
@@ -191,7 +237,9 @@ def test_a_part_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(ce
             one = said | ({"from": "gate", "to": "lake"} if turned else {})
             spot = {"type": "junction", "on": "main", "at": LENGTH - at if turned else at}
             found = fvsolve.load(line({"spot": spot}, {"main": one})).links
-            lengths.append([found[name].length for name in ("main-1", "main-2")][:: -1 if turned else 1])
+            lengths.append(
+                [found[name].length for name in ("main-1", "main-2")][:: -1 if turned else 1]
+            )
         assert lengths[0] == pytest.approx(lengths[1], rel=1e-12), k
 
 

@@ -22,7 +22,9 @@ CASES = sorted(folders.CASES.glob("*.toml"))
 EXAMPLES = {  # TOML blocks in the docs
     f"{page.stem}-{at}": text
     for page in sorted(folders.DOCS.glob("*.md"))
-    for at, text in enumerate(re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    for at, text in enumerate(
+        re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    )
 }
 
 SLIPS = {  # settings -> (place, key, value, limit, part of the text)
@@ -101,25 +103,45 @@ NETWORK_SLIPS = [  # part, key, value, part of the text
     ({"type": "capacitor", "from": "a", "to": "b"}, "capacitance", 100, '"100 uF"'),
     ({"type": "inductor", "from": "a", "to": "b"}, "inductance", 200, '"200 mH"'),
 ]
-MACHINE = {"type": "displacement-pump", "from": "lake", "to": "gate", "displacement": "28 cm3/rev", "speed": "1500 rpm"}
+MACHINE = {
+    "type": "displacement-pump",
+    "from": "lake",
+    "to": "gate",
+    "displacement": "28 cm3/rev",
+    "speed": "1500 rpm",
+}
 MACHINE_SLIPS = [
     ({}, "speed", 1500, '"1500 rpm"'),
     ({"volumetric_efficiency": 0.9, "rated_speed": "1500 rpm"}, "rated_pressure", 180, '"180 bar"'),
-    ({"volumetric_efficiency": 0.9, "rated_pressure": "180 bar"}, "rated_speed", 1500, '"1500 rpm"'),
+    (
+        {"volumetric_efficiency": 0.9, "rated_pressure": "180 bar"},
+        "rated_speed",
+        1500,
+        '"1500 rpm"',
+    ),
 ]
 
 
-@pytest.mark.parametrize("part, key, value, says", NETWORK_SLIPS, ids=[item[0]["type"] for item in NETWORK_SLIPS])
+@pytest.mark.parametrize(
+    "part, key, value, says", NETWORK_SLIPS, ids=[item[0]["type"] for item in NETWORK_SLIPS]
+)
 def test_a_slip_of_units_in_a_network_is_noted(part, key, value, says):
     group = "links" if "from" in part else "nodes"
     given = {name: item for name, item in (part | {key: value}).items() if name != "type"}
-    said = {**load(tomllib.loads(SCENE)).__dict__, "raw": {group: {"x": part | {key: value}}}, "nodes": {}, "links": {}}
+    said = {
+        **load(tomllib.loads(SCENE)).__dict__,
+        "raw": {group: {"x": part | {key: value}}},
+        "nodes": {},
+        "links": {},
+    }
     said[group] = {"x": KINDS[group][part["type"]].model_validate(given)}
     (note,) = range_notices(SimpleNamespace(**said))
     assert (note.place, note.key) == (f"{group}.x", key) and says in note.text
 
 
-@pytest.mark.parametrize("more, key, value, says", MACHINE_SLIPS, ids=[item[1] for item in MACHINE_SLIPS])
+@pytest.mark.parametrize(
+    "more, key, value, says", MACHINE_SLIPS, ids=[item[1] for item in MACHINE_SLIPS]
+)
 def test_a_slip_of_units_in_a_displacement_machine_is_noted(more, key, value, says):
     (note,) = load(tomllib.loads(SCENE), {"links.x": MACHINE | more | {key: value}}).notices
     assert (note.place, note.key) == ("links.x", key) and says in note.text
@@ -127,7 +149,9 @@ def test_a_slip_of_units_in_a_displacement_machine_is_noted(more, key, value, sa
 
 def test_slips_of_units_in_tables_are_noted():
     compensator = {"set_pressure": 180, "range": "10 bar"}
-    (note,) = load(tomllib.loads(SCENE), {"links.x": MACHINE | {"compensator": compensator}}).notices
+    (note,) = load(
+        tomllib.loads(SCENE), {"links.x": MACHINE | {"compensator": compensator}}
+    ).notices
     assert note.key == "compensator.set_pressure" and '"180 bar"' in note.text
     law = {"law": "astm-d341", "points": [[40, "46 cSt"], [100, "6.8 cSt"]]}
     notes = load(tomllib.loads(SCENE), {"fluid.viscosity": law}).notices
@@ -147,7 +171,12 @@ def test_notes_of_ranges_reach_check_and_summary():
     case = load(tomllib.loads(SCENE), {"links.main.wave_speed": 12, "numerics.end": 1})
     for said in (model_of(case).checks["warnings"], run(case).summary["warnings"]):
         (note,) = [one for one in said if one["kind"] == "range"]
-        assert (note["place"], note["key"], note["value"], note["limit"]) == ("links.main", "wave_speed", 12.0, 30.0)
+        assert (note["place"], note["key"], note["value"], note["limit"]) == (
+            "links.main",
+            "wave_speed",
+            12.0,
+            30.0,
+        )
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -179,9 +208,18 @@ def test_examples_of_the_docs_are_within_ranges_of_practice(name):
     "settings",
     [
         {"links.main.wave_speed": 50},  # a hose
-        {"links.main.wall": {"youngs_modulus": "5 MPa", "thickness": "4 mm"}, "links.main.diameter": "20 mm"},  # rubber
-        {"links.main.wall": {"youngs_modulus": "0.25 GPa", "thickness": "20 mm"}},  # low-density polyethylene, SDR 17
-        {"links.main.diameter": "0.1 mm", "links.main.friction.roughness": 0, "links.main.length": "0.1 m"},
+        # rubber
+        {
+            "links.main.wall": {"youngs_modulus": "5 MPa", "thickness": "4 mm"},
+            "links.main.diameter": "20 mm",
+        },
+        # low-density polyethylene, SDR 17
+        {"links.main.wall": {"youngs_modulus": "0.25 GPa", "thickness": "20 mm"}},
+        {
+            "links.main.diameter": "0.1 mm",
+            "links.main.friction.roughness": 0,
+            "links.main.length": "0.1 m",
+        },
         {"links.main.diameter": "12 m"},  # a penstock
         {"fluid.density": 13534, "fluid.bulk_modulus": "28 GPa"},  # mercury
         {"fluid.density": 870, "fluid.viscosity": "680 cSt"},
@@ -197,8 +235,13 @@ def main(flow: float, viscosity: float = 1e-3, density: float = 1000.0, **pipe) 
     said = {"cells": 10, "friction": {"model": "quasi-steady", "roughness": 1e-4}, **pipe}
     fluid = {**scenes.WATER, "viscosity": viscosity, "density": density}
     links = {"main": scenes.pipe("lake", "end", 1000.0, 0.3, 1200.0, **said)}
-    return scenes.scene({"lake": scenes.lake(50.0), "end": scenes.junction(flow)}, links, 1.0, scenes.SMOOTH,
-                        fluid=fluid)  # fmt: skip
+    return scenes.scene(
+        {"lake": scenes.lake(50.0), "end": scenes.junction(flow)},
+        links,
+        1.0,
+        scenes.SMOOTH,
+        fluid=fluid,
+    )
 
 
 def noted(case: dict) -> list:
@@ -219,7 +262,9 @@ def rigid(case: dict) -> dict:
 def test_laminar_water_in_a_main_is_noted(flow, viscosity, made):
     (note,) = noted(made(main(flow, viscosity)))
     reynolds = 1000.0 * flow / (math.pi / 4.0 * 0.3**2) * 0.3 / viscosity
-    assert (note.place, note.key) == ("links.main", "reynolds") and note.value == pytest.approx(reynolds)
+    assert (note.place, note.key) == ("links.main", "reynolds") and note.value == pytest.approx(
+        reynolds
+    )
     assert f"{reynolds:.4g}" in note.text
 
 
@@ -242,7 +287,12 @@ def test_too_few_cells_are_noted_where_they_matter(cells):
     for scheme, enough in (("upwind", 40), ("muscl", 10), ("weno5", 6)):
         case["numerics"] = {**case["numerics"], "scheme": scheme}
         (note,) = noted(case)
-        assert (note.place, note.key, note.value, note.limit) == ("links.main", "cells", cells, enough)
+        assert (note.place, note.key, note.value, note.limit) == (
+            "links.main",
+            "cells",
+            cells,
+            enough,
+        )
     case["links"]["main"]["cells"] = 100
     case["links"]["main"]["to"] = "stub"
     case["nodes"]["stub"] = scenes.junction()
@@ -260,23 +310,48 @@ def test_a_list_never_hides_two():
 def test_loops_without_friction_are_named_once(law):
     case = main(0.03)
     case["fluid"] = {**case["fluid"], "law": law}
-    case["nodes"] |= {"a": scenes.junction(), "b": scenes.junction(), "out": case["nodes"].pop("end")}
+    case["nodes"] |= {
+        "a": scenes.junction(),
+        "b": scenes.junction(),
+        "out": case["nodes"].pop("end"),
+    }
     case["links"]["main"]["to"] = "a"
-    case["links"] |= {name: scenes.pipe("a", "b", 100.0, 0.3, 1200.0, 5) for name in ("left", "right")}
+    case["links"] |= {
+        name: scenes.pipe("a", "b", 100.0, 0.3, 1200.0, 5) for name in ("left", "right")
+    }
     case["links"]["stub"] = scenes.pipe("b", "out", 100.0, 0.3, 1200.0, 5)
     (note,) = [one for one in model_of(load(case)).warnings if "loops" in one.text]
-    assert note.place == "links.left" and note.text.startswith("left, right: flow in loops without friction")
+    assert note.place == "links.left" and note.text.startswith(
+        "left, right: flow in loops without friction"
+    )
 
 
-@pytest.mark.parametrize("other, equal", [("tank", False), ("chamber", False), ("lake", False), ("tank", True)])
+@pytest.mark.parametrize(
+    "other, equal", [("tank", False), ("chamber", False), ("lake", False), ("tank", True)]
+)
 def test_a_column_without_friction_between_two_vessels_is_no_loop(other, equal):
     """Unequal heads start an oscillation: a 50 m column between a lake and a tank has w^2 = g A / (L F)."""
-    height, head = 0.0 if equal else 1.0, 101325.0 + 1000.0 * 9.80665 * (31.0 if not equal else 30.0)
-    end = {"tank": scenes.tank(0.2, 30.0 + height), "chamber": scenes.chamber(1.0, head), "lake": scenes.lake(31.0)}
-    column = {"type": "rigid-column", "from": "lake", "to": "end", "length": 50.0, "diameter": 0.3,
-              "friction": {"model": "none"}}  # fmt: skip
+    height, head = (
+        0.0 if equal else 1.0,
+        101325.0 + 1000.0 * 9.80665 * (31.0 if not equal else 30.0),
+    )
+    end = {
+        "tank": scenes.tank(0.2, 30.0 + height),
+        "chamber": scenes.chamber(1.0, head),
+        "lake": scenes.lake(31.0),
+    }
+    column = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "end",
+        "length": 50.0,
+        "diameter": 0.3,
+        "friction": {"model": "none"},
+    }
     nodes = {"lake": scenes.lake(30.0), "end": end[other]}
-    case = scenes.scene(nodes, {"way": column}, 20.0, {"method": "dormand-prince", "rtol": 1e-9}, ["way.flow"], 0.5)
+    case = scenes.scene(
+        nodes, {"way": column}, 20.0, {"method": "dormand-prince", "rtol": 1e-9}, ["way.flow"], 0.5
+    )
     result = run(case)
     said = [one for one in result.warnings if one.kind == "start"]
     assert result.ok and [one.place for one in said] == ([] if equal else ["links.way"])
@@ -285,17 +360,29 @@ def test_a_column_without_friction_between_two_vessels_is_no_loop(other, equal):
     assert result["way.flow"][0] == 0.0
     if other == "tank":
         omega = math.sqrt(9.80665 * math.pi / 4 * 0.09 / (50.0 * 0.2))
-        assert result["way.flow"] == pytest.approx(-height * 0.2 * omega * np.sin(omega * result.t), abs=1e-6)
+        assert result["way.flow"] == pytest.approx(
+            -height * 0.2 * omega * np.sin(omega * result.t), abs=1e-6
+        )
 
 
 def test_check_summary_and_resolved_case_hold_the_fluid():
     case = load(tomllib.loads(SCENE), {"numerics.end": 0.1, "fluid.name": "Water"})
     said = model_of(case).checks["fluid"]
     assert said == run(case).summary["fluid"]
-    assert list(said) == ["name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source"]
+    assert list(said) == [
+        "name",
+        "density",
+        "bulk_modulus",
+        "sound_speed",
+        "viscosity",
+        "vapor_pressure",
+        "source",
+    ]
     assert (said["name"], said["density"], said["vapor_pressure"]) == ("Water", 998.0, 2339.0)
     assert said["sound_speed"] == pytest.approx(math.sqrt(2.2e9 / 998.0), rel=1e-15)
-    assert re.fullmatch(r"CoolProp [0-9.]+; density, bulk_modulus, viscosity, vapor_pressure given", said["source"])
+    assert re.fullmatch(
+        r"CoolProp [0-9.]+; density, bulk_modulus, viscosity, vapor_pressure given", said["source"]
+    )
     text = case.resolved()
     for key in ("density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure"):
         assert f"\n# {key} = {said[key]!r}\n" in text
@@ -305,13 +392,26 @@ def test_check_summary_and_resolved_case_hold_the_fluid():
 
 def ladder(pipes: int) -> dict:
     """Case of pipes in a row; the seventh is narrower, and the ninth has a higher wave speed."""
-    nodes = {"lake": scenes.lake(50.0)} | {f"n{k}": scenes.junction(0.01 if k == pipes else None)
-                                           for k in range(1, pipes + 1)}  # fmt: skip
+    nodes = {"lake": scenes.lake(50.0)} | {
+        f"n{k}": scenes.junction(0.01 if k == pipes else None) for k in range(1, pipes + 1)
+    }
     friction = {"model": "quasi-steady", "roughness": 1e-4}
-    links = {f"p{k}": scenes.pipe("lake" if k == 1 else f"n{k - 1}", f"n{k}", 10.0, 0.3 - 0.1 * (k == 7), 1200.0, 3,
-                                  friction=friction) for k in range(1, pipes + 1)}  # fmt: skip
+    links = {
+        f"p{k}": scenes.pipe(
+            "lake" if k == 1 else f"n{k - 1}",
+            f"n{k}",
+            10.0,
+            0.3 - 0.1 * (k == 7),
+            1200.0,
+            3,
+            friction=friction,
+        )
+        for k in range(1, pipes + 1)
+    }
     links["p9"]["wave_speed"] = 2500.0
-    return scenes.scene(nodes, links, 0.1, scenes.SMOOTH, output={"units": {"pressure": "barg", "velocity": "cm/s"}})
+    return scenes.scene(
+        nodes, links, 0.1, scenes.SMOOTH, output={"units": {"pressure": "barg", "velocity": "cm/s"}}
+    )
 
 
 def test_check_shows_outliers_in_the_units_of_the_output(capsys):
@@ -323,7 +423,10 @@ def test_check_shows_outliers_in_the_units_of_the_output(capsys):
     short = capsys.readouterr().out
     show(printing.check_text(model.case, model.checks, every=True))
     whole = capsys.readouterr().out
-    rows = lambda text: {line.split()[0] for line in text.splitlines() if re.match(r" *[pn]\d+ ", line)}  # noqa: E731
+
+    def rows(text):
+        return {line.split()[0] for line in text.splitlines() if re.match(r" *[pn]\d+ ", line)}
+
     assert {f"p{k}" for k in range(1, 51)} | {f"n{k}" for k in range(1, 51)} == rows(whole)
     assert {"p7", "p9", "p1", "p50", "n50"} <= rows(short) and len(rows(short)) < 20
     assert "more of 50" in short and "--all" in short and "more of" not in whole

@@ -13,10 +13,13 @@ from fvsolve.parts.value import ReadContext, ValueFault
 
 PATTERN = {"time": [0.0, 10.0, 20.0], "value": [1.0, 1.5, 0.5], "kind": "step"}
 FORMS = {
-    "step": PATTERN, "linear": PATTERN | {"kind": "linear"}, "smooth": PATTERN | {"kind": "smooth"}, "number": 1.2,
+    "step": PATTERN,
+    "linear": PATTERN | {"kind": "linear"},
+    "smooth": PATTERN | {"kind": "smooth"},
+    "number": 1.2,
     "ramp": {"start": 5.0, "duration": 10.0, "value": [1.0, 2.0], "exponent": 2.0},
     "wave": {"mean": 1.0, "amplitude": 0.5, "period": 12.0, "phase": 0.3},
-}  # fmt: skip
+}
 SCALED = {
     "number": lambda form: 1.2 * 0.02,
     "wave": lambda form: form | {"mean": 0.02, "amplitude": 0.01},
@@ -27,7 +30,13 @@ def filling(flow, **top):
     nodes = {"spring": inflow(flow), "pond": tank(2.0, 1.0)}
     links = {"gate": valve("spring", "pond", 0.05)}
     return scene(
-        nodes, links, 30.0, {"method": "dormand-prince", "rtol": 1e-9}, ["pond.level", "gate.flow"], 1.0, **top
+        nodes,
+        links,
+        30.0,
+        {"method": "dormand-prince", "rtol": 1e-9},
+        ["pond.level", "gate.flow"],
+        1.0,
+        **top,
     )
 
 
@@ -46,7 +55,9 @@ def test_keys_of_several_units_share_a_pattern_and_the_resolved_case_has_it():
     case["nodes"]["well"] = {"type": "reservoir", "head": {"signal": "day", "factor": "4 m"}}
     case["links"]["lift"] = valve("well", "pond", 0.01)
     read = fvsolve.load(case)
-    assert read.nodes["well"].head.value.tolist() == [4.0, 6.0, 2.0] and read.signals["day"]["value"] == [1.0, 1.5, 0.5]
+    assert read.nodes["well"].head.value.tolist() == [4.0, 6.0, 2.0] and read.signals["day"][
+        "value"
+    ] == [1.0, 1.5, 0.5]
     assert read.nodes["spring"].flow.table() == {"signal": "day", "factor": -0.004}
     assert "factor = -0.004" in read.resolved()
 
@@ -54,8 +65,9 @@ def test_keys_of_several_units_share_a_pattern_and_the_resolved_case_has_it():
 def test_a_wrong_factor_is_reported_at_its_place():
     faults = []
     for signal, form in (
-        ({"signal": "day", "factor": "3 m"}, PATTERN), ({"signal": "day", "factor": "1 l/s"}, "sin(t)"),
-    ):  # fmt: skip
+        ({"signal": "day", "factor": "3 m"}, PATTERN),
+        ({"signal": "day", "factor": "1 l/s"}, "sin(t)"),
+    ):
         with pytest.raises(CaseError) as caught:
             fvsolve.load(filling(signal, signals={"day": form}))
         faults += [(fault.place, fault.message) for fault in caught.value.faults]
@@ -76,10 +88,17 @@ def test_a_sum_is_the_table_of_the_added_values(kind):
     if kind == "step":
         values = [0.031, 0.031, 0.051, 0.031, 0.016]
     else:
-        values = [0.02 * np.interp(t, day["time"], day["value"]) + 0.005 * np.interp(t, night["time"], night["value"])
-                  + 0.001 for t in times]  # fmt: skip
+        values = [
+            0.02 * np.interp(t, day["time"], day["value"])
+            + 0.005 * np.interp(t, night["time"], night["value"])
+            + 0.001
+            for t in times
+        ]
     case = filling({"sum": parts}, signals={"day": day, "night": night})
-    found, exact = fvsolve.run(case), fvsolve.run(filling({"time": times, "value": values, "kind": kind}))
+    found, exact = (
+        fvsolve.run(case),
+        fvsolve.run(filling({"time": times, "value": values, "kind": kind})),
+    )
     assert found["gate.flow"] == pytest.approx(exact["gate.flow"], rel=1e-13)
     again = fvsolve.load(tomllib.loads(fvsolve.load(case).resolved()))
     assert again.nodes["spring"].flow == fvsolve.load(case).nodes["spring"].flow
@@ -98,7 +117,12 @@ def test_a_sum_is_the_table_of_the_added_values(kind):
 )
 def test_a_wrong_sum_is_reported_at_its_place(given, place, message):
     with pytest.raises(CaseError) as caught:
-        fvsolve.load(filling(given, signals={"loop": {"sum": [{"signal": "loop"}]}} if "loop" in str(given) else {}))
+        fvsolve.load(
+            filling(
+                given,
+                signals={"loop": {"sum": [{"signal": "loop"}]}} if "loop" in str(given) else {},
+            )
+        )
     (fault,) = caught.value.faults
     assert fault.place == f"nodes.spring.flow.{place}" and message in fault.message
 

@@ -11,7 +11,13 @@ from fvsolve.case.resource_checks import disk_size, free_memory
 from fvsolve.cli.printing import cost_estimate, duration
 from fvsolve.errors import RunError
 
-POOL = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4], "velocity": {"u": 0, "v": 0}}
+POOL = {
+    "type": "basin",
+    "physics": "transport",
+    "size": [1.0, 1.0],
+    "cells": [4, 4],
+    "velocity": {"u": 0, "v": 0},
+}
 
 
 @pytest.mark.parametrize("settings, words", [
@@ -46,7 +52,8 @@ def test_settings_that_fit_are_accepted(settings):
 
 
 def test_a_table_larger_than_the_disk_is_refused_by_its_place(tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000})())  # of the system
+    # of the system
+    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 1000})())
     with pytest.raises(RunError, match=r"run: history\.csv needs at least 2 kB, but 1 kB are free"):
         fvsolve.run(branched(fields=0), out=tmp_path / "run")
     assert not (tmp_path / "run" / ".lock").exists()
@@ -65,16 +72,26 @@ def test_long_names_are_refused_at_once(group):
     case, name = branched() | {"scalars": {}}, "x" * 10**5
     case["nodes"]["pool"] = POOL
     case["output"]["lines"] = {}
-    tables = {**{one: case[one] for one in ("nodes", "links", "scalars")}, "lines": case["output"]["lines"]}
-    parts = {"nodes": {"type": "junction"}, "links": case["links"]["valve"], "scalars": {},
-             "lines": {"basin": "pool", "from": [0, 0], "to": [1, 1]}}  # fmt: skip
+    tables = {
+        **{one: case[one] for one in ("nodes", "links", "scalars")},
+        "lines": case["output"]["lines"],
+    }
+    parts = {
+        "nodes": {"type": "junction"},
+        "links": case["links"]["valve"],
+        "scalars": {},
+        "lines": {"basin": "pool", "from": [0, 0], "to": [1, 1]},
+    }
     tables[group][name] = parts[group]
     error = refused(case)
     assert "has 100000 letters; expected at most 60" in str(error) and len(str(error)) < 5000
 
 
 def test_a_long_reference_gets_a_short_message():
-    error = refused(branched(), set={"links.valve.to": "y" * 10**5, "output.probes": ["z" * 10**5 + ".pressure"]})
+    error = refused(
+        branched(),
+        set={"links.valve.to": "y" * 10**5, "output.probes": ["z" * 10**5 + ".pressure"]},
+    )
     assert len(str(error)) < 5000
 
 
@@ -94,7 +111,14 @@ def test_a_long_unit_is_refused_at_once():
 def test_a_long_run_is_announced_before_it_starts(fvs, tmp_path, monkeypatch):
     long = fvsolve.build(fvsolve.load(branched(), {"numerics.end": 1e12, "output.every": 1e9}))
     assert re.fullmatch(r"case will take about \S+ years", cost_estimate(long))
-    large = fvsolve.build(fvsolve.load(branched(fields=10**6), {"numerics.end": 1e-2, "output.every": 1e-3}))
+    large = fvsolve.build(
+        fvsolve.load(branched(fields=10**6), {"numerics.end": 1e-2, "output.every": 1e-3})
+    )
     assert re.fullmatch(r"case will take about .* GB on disk", cost_estimate(large))
     assert cost_estimate(fvsolve.build(fvsolve.load(still()))) == ""
-    assert [duration(one) for one in (100.0, 240.0, 86400.0, 1e6)] == ["1e+02 s", "4 minutes", "24 hours", "12 days"]
+    assert [duration(one) for one in (100.0, 240.0, 86400.0, 1e6)] == [
+        "1e+02 s",
+        "4 minutes",
+        "24 hours",
+        "12 days",
+    ]

@@ -27,15 +27,29 @@ def piped(**numerics) -> dict:
 
 
 def cellless(**numerics) -> dict:
-    return scene({"lake": lake(10.0), "surge": tank(2.0, 12.0)}, {"tap": valve("lake", "surge", 0.01)}, 1.0, numerics)
+    return scene(
+        {"lake": lake(10.0), "surge": tank(2.0, 12.0)},
+        {"tap": valve("lake", "surge", 0.01)},
+        1.0,
+        numerics,
+    )
 
 
 FAULTS = {
-    "no such method": (piped(method="radau5"), 'numerics.method: no method named "radau5"; did you mean "'),
+    "no such method": (
+        piped(method="radau5"),
+        'numerics.method: no method named "radau5"; did you mean "',
+    ),
     "misspelt": (piped(method="esdirk4"), 'no method named "esdirk4"; did you mean "esdirk-4"?'),
     "auto misspelt": (piped(method="atuo"), 'no method named "atuo"; did you mean "auto"?'),
-    "no error estimate": (piped(method="gauss-4", rtol=1e-6), 'method "gauss-4" estimates no error; use '),
-    "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
+    "no error estimate": (
+        piped(method="gauss-4", rtol=1e-6),
+        'method "gauss-4" estimates no error; use ',
+    ),
+    "no estimate by default": (
+        cellless(method="gauss-4"),
+        'numerics.method: method "gauss-4" estimates no error; use',
+    ),
     "rtol below rounding": (
         piped(method="radau-iia-5", rtol=1e-14),
         "numerics.rtol: 1e-14 is below rounding errors; expected",
@@ -57,8 +71,14 @@ FAULTS = {
         piped(method="auto", courant=0.9),
         'method "auto" controls the error of its steps; give `rtol`',
     ),
-    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" controls the error of its steps; give `rtol`'),
-    "two settings": (piped(method="radau-iia-5", rtol=1e-6, courant=2.0), "courant and rtol are given; keep one"),
+    "auto by step": (
+        piped(method="auto", step=1e-3),
+        'method "auto" controls the error of its steps; give `rtol`',
+    ),
+    "two settings": (
+        piped(method="radau-iia-5", rtol=1e-6, courant=2.0),
+        "courant and rtol are given; keep one",
+    ),
     "no such algebra": (piped(method="gauss-4", linear_algebra="bandid"), 'did you mean "banded"?'),
 }
 
@@ -77,7 +97,10 @@ def test_error_control_by_a_method_without_it_names_methods_with_it():
 
 
 INTEGRATE = {
-    "misspelt": (dict(method="radau-iia5"), 'no method named "radau-iia5"; did you mean "radau-iia-5"'),
+    "misspelt": (
+        dict(method="radau-iia5"),
+        'no method named "radau-iia5"; did you mean "radau-iia-5"',
+    ),
     "below rounding": (
         dict(method="radau-iia-5", rtol=1e-14),
         "rtol = 1e-14 is below rounding errors; expected 1e-13 or more",
@@ -87,14 +110,29 @@ INTEGRATE = {
         "step = 1e-17 is too small to change the time; expected more",
     ),
     "neither": (dict(method="gauss-4"), "gauss-4 has no error estimate; give step, or one of"),
-    "rtol without an estimate": (dict(method="gauss-4", rtol=1e-6), "gauss-4 has no error estimate"),
-    "both": (dict(method="radau-iia-5", rtol=1e-6, step=0.1), "rtol and step both set the step; give only one"),
+    "rtol without an estimate": (
+        dict(method="gauss-4", rtol=1e-6),
+        "gauss-4 has no error estimate",
+    ),
+    "both": (
+        dict(method="radau-iia-5", rtol=1e-6, step=0.1),
+        "rtol and step both set the step; give only one",
+    ),
     "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
-    "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
+    "infinite": (
+        dict(method="radau-iia-5", step=float("inf")),
+        "step = inf is not a positive number",
+    ),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
     "auto by steps": (dict(method="auto", step=0.1), 'method "auto" uses error control; give rtol'),
-    "negative atol": (dict(atol=-1.0), "atol = -1.0 is not valid; expected a positive number, or a row"),
-    "atol of another length": (dict(atol=[1e-6, 1e-6]), "positive numbers with the length of y0, 1"),
+    "negative atol": (
+        dict(atol=-1.0),
+        "atol = -1.0 is not valid; expected a positive number, or a row",
+    ),
+    "atol of another length": (
+        dict(atol=[1e-6, 1e-6]),
+        "positive numbers with the length of y0, 1",
+    ),
 }
 
 
@@ -107,7 +145,11 @@ def test_integrate_refuses_it(settings, wanted):
 
 WRONG = {
     "too few": (lambda t, y: np.array([y[1]]), [1.0, 0.0], "f(t, y) gives 1 rates for 2 states"),
-    "too many": (lambda t, y: np.array([y[1], y[0], 0.0]), [1.0, 0.0], "f(t, y) gives 3 rates for 2 states"),
+    "too many": (
+        lambda t, y: np.array([y[1], y[0], 0.0]),
+        [1.0, 0.0],
+        "f(t, y) gives 3 rates for 2 states",
+    ),
     "nothing": (lambda t, y: None, [1.0], "f(t, y) gives 0 rates for 1 states"),
     "no function": (5, [1.0], "f = 5 cannot be called"),
     "no numbers": (lambda t, y: -y, ["a"], "y0 = ['a'] is not valid; expected real numbers"),
@@ -146,10 +188,19 @@ def test_settings_left_out_get_defaults(numerics, found):
 
 def joined(volume: float, **numerics) -> dict:
     """Case of a basin of liquid joined to a chamber by a valve, with flow at the start."""
-    pool = {"type": "basin", "size": [4.0, 2.0], "cells": [16, 8], "physics": "liquid", "pressure": 2e6,
-            "thickness": 0.1, "patches": {"out": {"side": "east"}}}  # fmt: skip
+    pool = {
+        "type": "basin",
+        "size": [4.0, 2.0],
+        "cells": [16, 8],
+        "physics": "liquid",
+        "pressure": 2e6,
+        "thickness": 0.1,
+        "patches": {"out": {"side": "east"}},
+    }
     nodes = {"pool": pool, "pot": chamber(volume, 1e6)}
-    return scene(nodes, {"gate": valve("pool.out", "pot", 1e-4)}, 0.02, numerics, ["pot.pressure"], 1e-3)
+    return scene(
+        nodes, {"gate": valve("pool.out", "pot", 1e-4)}, 0.02, numerics, ["pot.pressure"], 1e-3
+    )
 
 
 def test_check_states_the_cost_of_explicit_steps_and_not_of_the_remedy(tmp_path, fvs):
@@ -157,7 +208,12 @@ def test_check_states_the_cost_of_explicit_steps_and_not_of_the_remedy(tmp_path,
     file.write_text(write(joined(1e-6)))
     code, out, _ = fvs("check", file, "--json")
     (said,) = [one for one in json.loads(out)["warnings"] if one["kind"] == "cost"]
-    assert code == 0 and said["value"] > 20_000 and said["value"] > 10 * said["limit"] and "links.gate" in said["text"]
+    assert (
+        code == 0
+        and said["value"] > 20_000
+        and said["value"] > 10 * said["limit"]
+        and "links.gate" in said["text"]
+    )
     assert 'method = "auto" or "rodas-5p" with rtol = 1e-6' in said["text"]
     for method in ("auto", "rodas-5p"):
         remedy = {"numerics.method": method, "numerics.rtol": 1e-6}
@@ -166,10 +222,16 @@ def test_check_states_the_cost_of_explicit_steps_and_not_of_the_remedy(tmp_path,
         assert not [one for one in json.loads(out)["warnings"] if one["kind"] == "cost"]
 
 
-@pytest.mark.parametrize("given", [{"method": "rk4", "courant": 0.8}, {"method": "dormand-prince", "rtol": 1e-6}])
+@pytest.mark.parametrize(
+    "given", [{"method": "rk4", "courant": 0.8}, {"method": "dormand-prince", "rtol": 1e-6}]
+)
 def test_the_cost_is_stated_for_all_explicit_control_and_not_where_waves_limit_the_step(given):
     def cost_notices(volume):
-        return [one for one in build(load(joined(volume, **given))).checks["warnings"] if one["kind"] == "cost"]
+        return [
+            one
+            for one in build(load(joined(volume, **given))).checks["warnings"]
+            if one["kind"] == "cost"
+        ]
 
     assert cost_notices(1e-6) and not cost_notices(1.0)
 
@@ -211,7 +273,9 @@ def test_a_method_of_a_file_is_that_of_its_tableau(tmp_path):
     run = fvsolve.run(placed(tmp_path, file="methods/ssp43.txt", method="methods/ssp43.txt"))
     METHODS.pop("ssp43")
     fvsolve.tableau("by-hand", SSP43)
-    same = fvsolve.run(fvsolve.load(TWO_TANKS, {"numerics.method": "by-hand", "numerics.rtol": 1e-6}))
+    same = fvsolve.run(
+        fvsolve.load(TWO_TANKS, {"numerics.method": "by-hand", "numerics.rtol": 1e-6})
+    )
     assert run.ok and np.array_equal(run["low.level"], same["low.level"])
 
 
@@ -228,7 +292,9 @@ def test_the_run_directory_stores_a_copy_that_runs_again_to_the_same_numbers(tmp
 
 def test_a_file_is_named_on_the_command_line_too(tmp_path, fvs):
     case = placed(tmp_path, method="dormand-prince")
-    code, said, _ = fvs("run", case, "--set", "numerics.method=ssp43.txt", "--out", tmp_path / "out")
+    code, said, _ = fvs(
+        "run", case, "--set", "numerics.method=ssp43.txt", "--out", tmp_path / "out"
+    )
     assert code == 0 and 'method = "ssp43.txt"' in (tmp_path / "out" / "case.toml").read_text()
 
 
@@ -236,7 +302,12 @@ def test_a_file_is_named_on_the_command_line_too(tmp_path, fvs):
     "file, tableau, method, said",
     [
         ("ssp43.txt", SSP43, "ssp34.txt", 'numerics.method: "ssp34.txt".*no such file.*ssp43.txt'),
-        ("bad.txt", "0 | 1/2\n--+--\n | 1", "bad.txt", "numerics.method.*bad.txt.*row 1 adds up to 1/2"),
+        (
+            "bad.txt",
+            "0 | 1/2\n--+--\n | 1",
+            "bad.txt",
+            "numerics.method.*bad.txt.*row 1 adds up to 1/2",
+        ),
         ("rk4.txt", SSP43, "rk4.txt", 'numerics.method.*"rk4" is not free'),
     ],
 )
@@ -260,8 +331,13 @@ def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
     file.parent.mkdir()
     file.write_text(SSP43)
     made = chart(case, methods=[method_name(str(file))], rtol=[1e-3, 1e-5])
-    point = next(one for one in made.points if one.setting.method == "ssp43")  # the cheapest depends on measured times
-    (line,) = (one for one in _target_setting(1e-2, point, fvsolve.load(case)).toml_lines() if one.startswith("method"))
+    # the cheapest depends on measured times
+    point = next(one for one in made.points if one.setting.method == "ssp43")
+    (line,) = (
+        one
+        for one in _target_setting(1e-2, point, fvsolve.load(case)).toml_lines()
+        if one.startswith("method")
+    )
     assert line == f'method = "{"methods/ssp43.txt" if inside else file}"'
     METHODS.pop("ssp43")
     case.write_text(case.read_text().replace('method = "dormand-prince"', line))
@@ -288,9 +364,25 @@ def test_the_picture_of_a_method_has_its_name(tmp_path, fvs, monkeypatch):
 
 def test_keys_of_a_part_that_settings_add_replace_their_alternatives():
     """The type of the part is in no table of the file."""
-    nodes = {"lake": {"type": "reservoir", "head": 20.0}, "low": {"type": "reservoir", "head": 10.0}}
-    main = {"type": "pipe", "from": "lake", "to": "low", "length": 100.0, "diameter": 0.1, "wave_speed": 1000.0}
-    case = {"schema": 1, "fluid": {"name": "Water"}, "nodes": nodes, "links": {"main": main}, "numerics": {"end": 1.0}}
+    nodes = {
+        "lake": {"type": "reservoir", "head": 20.0},
+        "low": {"type": "reservoir", "head": 10.0},
+    }
+    main = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "low",
+        "length": 100.0,
+        "diameter": 0.1,
+        "wave_speed": 1000.0,
+    }
+    case = {
+        "schema": 1,
+        "fluid": {"name": "Water"},
+        "nodes": nodes,
+        "links": {"main": main},
+        "numerics": {"end": 1.0},
+    }
     added = {"type": "orifice", "from": "lake", "to": "low", "diameter": 0.1}
     loaded = fvsolve.load(case, {"links.bypass": added, "links.bypass.area": 0.002})
     assert loaded.links["bypass"].area == 0.002 and "diameter" not in loaded.raw["links"]["bypass"]

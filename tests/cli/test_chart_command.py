@@ -17,12 +17,20 @@ def folder(tmp_path):
 def test_a_chart_leaves_table_and_both_pictures_and_states_the_cost_of_the_default(fvs, folder):
     code, said, _ = fvs("chart", "two-tanks", *GIVEN, "--target", "1e-3", "--out", folder)
     assert code == 0
-    assert {path.name for path in folder.iterdir()} == {"chart.csv", "chart.png", "chart.svg", "points.jsonl"}
+    assert {path.name for path in folder.iterdir()} == {
+        "chart.csv",
+        "chart.png",
+        "chart.svg",
+        "points.jsonl",
+    }
     assert (folder / "chart.png").read_bytes()[:4] == b"\x89PNG"
     assert "<svg" in (folder / "chart.svg").read_text()
     lines = list(csv.DictReader((folder / "chart.csv").open()))
-    methods = [line["method"] for line in lines]  # coarser tolerances are added until one of them misses the target
-    assert {*methods} == {"auto", "rodas-5p"} and min(methods.count(name) for name in {*methods}) >= 3
+    # coarser tolerances are added until one of them misses the target
+    methods = [line["method"] for line in lines]
+    assert {*methods} == {"auto", "rodas-5p"} and min(
+        methods.count(name) for name in {*methods}
+    ) >= 3
     assert "default: auto" in said
     assert "\nmethod = " in said and "\nrtol = " in said
 
@@ -32,7 +40,9 @@ def test_json_is_a_single_object_with_every_point_unrounded(fvs, folder):
     found = json.loads(said)
     assert code == 0
     assert len(found["points"]) == 6
-    assert {"trajectory", "end", "seconds", "rhs", "updates", "ok", "reason"} <= found["points"][0].keys()
+    assert {"trajectory", "end", "seconds", "rhs", "updates", "ok", "reason"} <= found["points"][
+        0
+    ].keys()
     assert found["floor"]["trajectory"] > 0.0
     assert found["front"][0]["target"] == 0.1
 

@@ -80,7 +80,10 @@ def test_json_is_a_single_object_with_unrounded_numbers(case, fvs):
     said = json.loads(out)
     assert code == 0 and err == ""
     assert said["reason"] == "finished" and Path(said["directory"]) == Path("there")
-    assert said["extremes"]["gate.pressure"]["maximum"] == fvsolve.open_run("there").extremes["gate.pressure"][2]
+    assert (
+        said["extremes"]["gate.pressure"]["maximum"]
+        == fvsolve.open_run("there").extremes["gate.pressure"][2]
+    )
 
 
 def test_several_cases_go_to_directories_of_their_own(case, fvs):
@@ -91,7 +94,9 @@ def test_several_cases_go_to_directories_of_their_own(case, fvs):
 
 
 @pytest.mark.parametrize("options", [("--out", "both"), ("--out", "both", "--force"), ()])
-def test_cases_that_would_write_to_the_same_directory_are_refused_before_any_runs(case, fvs, options):
+def test_cases_that_would_write_to_the_same_directory_are_refused_before_any_runs(
+    case, fvs, options
+):
     for folder in ("n1", "n2"):
         Path(folder).mkdir()
         Path(folder, "main.toml").write_text(CASE)
@@ -106,7 +111,11 @@ def test_cases_that_would_write_to_the_same_directory_are_refused_before_any_run
 
 
 def test_set_overrides_any_key(case, fvs):
-    settings = ["links.main.cells=7", "links.main.length=500 m", 'links.main.friction={ model = "none" }']
+    settings = [
+        "links.main.cells=7",
+        "links.main.length=500 m",
+        'links.main.friction={ model = "none" }',
+    ]
     code, out, _ = fvs("run", case, "--json", *(f"--set={one}" for one in settings))
     assert code == 0 and json.loads(out)["cells"] == 7
     written = fvsolve.load("runs/shut/case.toml")
@@ -123,7 +132,13 @@ def test_all_bad_settings_are_reported_at_once(case, fvs):
     code, out, err = fvs("check", case, *(f"--set={one}" for one in settings))
     assert code == 2 and out == "" and "shut.toml: 5 faults" in err
     assert err.count("expected KEY=VALUE") == 2
-    for key in ("--set nope", "--set =3", "--set links.mian.cells", "--set numeric", "--set links.main.cells"):
+    for key in (
+        "--set nope",
+        "--set =3",
+        "--set links.mian.cells",
+        "--set numeric",
+        "--set links.main.cells",
+    ):
         assert f"  {key}: " in err
     code, _, err = fvs("check", case, "--set", "nope")
     assert code == 2 and "shut.toml: 1 fault\n  --set nope: expected KEY=VALUE" in err
@@ -132,9 +147,14 @@ def test_all_bad_settings_are_reported_at_once(case, fvs):
 def test_a_case_that_cannot_start_names_the_place(case, fvs):
     line = CASE.splitlines().index("[links.main]") + 1
     for command in ("run", "check"):
-        code, out, err = fvs(command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m")
+        code, out, err = fvs(
+            command, case, "--set", "nodes.gate.type=reservoir", "--set", "nodes.gate.head=1 m"
+        )
         assert code == 2 and out == ""
-        assert f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: this pipe has no friction" in err
+        assert (
+            f"shut.toml: 1 fault\n  line {line}: links.main: no steady state: this pipe has no friction"
+            in err
+        )
     assert not Path("runs").exists()
 
 
@@ -155,7 +175,9 @@ def test_an_earlier_run_is_in_the_way(case, fvs):
 
 
 def test_a_claim_that_fails_is_exit_code_1(case, fvs):
-    code, out, _ = fvs("run", case, "--set", 'expect={ "max(valve.flow)" = { value = 1.0, rtol = 1e-3 } }')
+    code, out, _ = fvs(
+        "run", case, "--set", 'expect={ "max(valve.flow)" = { value = 1.0, rtol = 1e-3 } }'
+    )
     assert code == 1 and "FAILS: max(valve.flow)" in out
 
 
@@ -261,27 +283,51 @@ def test_only_pictures_of_basins_and_bodies_need_pyvista(case, tmp_path):
     lost.mkdir()
     for name in ("pyvista", "vtk", "vtkmodules"):
         (lost / f"{name}.py").write_text(LOST)
-    commands = [f"run {case} --set output.fields=2", "view runs/shut --field head",
-                f"order {case} --levels 2 --cells 5 --out order",
-                "run dam-break --set nodes.tank.cells=[20,5] --set output.fields=1", "view runs/dam-break"]  # fmt: skip
+    commands = [
+        f"run {case} --set output.fields=2",
+        "view runs/shut --field head",
+        f"order {case} --levels 2 --cells 5 --out order",
+        "run dam-break --set nodes.tank.cells=[20,5] --set output.fields=1",
+        "view runs/dam-break",
+    ]
     commands += ["report runs/shut"] if importlib.util.find_spec("plotly") else []
     search = os.pathsep.join([str(lost), str(Path(fvsolve.__file__).parents[1])])
-    done = subprocess.run([sys.executable, "-c", WITHOUT_PYVISTA, *commands], capture_output=True, text=True,
-                          check=True, env=os.environ | {"PYTHONPATH": search})  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_PYVISTA, *commands],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": search},
+    )
     results = json.loads(done.stdout)
-    assert [code for code, _, _ in results] == [0, 0, 0, 1, 2, 0][: len(commands)], results  # 1: few cells miss claims
+    # 1: few cells miss claims
+    assert [code for code, _, _ in results] == [0, 0, 0, 1, 2, 0][: len(commands)], results
     message = results[4][2]
-    assert message.count("\n") == 1 and "No module named 'pyvista'" in message and "pip install pyvista" in message
-    for name in ("shut/view-head.png", "shut/history.png", "shut/envelope.csv", "dam-break/history.png"):
+    assert (
+        message.count("\n") == 1
+        and "No module named 'pyvista'" in message
+        and "pip install pyvista" in message
+    )
+    for name in (
+        "shut/view-head.png",
+        "shut/history.png",
+        "shut/envelope.csv",
+        "dam-break/history.png",
+    ):
         assert Path("runs", name).stat().st_size
-    assert len(list(Path("runs/dam-break/fields").glob("*.vtu"))) == 2 and Path("order/order.png").exists()
+    assert (
+        len(list(Path("runs/dam-break/fields").glob("*.vtu"))) == 2
+        and Path("order/order.png").exists()
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
 def test_ctrl_c_ends_a_run_cleanly_and_resume_goes_on(case):
     settings = ["--set", "output.fields=0", "--set", "output.every=1", "--set"]
     command = [sys.executable, "-m", "fvsolve", "run", case, *settings]
-    running = subprocess.Popen([*command, "numerics.end=1e6"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    running = subprocess.Popen(
+        [*command, "numerics.end=1e6"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     wait_for_a_checkpoint(Path("runs/shut/restart.npz"), running)
     running.send_signal(signal.SIGINT)
     out, err = (text.decode() for text in running.communicate(timeout=30))
@@ -321,7 +367,12 @@ def test_a_case_is_copied_next_to_its_mesh_and_another_mesh_stays(fvs, tmp_path,
     mesh = tmp_path / "flooding.msh"
     mesh.write_text("another")
     code, _, err = fvs("new", "flooding", "three.toml")
-    assert code == 2 and "exists" in err and mesh.read_text() == "another" and not (tmp_path / "three.toml").exists()
+    assert (
+        code == 2
+        and "exists" in err
+        and mesh.read_text() == "another"
+        and not (tmp_path / "three.toml").exists()
+    )
 
 
 def test_a_caller_may_put_any_text_stream_in_place_of_standard_output(monkeypatch):
@@ -329,7 +380,10 @@ def test_a_caller_may_put_any_text_stream_in_place_of_standard_output(monkeypatc
     from fvsolve.cli import main
 
     monkeypatch.setattr(sys, "argv", ["fvsolve", "--version"])
-    with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()):
+    with (
+        contextlib.redirect_stdout(io.StringIO()) as said,
+        contextlib.redirect_stderr(io.StringIO()),
+    ):
         with contextlib.suppress(SystemExit):
             main()
     assert fvsolve.__version__ in said.getvalue()

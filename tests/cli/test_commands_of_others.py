@@ -47,7 +47,9 @@ def fvsolve(home, *words: str, code: int = 0, **environment: str) -> tuple[str, 
 
 def test_the_help_lists_a_command_of_another_package_without_its_import(home):
     text, warning = fvsolve(home, "--help")
-    assert re.search(r"\n  validate .*\n(.*\n)*  fails *\n  flush +Flush the pipes of a case.\n  lost", text)
+    assert re.search(
+        r"\n  validate .*\n(.*\n)*  fails *\n  flush +Flush the pipes of a case.\n  lost", text
+    )
     assert "imported" not in text and text.count("\n  run ") == 1
     source = "run of the entry points fvsolve.commands of mill: mill.flush:flush"
     fault = 'a declaration of the command "run" exists already; expected another name'
@@ -55,7 +57,9 @@ def test_the_help_lists_a_command_of_another_package_without_its_import(home):
 
 
 def test_a_command_of_another_package_runs(home):
-    assert fvsolve(home, "flush", "two-tanks", "--times", "3")[0] == "imported\nflushed two-tanks 3\n"
+    assert (
+        fvsolve(home, "flush", "two-tanks", "--times", "3")[0] == "imported\nflushed two-tanks 3\n"
+    )
     assert "Flush the pipes of a case." in fvsolve(home, "flush", "--help")[0]
 
 
@@ -69,7 +73,9 @@ def test_a_command_that_cannot_be_read_names_its_package(home):
 
 def test_a_defect_of_another_package_is_reported_to_its_authors(home):
     _, problem = fvsolve(home, "fails", "a", code=1)
-    assert problem.splitlines()[-1].startswith("fails of the entry points fvsolve.commands of mill: internal error in ")
+    assert problem.splitlines()[-1].startswith(
+        "fails of the entry points fvsolve.commands of mill: internal error in "
+    )
     assert problem.endswith("IndexError: no pipe in a; please report it to its authors\n")
 
 
@@ -85,7 +91,8 @@ def test_a_built_in_command_reads_no_other_package(home):
 
 def test_files_of_a_user_declare_commands(home):
     text = (
-        'from fvsolve.cli.app import command\n@command("drain")\ndef empty(case: str) -> None:\n    print("drained")\n'
+        'from fvsolve.cli.app import command\n@command("drain")\ndef empty(case: '
+        'str) -> None:\n    print("drained")\n'
     )
     (home / "drain.py").write_text(text, encoding="utf-8")
     assert fvsolve(home, "drain", "a", FVSOLVE_COMMANDS="drain.py")[0] == "drained\n"

@@ -12,9 +12,19 @@ from fvsolve.core.steppers import METHODS, Facts, analyse
 DOCS = folders.page("choosing-a-method")
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 ASKED = {
-    "order", "stage_order", "stages", "explicit", "a_stable", "l_stable", "real_interval", "imaginary_interval",
-    "ssp_radius", "pade", "numerator", "denominator",
-}  # fmt: skip
+    "order",
+    "stage_order",
+    "stages",
+    "explicit",
+    "a_stable",
+    "l_stable",
+    "real_interval",
+    "imaginary_interval",
+    "ssp_radius",
+    "pade",
+    "numerator",
+    "denominator",
+}
 
 
 @pytest.fixture
@@ -28,7 +38,9 @@ def test_the_table_names_every_method(command_in_folder):
     code, out, _ = command_in_folder("methods")
     lines = out.splitlines()
     assert code == 0 and lines[0].split()[:3] == ["method", "order", "error"]
-    assert [name for name in METHODS if not any(line.startswith(f"{name} ") for line in lines)] == []
+    assert [
+        name for name in METHODS if not any(line.startswith(f"{name} ") for line in lines)
+    ] == []
 
 
 def test_json_is_a_single_object_with_every_method_and_null_for_infinity(command_in_folder):
@@ -36,7 +48,9 @@ def test_json_is_a_single_object_with_every_method_and_null_for_infinity(command
     found = json.loads(out)
     assert code == 0 and err == "" and list(found) == list(METHODS)
     assert all(one.keys() >= ASKED for one in found.values())
-    assert all(one["denominator"][0] == 1.0 and one["numerator"][0] == 1.0 for one in found.values())
+    assert all(
+        one["denominator"][0] == 1.0 and one["numerator"][0] == 1.0 for one in found.values()
+    )
     assert found["radau-iia-5"]["real_interval"] is found["implicit-euler"]["ssp_radius"] is None
     assert found["radau-iia-5"]["pade"] == [2, 3] and found["alexander-2"]["pade"] is None
     assert found["rk4"]["real_interval"] == pytest.approx(2.785293563405282, rel=1e-13)
@@ -52,7 +66,11 @@ def test_a_single_method_is_shown_with_tableau_r_and_picture(command_in_folder, 
 def test_the_picture_goes_to_the_stated_place(command_in_folder, tmp_path):
     code, out, _ = command_in_folder("methods", "alexander-3", "--out", "pictures/a.png", "--json")
     found = json.loads(out)
-    assert code == 0 and (tmp_path / "pictures" / "a.png").exists() and found["picture"] == "pictures/a.png"
+    assert (
+        code == 0
+        and (tmp_path / "pictures" / "a.png").exists()
+        and found["picture"] == "pictures/a.png"
+    )
     assert found["a"][0][0] == pytest.approx(0.435866521508459) and len(found["numerator"]) == 3
 
 
@@ -64,7 +82,10 @@ def test_long_and_short_tableaux_are_both_shown(command_in_folder, name):
 
 def test_a_name_that_no_method_has(command_in_folder, tmp_path):
     code, out, err = command_in_folder("methods", "radau-iia-50")
-    assert (code, out) == (2, "") and 'no method named "radau-iia-50"; did you mean "radau-iia-5"?' in err
+    assert (code, out) == (
+        2,
+        "",
+    ) and 'no method named "radau-iia-50"; did you mean "radau-iia-5"?' in err
     assert not list(tmp_path.iterdir())
 
 
@@ -83,9 +104,17 @@ def test_the_page_and_the_program_print_the_same(name):
     one = analyse(name)
     pade = f"{one.pade[0]}/{one.pade[1]}" if one.pade else "-"
     row = [
-        f"`{name}`", one.order, one.error_order or "-", one.stage_order, one.stages, one.kind, stable(one),
-        *map(cell, (one.real_interval, one.imaginary_interval, one.ssp_radius)), pade, one.source,
-    ]  # fmt: skip
+        f"`{name}`",
+        one.order,
+        one.error_order or "-",
+        one.stage_order,
+        one.stages,
+        one.kind,
+        stable(one),
+        *map(cell, (one.real_interval, one.imaginary_interval, one.ssp_radius)),
+        pade,
+        one.source,
+    ]
     assert f"| {' | '.join(map(str, row))} |" in DOCS.splitlines()
 
 

@@ -56,7 +56,9 @@ def test_a_run_imports_only_the_kinds_of_its_case(tmp_path):
     assert not modules & {"numba", "CoolProp", "meshio", "rich", "matplotlib", "numpy.random"}
 
 
-@pytest.mark.parametrize("words", [["run", "two-tanks", "--no-pictures"], ["run", "--nonsense"], ["run", "nowhere"]])
+@pytest.mark.parametrize(
+    "words", [["run", "two-tanks", "--no-pictures"], ["run", "--nonsense"], ["run", "nowhere"]]
+)
 def test_unused_objects_are_collected_after_the_start(words, fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fvs(*words)
@@ -82,7 +84,10 @@ def by_rich(table: ResultTable) -> str:
 @pytest.mark.parametrize(
     "headers, rows",
     [
-        (["probe", "unit", "maximum"], [["gate.pressure", "Pa", "1.07e+06"], ["[b]valve[/b]", "m3/s", "-"]]),
+        (
+            ["probe", "unit", "maximum"],
+            [["gate.pressure", "Pa", "1.07e+06"], ["[b]valve[/b]", "m3/s", "-"]],
+        ),
         (["a", ""], [["1", ""], ["", "x"]]),
         (["one"], []),
         (["a", "b"], [["two words", ":smile:"], ["nan", "5"]]),

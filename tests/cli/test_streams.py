@@ -29,7 +29,9 @@ def case(tmp_path_factory):
 def shell(line: str, folder) -> subprocess.CompletedProcess:
     """Run a line of bash; `fvsolve` is the command of this interpreter."""
     name = f'fvsolve() {{ "{sys.executable}" -m fvsolve "$@"; }}'
-    return subprocess.run(["bash", "-c", f"{name}\n{line}"], cwd=folder, capture_output=True, text=True)
+    return subprocess.run(
+        ["bash", "-c", f"{name}\n{line}"], cwd=folder, capture_output=True, text=True
+    )
 
 
 @pytest.mark.parametrize("streams, code", [
@@ -39,7 +41,11 @@ def shell(line: str, folder) -> subprocess.CompletedProcess:
 ])  # fmt: skip
 def test_a_run_is_complete_whatever_its_streams_are(streams, code, case, tmp_path):
     done = shell(f"fvsolve run {case} --out out {streams}", tmp_path)
-    assert done.returncode == code and "Traceback" not in done.stderr and "internal error" not in done.stderr
+    assert (
+        done.returncode == code
+        and "Traceback" not in done.stderr
+        and "internal error" not in done.stderr
+    )
     assert "Exception ignored" not in done.stderr
     assert sorted(os.listdir(tmp_path / "out")) == FILES
     if streams.endswith("> /dev/full") and code:
@@ -52,12 +58,20 @@ def test_a_run_is_complete_whatever_its_streams_are(streams, code, case, tmp_pat
 ])  # fmt: skip
 def test_each_command_retains_its_exit_code(command, code, streams, tmp_path):
     done = shell(f"fvsolve {command} {streams}", tmp_path)
-    assert done.returncode == code and "Traceback" not in done.stderr and "internal error" not in done.stderr
+    assert (
+        done.returncode == code
+        and "Traceback" not in done.stderr
+        and "internal error" not in done.stderr
+    )
 
 
 def test_a_sweep_with_other_processes_needs_no_streams(case, tmp_path):
-    done = shell(f"fvsolve sweep {case} --set numerics.end=0.1,0.2 --jobs 2 --out out >&- 2>&- <&-", tmp_path)
-    assert done.returncode == 0 and len((tmp_path / "out" / "sweep.csv").read_text().splitlines()) == 3
+    done = shell(
+        f"fvsolve sweep {case} --set numerics.end=0.1,0.2 --jobs 2 --out out >&- 2>&- <&-", tmp_path
+    )
+    assert (
+        done.returncode == 0 and len((tmp_path / "out" / "sweep.csv").read_text().splitlines()) == 3
+    )
 
 
 def test_a_process_without_streams_may_call_the_command(case, tmp_path, monkeypatch):

@@ -27,13 +27,20 @@ def test_warmed_cases_are_not_compiled_again(tmp_path, fvs):
         copy = tmp_path / source.relative_to(jit.cache_folder())
         if source.suffix in (".code", ".json") and not source.name.startswith("."):
             copy.parent.mkdir(parents=True, exist_ok=True)
-            os.link(source, copy) if source.stat().st_dev == tmp_path.stat().st_dev else shutil.copy(source, copy)
+            os.link(
+                source, copy
+            ) if source.stat().st_dev == tmp_path.stat().st_dev else shutil.copy(source, copy)
     second = json.loads(warm("--for", "two-tanks", "--json", FVSOLVE_CACHE=str(tmp_path)).stdout)
     assert second["compiled"] == 0 and second["functions"] >= first["functions"] > 20
     assert second["directory"].endswith(second["target"]) and second["bytes"] > 1e5
-    assert json.loads((Path(second["directory"]) / "target.json").read_text())["name"] == second["target"]
+    assert (
+        json.loads((Path(second["directory"]) / "target.json").read_text())["name"]
+        == second["target"]
+    )
     code = "import sys, fvsolve; fvsolve.run('two-tanks.toml', {'output.fields': 0}); print('numba' in sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], cwd=CASES, capture_output=True, text=True, check=True)
+    told = subprocess.run(
+        [sys.executable, "-c", code], cwd=CASES, capture_output=True, text=True, check=True
+    )
     assert told.stdout == "False\n"  # without numba nothing is compiled
 
 

@@ -30,7 +30,9 @@ WAVE, OTHER = np.sin(7.0 * T), np.cos(5.0 * T)
 
 
 def labels(columns: dict, measured=()) -> tuple[dict, list]:
-    panels, still = select_curves(np.column_stack(list(columns.values())), [(name, "x") for name in columns], measured)
+    panels, still = select_curves(
+        np.column_stack(list(columns.values())), [(name, "x") for name in columns], measured
+    )
     return {panel.quantity: [line.label for line in panel.lines] for panel in panels}, still
 
 
@@ -44,7 +46,10 @@ def test_pressure_and_head_of_a_place_are_a_single_curve():
 
 def test_constant_series_are_named_and_drawn_only_in_a_picture_of_rest():
     lake = np.full(T.size, 45.0) + 1e-12 * WAVE
-    assert labels({"lake.head": lake, "a.flow": WAVE}) == ({"flow": ["a"]}, [("lake.head", "x", lake[0])])
+    assert labels({"lake.head": lake, "a.flow": WAVE}) == (
+        {"flow": ["a"]},
+        [("lake.head", "x", lake[0])],
+    )
     assert labels({"lake.head": lake}) == ({"head": ["lake"]}, [])
 
 

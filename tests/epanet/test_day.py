@@ -30,9 +30,11 @@ def ours(imported, tmp_path, **settings):
 
 def blocks_of(run):
     """Switches of relays and latches of a run : list of (time [s], name, True if on)."""
-    return sorted((event["time"], event["name"].removeprefix("controls."), event["what"] == "turns on")
-                  for event in run.summary["events"] if event["name"].startswith("controls.")
-                  and event["what"].startswith("turns"))  # fmt: skip
+    return sorted(
+        (event["time"], event["name"].removeprefix("controls."), event["what"] == "turns on")
+        for event in run.summary["events"]
+        if event["name"].startswith("controls.") and event["what"].startswith("turns")
+    )
 
 
 def in_order(switches):
@@ -49,7 +51,9 @@ def agree(path, imported, run, links, step=2, scheduled=()):
         level = run[f"nodes.{place}.level"]
         assert level == pytest.approx(day.level(tank, run.t), abs=SAME), tank
         assert np.ptp(level) > 0.1  # it moves
-    found = in_order(item for item in blocks_of(run) if item[1] in [imported.links[link] for link in links])
+    found = in_order(
+        item for item in blocks_of(run) if item[1] in [imported.links[link] for link in links]
+    )
     known = in_order(item for item in day.switches if item[1] not in scheduled)
     assert [item[1:] for item in found] == [(imported.links[link], on) for _, link, on in known]
     assert [item[0] for item in found] == pytest.approx([item[0] for item in known], abs=SOON)
@@ -61,10 +65,19 @@ def test_the_networks_of_epanet_have_its_levels_and_switches_all_day(name, tmp_p
     path = SHIPPED / f"{name}.inp"
     imported = import_network(path, day=True)
     run = ours(imported, tmp_path)
-    known = "opens and shuts", "no elevation of a reservoir", "the chemical", "water age", "water trace"
-    assert run.t[-1] == 86400.0 and all(any(one in text for one in known) for text, _ in imported.notes)
+    known = (
+        "opens and shuts",
+        "no elevation of a reservoir",
+        "the chemical",
+        "water age",
+        "water trace",
+    )
+    assert run.t[-1] == 86400.0 and all(
+        any(one in text for one in known) for text, _ in imported.notes
+    )
     day = agree(path, imported, run, SWITCHED[name], scheduled=("10", "335"))
-    if name == "Net3":  # the pump and its bypass switch at one time, the pump by the negation of the relay
+    # the pump and its bypass switch at one time, the pump by the negation of the relay
+    if name == "Net3":
         both = [[time for time, link, _ in day.switches if link == own] for own in ("330", "335")]
         assert both[0] == both[1]
     assert len(day.switches) == {"Net1": 2, "Net2": 0, "Net3": 6}[name]
@@ -72,8 +85,14 @@ def test_the_networks_of_epanet_have_its_levels_and_switches_all_day(name, tmp_p
 
 def test_the_method_does_not_matter(tmp_path):
     imported = import_network(SHIPPED / "Net1.inp", day=True)
-    found = [ours(imported, tmp_path, **{"numerics.method": method, "numerics.rtol": 1e-9, "numerics.end": "13 h"})
-             for method in ("dormand-prince", "radau-iia-5", "rodas-5p")]  # fmt: skip
+    found = [
+        ours(
+            imported,
+            tmp_path,
+            **{"numerics.method": method, "numerics.rtol": 1e-9, "numerics.end": "13 h"},
+        )
+        for method in ("dormand-prince", "radau-iia-5", "rodas-5p")
+    ]
     for run in found[1:]:
         assert run["nodes.2.level"] == pytest.approx(found[0]["nodes.2.level"], abs=1e-6)
         assert blocks_of(run)[0][0] == pytest.approx(blocks_of(found[0])[0][0], abs=1e-4)
@@ -164,22 +183,53 @@ WINDOWS = "".join(
     f"AND TANK tower LEVEL {relation} {level + 0.05 * (hour % 6):.2f}\nTHEN PUMP lift STATUS IS {action}\n"
     f"PRIORITY {priority}\n"
     for hour in range(0, 24, 2)
-    for name, relation, level, action, priority in (("on", "BELOW", 2.6, "OPEN", 1), ("off", "ABOVE", 3.4, "CLOSED", 5))
+    for name, relation, level, action, priority in (
+        ("on", "BELOW", 2.6, "OPEN", 1),
+        ("off", "ABOVE", 3.4, "CLOSED", 5),
+    )
 )
 CASES = {
     "levels": ({"controls": LEVELS}, ["lift"], ["relay"]),
-    "times": ({"controls": "LINK p3 CLOSED AT TIME 2:15\nLINK p3 OPEN AT TIME 7.5\n"
-                           "LINK p5 CLOSED AT CLOCKTIME 1 PM\nLINK p5 OPEN AT CLOCKTIME 9:30 PM"}, ["p3", "p5"], []),
-    "mixed": ({"controls": "LINK lift CLOSED IF NODE tower ABOVE 4.2\nLINK lift OPEN AT TIME 9"},
-              ["lift"], ["latch", "function", "function"]),
+    "times": (
+        {
+            "controls": "LINK p3 CLOSED AT TIME 2:15\nLINK p3 OPEN AT TIME 7.5\n"
+            "LINK p5 CLOSED AT CLOCKTIME 1 PM\nLINK p5 OPEN AT CLOCKTIME 9:30 PM"
+        },
+        ["p3", "p5"],
+        [],
+    ),
+    "mixed": (
+        {"controls": "LINK lift CLOSED IF NODE tower ABOVE 4.2\nLINK lift OPEN AT TIME 9"},
+        ["lift"],
+        ["latch", "function", "function"],
+    ),
     "rules": ({"rules": RULES}, ["lift", "p3"], ["latch", "function", "function"]),
-    "windows": ({"rules": WINDOWS, "drawn": 10}, ["lift"], ["latch", "function", "function", "pi", "pi"]),
-    "alternating windows": ({"rules": re.sub("PRIORITY.*\n", "", WINDOWS), "drawn": 10},
-                            ["lift"], ["latch", "function", "function", "pi", "pi"]),
-    "until 24:00": ({"rules": "RULE 1\nIF SYSTEM CLOCKTIME >= 22\nAND SYSTEM CLOCKTIME < 24\n"
-                              "THEN PUMP lift STATUS IS CLOSED\nELSE PUMP lift STATUS IS OPEN"}, ["lift"], []),
-    "speed": ({"controls": LEVELS.replace("CLOSED", "0.8").replace("OPEN", "1.05"), "speed": "SPEED 1.05"},
-              [], ["relay"]),
+    "windows": (
+        {"rules": WINDOWS, "drawn": 10},
+        ["lift"],
+        ["latch", "function", "function", "pi", "pi"],
+    ),
+    "alternating windows": (
+        {"rules": re.sub("PRIORITY.*\n", "", WINDOWS), "drawn": 10},
+        ["lift"],
+        ["latch", "function", "function", "pi", "pi"],
+    ),
+    "until 24:00": (
+        {
+            "rules": "RULE 1\nIF SYSTEM CLOCKTIME >= 22\nAND SYSTEM CLOCKTIME < 24\n"
+            "THEN PUMP lift STATUS IS CLOSED\nELSE PUMP lift STATUS IS OPEN"
+        },
+        ["lift"],
+        [],
+    ),
+    "speed": (
+        {
+            "controls": LEVELS.replace("CLOSED", "0.8").replace("OPEN", "1.05"),
+            "speed": "SPEED 1.05",
+        },
+        [],
+        ["relay"],
+    ),
     "shut": ({"status": "Closed", "controls": LEVELS}, ["lift"], ["relay"]),
     "check valve": ({"valve": "CV", "controls": LEVELS}, ["lift"], ["relay"]),
     "pattern of speed": ({"speed": "PATTERN slow"}, [], []),
@@ -188,7 +238,7 @@ CASES = {
     "pattern and a rule": ({"speed": "PATTERN slow", "rules": RULES}, ["p3"], []),
     "volume curve": ({"curve": "v", "controls": LEVELS}, ["lift"], ["relay"]),
     "full and empty": ({"width": 4, "drawn": 30}, [], []),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -202,7 +252,9 @@ def test_controls_rules_and_tanks_act_as_in_epanet(name, tmp_path):
     day = agree(path, imported, run, links, scheduled=scheduled)
     assert len(day.switches) >= len(links)
     if name == "full and empty":
-        shut = [event["what"] for event in run.summary["events"] if event["name"] == "pond-altitude"]
+        shut = [
+            event["what"] for event in run.summary["events"] if event["name"] == "pond-altitude"
+        ]
         assert "shuts: the tank is full" in shut and "opens" in shut
 
 
@@ -214,13 +266,22 @@ IF TANK tower LEVEL BELOW 3.5
 THEN PUMP lift STATUS IS OPEN"""
 
 
-@pytest.mark.parametrize("rules", [BOTH_SIDES, BOTH_SIDES.partition("\nRULE 2")[0] + "\nELSE PUMP lift STATUS IS OPEN"])
+@pytest.mark.parametrize(
+    "rules", [BOTH_SIDES, BOTH_SIDES.partition("\nRULE 2")[0] + "\nELSE PUMP lift STATUS IS OPEN"]
+)
 def test_a_link_rests_between_actions_that_hold_on_both_sides_of_a_common_level(rules, tmp_path):
     """The pump would switch without end at 3.5 m; in EPANET at a step of 10 s it switches at almost each step."""
     path, imported = town(tmp_path, rules=rules)
     blocks = tomllib.loads(imported.text)["controls"]
-    assert sorted(block["type"] for block in blocks.values()) == ["function", "function", "latch", "timer"]
-    assert any("the link rests after each switch" in cause and "lift" in cause for cause in imported.causes)
+    assert sorted(block["type"] for block in blocks.values()) == [
+        "function",
+        "function",
+        "latch",
+        "timer",
+    ]
+    assert any(
+        "the link rests after each switch" in cause and "lift" in cause for cause in imported.causes
+    )
     run = ours(imported, tmp_path, **{"numerics.end": "6 h"})
     switches = [time for time, name, _ in blocks_of(run) if name == imported.links["lift"]]
     assert len(switches) > 20 and np.diff(switches).min() >= 60.0 - 1e-6
@@ -234,21 +295,34 @@ def test_a_pump_rests_between_speeds_on_both_sides_of_a_common_level(tmp_path):
     """The level stays where the two speeds alternate, as in EPANET at a step of 10 s."""
     controls = "LINK lift 0.7 IF NODE tower ABOVE 3.5\nLINK lift 1.05 IF NODE tower BELOW 3.5"
     path, imported = town(tmp_path, controls=controls, speed="SPEED 1.05")
-    assert any("the link rests after each switch" in cause and "lift" in cause for cause in imported.causes)
+    assert any(
+        "the link rests after each switch" in cause and "lift" in cause for cause in imported.causes
+    )
     run = ours(imported, tmp_path, **{"numerics.end": "6 h"})
     times = [time for time, name, _ in blocks_of(run) if name.endswith("-state")]
     assert len(times) > 20 and np.diff(times).min() >= 60.0 - 1e-6
     day = toolkit_run.run(path, ["tower"], [], 10, 21600)
-    assert run[f"nodes.{imported.nodes['tower']}.level"] == pytest.approx(day.level("tower", run.t), abs=0.01)
+    assert run[f"nodes.{imported.nodes['tower']}.level"] == pytest.approx(
+        day.level("tower", run.t), abs=0.01
+    )
 
 
 def test_features_without_a_key_are_listed_with_their_number(tmp_path):
-    rules = ("RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
-             "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED")  # fmt: skip
+    rules = (
+        "RULE 7\nIF SYSTEM DEMAND ABOVE 20\nTHEN PUMP lift STATUS IS OPEN\n"
+        "RULE 8\nIF TANK tower FILLTIME ABOVE 5\nTHEN PIPE p5 STATUS IS CLOSED"
+    )
     _, imported = town(tmp_path, rules=rules)
-    found = {name: text for text, names in imported.notes for name in names if text.startswith("not imported")}
+    found = {
+        name: text
+        for text, names in imported.notes
+        for name in names
+        if text.startswith("not imported")
+    }
     assert set(found) == {"rule 7", "rule 8"}
-    assert "demand of the whole system" in found["rule 7"] and "filltime of a tank" in found["rule 8"]
+    assert (
+        "demand of the whole system" in found["rule 7"] and "filltime of a tank" in found["rule 8"]
+    )
     assert "# - not imported, because it acts by the" in imported.text and "rule 7" in imported.text
     assert len(imported.causes) == 2
 
@@ -279,9 +353,14 @@ def test_a_rule_that_holds_at_the_start_explains_the_start_alone(tmp_path):
 
 def test_demands_of_several_patterns_are_sums_of_signals(tmp_path):
     path, _ = town(tmp_path)
-    text = path.read_text().replace("[RESERVOIRS]", "[DEMANDS]\nb 4 day\nb 2 night\nb 1 night\nc 3 night\n[RESERVOIRS]")
+    text = path.read_text().replace(
+        "[RESERVOIRS]", "[DEMANDS]\nb 4 day\nb 2 night\nb 1 night\nc 3 night\n[RESERVOIRS]"
+    )
     path.write_text(text)
     imported = import_network(path, day=True)
-    factors = [{"signal": "pattern-day", "factor": "4 l/s"}, {"signal": "pattern-night", "factor": "3 l/s"}]
+    factors = [
+        {"signal": "pattern-day", "factor": "4 l/s"},
+        {"signal": "pattern-night", "factor": "3 l/s"},
+    ]
     assert tomllib.loads(imported.text)["nodes"]["b"]["demand"] == {"sum": factors}
     agree(path, imported, ours(imported, tmp_path), [])

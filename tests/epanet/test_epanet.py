@@ -17,7 +17,16 @@ from fvsolve.exchange.epanet.importing import cell_time  # noqa: E402
 
 PACKAGE = Path(wntr.__file__).parent
 SHIPPED, BROKEN = PACKAGE / "library" / "networks", PACKAGE / "tests" / "networks_for_testing"
-NETWORKS = [("Net1", 0), ("Net2", 0), ("Net2", 31), ("Net3", 0), ("Net3", 12), ("Net6", 0), ("ky4", 0), ("ky10", 0)]
+NETWORKS = [
+    ("Net1", 0),
+    ("Net2", 0),
+    ("Net2", 31),
+    ("Net3", 0),
+    ("Net3", 12),
+    ("Net6", 0),
+    ("ky4", 0),
+    ("ky10", 0),
+]
 
 # Nodes between a shut valve and a pump of constant power without flow in EPANET; no law gives their head.
 DEAD = {"ky10": {"O-Pump-11", "I-RV-4"}}
@@ -68,7 +77,9 @@ def truth(path, hour):
     step = network.options.time.hydraulic_timestep
     network.options.time.duration = 3600 * hour
     network.options.time.report_timestep = step
-    found = wntr.sim.EpanetSimulator(network).run_sim(file_prefix=str(path.parent / path.stem) + "-truth")
+    found = wntr.sim.EpanetSimulator(network).run_sim(
+        file_prefix=str(path.parent / path.stem) + "-truth"
+    )
     at = 3600 * hour
     return found.node["head"].loc[at].to_dict(), found.link["flowrate"].loc[at].to_dict()
 
@@ -87,7 +98,9 @@ def differences(path, hour, where, shortest=0.0):
     lost = max(abs(checks["nodes"][made.nodes[name]]["head"] - heads[name]) for name in live)
     pipes = checks["pipes"]
     found = {name: pipes[ours]["flow"] for name, ours in made.links.items() if ours in pipes}
-    off = max(abs(flow - flows[name]) for name, flow in found.items()) / max(map(abs, flows.values()))
+    off = max(abs(flow - flows[name]) for name, flow in found.items()) / max(
+        map(abs, flows.values())
+    )
     return lost, off, made
 
 
@@ -104,8 +117,12 @@ def test_tanks_that_epanet_fills_to_their_rim_are_read(name, hour):
     assert any(node.level == node.height for node in case.nodes.values() if node.kind == "tank")
 
 
-@pytest.mark.parametrize("formula, roughness, within", [("H-W", 110, 1e-3), ("C-M", 0.011, 1e-3), ("D-W", 0.3, 1e-3)])
-def test_every_head_loss_formula_patterns_minor_losses_and_shut_pipes(formula, roughness, within, tmp_path):
+@pytest.mark.parametrize(
+    "formula, roughness, within", [("H-W", 110, 1e-3), ("C-M", 0.011, 1e-3), ("D-W", 0.3, 1e-3)]
+)
+def test_every_head_loss_formula_patterns_minor_losses_and_shut_pipes(
+    formula, roughness, within, tmp_path
+):
     path = tmp_path / "in" / "small.inp"
     path.parent.mkdir()
     path.write_text(SMALL.format(r=roughness, formula=formula))
@@ -126,7 +143,8 @@ def still(made):
     return case
 
 
-LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shortest pipe for steps of cells [m]
+# numerics.pipe_model, and shortest pipe for steps of cells [m]
+LINES = [("auto", 0.0), ("finite-volume", 3.0)]
 
 
 @pytest.mark.in_turn
@@ -135,12 +153,26 @@ LINES = [("auto", 0.0), ("finite-volume", 3.0)]  # numerics.pipe_model, and shor
 def test_without_an_event_no_bit_changes_and_a_closure_moves_the_network(name, line, shortest):
     case = still(import_network(SHIPPED / f"{name}.inp", shortest=shortest))
     case["numerics"]["pipe_model"] = line
-    drawn = {node: float(part["demand"].split()[0]) for node, part in case["nodes"].items() if "demand" in part}
+    drawn = {
+        node: float(part["demand"].split()[0])
+        for node, part in case["nodes"].items()
+        if "demand" in part
+    }
     most = max(drawn, key=drawn.get)
-    case["nodes"][most]["demand"] = {"start": 20.0, "duration": 0.5, "value": [drawn[most] * 1e-3, 0.0]}
-    case["output"] = {"every": 0.5, "probes": [f"nodes.{node}.head" for node in list(case["nodes"])[::9]], "fields": 0}
+    case["nodes"][most]["demand"] = {
+        "start": 20.0,
+        "duration": 0.5,
+        "value": [drawn[most] * 1e-3, 0.0],
+    }
+    case["output"] = {
+        "every": 0.5,
+        "probes": [f"nodes.{node}.head" for node in list(case["nodes"])[::9]],
+        "fields": 0,
+    }
     case["output"]["probes"].append(f"nodes.{most}.head")
-    result = fvsolve.run(case, set={"numerics.end": 24.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl"})
+    result = fvsolve.run(
+        case, set={"numerics.end": 24.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl"}
+    )
     before = np.asarray(result.t) <= 20.0
     for probe in case["output"]["probes"]:
         assert np.ptp(result[probe][before]) == 0.0, probe
@@ -148,12 +180,23 @@ def test_without_an_event_no_bit_changes_and_a_closure_moves_the_network(name, l
 
 
 @pytest.mark.parametrize("line, shortest", LINES)
-def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_after(line, shortest):
+def test_a_pump_trip_on_net3_moves_nothing_before_and_travels_at_its_wave_speed_after(
+    line, shortest
+):
     case = still(import_network(SHIPPED / "Net3.inp", shortest=shortest))
     case["numerics"]["pipe_model"] = line
     case["links"]["335"] |= {"rated_speed": "890 rpm", "inertia": "47 kg m2", "trip": 20.0}
-    case["output"] = {"every": 0.25, "fields": 0, "probes": ["nodes.61.head", "nodes.123.head", "nodes.15.head"]}
-    set = {"numerics.end": 34.0, "numerics.cell_time": 0.04, "numerics.scheme": "muscl", "numerics.method": "ssp-rk2"}
+    case["output"] = {
+        "every": 0.25,
+        "fields": 0,
+        "probes": ["nodes.61.head", "nodes.123.head", "nodes.15.head"],
+    }
+    set = {
+        "numerics.end": 34.0,
+        "numerics.cell_time": 0.04,
+        "numerics.scheme": "muscl",
+        "numerics.method": "ssp-rk2",
+    }
     result = fvsolve.run(case, set=set)
     t = np.asarray(result.t)
     assert all(np.ptp(result[probe][t <= 20.0]) == 0.0 for probe in case["output"]["probes"])
@@ -167,21 +210,32 @@ def test_a_pipe_shorter_than_requested_is_lengthened_with_its_loss_and_a_notice(
     path = tmp_path / "in" / "short.inp"
     path.parent.mkdir()
     for formula, roughness in (("H-W", 110), ("C-M", 0.011)):
-        path.write_text(SMALL.format(r=roughness, formula=formula).replace("p3 b c 350", "p3 b c 0.5"))
+        path.write_text(
+            SMALL.format(r=roughness, formula=formula).replace("p3 b c 350", "p3 b c 0.5")
+        )
         lost, off, made = differences(path, 0, tmp_path, shortest=3.0)
         assert lost < 0.05
         assert tomllib.loads(made.text)["links"]["p3"]["length"] == "3 m"
-        assert ["p3"] in [names for what, names in made.notes if what.startswith("lengthened to 3 m")]
+        assert ["p3"] in [
+            names for what, names in made.notes if what.startswith("lengthened to 3 m")
+        ]
 
 
 @pytest.mark.parametrize("name", ["Net3", "ky4"])
 def test_every_pipe_is_as_long_as_in_epanet_and_those_shorter_than_a_cell_are_named(name):
     made = import_network(SHIPPED / f"{name}.inp")
-    network, case = wntr.network.WaterNetworkModel(str(SHIPPED / f"{name}.inp")), load(tomllib.loads(made.text))
+    network, case = (
+        wntr.network.WaterNetworkModel(str(SHIPPED / f"{name}.inp")),
+        load(tomllib.loads(made.text)),
+    )
     lengths = {pipe: link.length for pipe, link in network.pipes()}
     found = {pipe: case.links[made.links[pipe]].length for pipe in lengths}
     assert found == {pipe: pytest.approx(length, rel=1e-9) for pipe, length in lengths.items()}
-    assert made.short_pipes == [pipe for pipe in sorted(lengths, key=lengths.get) if lengths[pipe] < 12.0] != []
+    assert (
+        made.short_pipes
+        == [pipe for pipe in sorted(lengths, key=lengths.get) if lengths[pipe] < 12.0]
+        != []
+    )
     assert (
         f"{len(made.short_pipes)} pipes are shorter than a cell" in made.text
         and made.links[made.short_pipes[0]] in made.text
@@ -205,7 +259,9 @@ def test_short_pipes_set_no_step_and_keep_their_own_loss(tmp_path):
 def test_emitters_draw_the_flow_of_epanet(units, exponent, tmp_path):
     path = tmp_path / "in" / "leaky.inp"
     path.parent.mkdir()
-    text = SMALL.format(r=110, formula="H-W").replace("UNITS LPS", f"UNITS {units}\nEMITTER EXPONENT {exponent}")
+    text = SMALL.format(r=110, formula="H-W").replace(
+        "UNITS LPS", f"UNITS {units}\nEMITTER EXPONENT {exponent}"
+    )
     path.write_text(text.replace("[VALVES]", "[EMITTERS]\nb 0.7\nc 0.2\n[VALVES]"))
     lost, off, made = differences(path, 0, tmp_path)
     assert lost < 2e-3 and off < 1e-3
@@ -232,14 +288,18 @@ def written(tmp_path, changes, options=""):
 @pytest.mark.parametrize("weight", [1.0, 0.8, 1.3])
 @pytest.mark.parametrize("leaks", [{}, {"[VALVES]": LEAKY}], ids=["alone", "emitters"])
 @pytest.mark.parametrize("units, required, least", [("LPS", 40, 5), ("GPM", 66, 8)])
-def test_demands_that_follow_the_pressure_are_parts_that_do(weight, leaks, units, required, least, tmp_path):
+def test_demands_that_follow_the_pressure_are_parts_that_do(
+    weight, leaks, units, required, least, tmp_path
+):
     """EPANET reports the sum of demand and emitter flow, and states pressures as heads of water."""
     options = FOLLOWS.format(required=required, least=least) + f"SPECIFIC GRAVITY {weight}\n"
     path = written(tmp_path, {"UNITS LPS": f"UNITS {units}", **leaks}, options)
     lost, off, made = differences(path, 0, tmp_path)
     assert lost < 2e-3 and off < 1e-3
     case = load(tomllib.loads(made.text))
-    assert case.nodes["a"].required_pressure > case.nodes["a"].minimum_pressure > case.ambient_pressure
+    assert (
+        case.nodes["a"].required_pressure > case.nodes["a"].minimum_pressure > case.ambient_pressure
+    )
     assert not any("pressure" in what for what, _ in made.notes)
 
 
@@ -265,18 +325,32 @@ def test_a_demand_behind_a_valve_gets_the_flow_that_its_pressure_allows(way, dem
 @pytest.mark.in_turn
 @pytest.mark.parametrize("weight", [0.8, 1.0, 1.3])
 @pytest.mark.parametrize("units, power", [("LPS", 3), ("GPM", 4)])
-def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(weight, units, power, tmp_path):
-    changes = {"[VALVES]": f"[PUMPS]\nq low c POWER {power}\n[VALVES]", "UNITS LPS": f"UNITS {units}"}
-    lost, off, _ = differences(written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n"), 0, tmp_path)
+def test_a_pump_of_constant_power_lifts_as_in_epanet_whatever_the_fluid_weighs(
+    weight, units, power, tmp_path
+):
+    changes = {
+        "[VALVES]": f"[PUMPS]\nq low c POWER {power}\n[VALVES]",
+        "UNITS LPS": f"UNITS {units}",
+    }
+    lost, off, _ = differences(
+        written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n"), 0, tmp_path
+    )
     assert lost < 2e-3 and off < 1e-3
 
 
 @pytest.mark.in_turn
-@pytest.mark.parametrize("weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)])
+@pytest.mark.parametrize(
+    "weight, setting", [(0.8, 28), (0.8, 33.6), (0.8, 41), (1.3, 54.6), (1.3, 58), (1.3, 68)]
+)
 @pytest.mark.parametrize("kind", ["PRV", "PSV"])
-def test_a_set_pressure_is_a_pressure_of_water_at_any_density_of_the_fluid(kind, weight, setting, tmp_path):
+def test_a_set_pressure_is_a_pressure_of_water_at_any_density_of_the_fluid(
+    kind, weight, setting, tmp_path
+):
     """Some settings exceed every source; in the second file the import moves the junction, because a pipe is steep."""
-    changes = {"p4 a c 500 150 110 0 Open\n": "", "[VALVES]": f"[VALVES]\nv1 a c 150 {kind} {setting} 2"}
+    changes = {
+        "p4 a c 500 150 110 0 Open\n": "",
+        "[VALVES]": f"[VALVES]\nv1 a c 150 {kind} {setting} 2",
+    }
     path = written(tmp_path, changes, f"SPECIFIC GRAVITY {weight}\n")
     assert differences(path, 0, tmp_path)[0] < 5e-3
     steep = path.read_text().replace("p3 b c 350", "p3 b c 5").replace("c 9 0", "c 0 0")
@@ -285,13 +359,21 @@ def test_a_set_pressure_is_a_pressure_of_water_at_any_density_of_the_fluid(kind,
 
 
 @pytest.mark.parametrize("follows", [True, False])
-def test_where_a_flow_follows_the_pressure_a_steep_pipe_grows_and_no_junction_moves(follows, tmp_path):
-    changes = {"p3 b c 350": "p3 b c 5", "c 9 0": "c 0 0", "[VALVES]": "[VALVES]" if follows else LEAKY}
+def test_where_a_flow_follows_the_pressure_a_steep_pipe_grows_and_no_junction_moves(
+    follows, tmp_path
+):
+    changes = {
+        "p3 b c 350": "p3 b c 5",
+        "c 9 0": "c 0 0",
+        "[VALVES]": "[VALVES]" if follows else LEAKY,
+    }
     path = written(tmp_path, changes, FOLLOWS.format(required=60, least=0) if follows else "")
     lost, off, made = differences(path, 0, tmp_path)
     assert lost < 2e-3 and off < 1e-3
     assert tomllib.loads(made.text)["nodes"]["c"]["elevation"] == "0 m"
-    assert ["p3"] in [names for what, names in made.notes if what.startswith("lengthened to 12.12 m")]
+    assert ["p3"] in [
+        names for what, names in made.notes if what.startswith("lengthened to 12.12 m")
+    ]
 
 
 VALVES = {
@@ -318,7 +400,9 @@ def test_valves_of_every_kind_stand_as_epanets_do(kind, tmp_path):
     assert tomllib.loads(made.text)["links"]["v1"]["type"] == word
 
 
-@pytest.mark.parametrize("line, opening", [("v1 a c 150 PRV 90 2", 1.0), ("v1 a c 150 PSV 90 0", 0.0)])
+@pytest.mark.parametrize(
+    "line, opening", [("v1 a c 150 PRV 90 2", 1.0), ("v1 a c 150 PSV 90 0", 0.0)]
+)
 def test_a_valve_set_above_every_source_stands_open_or_shut(line, opening, tmp_path):
     path = tmp_path / "in" / "valve.inp"
     path.parent.mkdir()
@@ -336,7 +420,9 @@ def test_a_valve_that_drives_its_flow_uphill_is_listed(tmp_path):
     text = SMALL.format(r=110, formula="H-W").replace("p4 a c 500 150 110 0 Open\n", "")
     path.write_text(text.replace("[VALVES]", "[VALVES]\nv1 a c 150 PBV 30 0"))
     made = differences(path, 0, tmp_path)[2]
-    assert ["v1"] in [names for what, names in made.notes if what.startswith("PBV raises the head along its flow")]
+    assert ["v1"] in [
+        names for what, names in made.notes if what.startswith("PBV raises the head along its flow")
+    ]
 
 
 def test_cells_grow_only_where_their_number_would_be_too_large():
@@ -347,7 +433,11 @@ def test_cells_grow_only_where_their_number_would_be_too_large():
 def test_a_climb_steeper_than_the_pipe_moves_the_junction_and_no_head(tmp_path):
     path = tmp_path / "in" / "steep.inp"
     path.parent.mkdir()
-    path.write_text(SMALL.format(r=110, formula="H-W").replace("p3 b c 350", "p3 b c 5").replace("c 9 0", "c 0 0"))
+    path.write_text(
+        SMALL.format(r=110, formula="H-W")
+        .replace("p3 b c 350", "p3 b c 5")
+        .replace("c 9 0", "c 0 0")
+    )
     lost, _, made = differences(path, 0, tmp_path)
     assert lost < 1e-3
     assert ["c"] in [names for what, names in made.notes if what.startswith("elevation changed")]
@@ -376,7 +466,11 @@ def test_a_broken_file_is_reported_by_its_fault(good, tmp_path, fvs):
 
 def test_all_faults_that_epanet_lists_are_reported_at_once(tmp_path, fvs):
     path = tmp_path / "bad.inp"
-    text = SMALL.format(r=110, formula="H-W").replace("p2 a b", "p2 a bb").replace("500 150", "500 -150")
+    text = (
+        SMALL.format(r=110, formula="H-W")
+        .replace("p2 a b", "p2 a bb")
+        .replace("500 150", "500 -150")
+    )
     path.write_text(text)
     code, _, err = fvs("import", path, tmp_path / "x.toml")
     assert code == 2 and "2 faults" in err and "undefined node bb" in err and "-150" in err
@@ -392,7 +486,9 @@ def test_the_broken_files_that_wntr_ships(name, said, tmp_path, fvs):
 
 def test_a_network_without_a_source_or_an_hour_before_its_start(tmp_path, fvs):
     path = tmp_path / "dry.inp"
-    path.write_text("[JUNCTIONS]\na 10 5\nb 10 5\n[PIPES]\np1 a b 100 200 100 0 Open\n[OPTIONS]\nUNITS LPS\n[END]\n")
+    path.write_text(
+        "[JUNCTIONS]\na 10 5\nb 10 5\n[PIPES]\np1 a b 100 200 100 0 Open\n[OPTIONS]\nUNITS LPS\n[END]\n"
+    )
     code, _, err = fvs("import", path, tmp_path / "x.toml")
     assert code == 2 and "no tanks or reservoirs" in err
     code, _, err = fvs("import", SHIPPED / "Net2.inp", tmp_path / "x.toml", "--hour", "-1")
@@ -401,16 +497,22 @@ def test_a_network_without_a_source_or_an_hour_before_its_start(tmp_path, fvs):
 
 def test_the_command_writes_a_case_that_checks_and_never_writes_over_a_file(tmp_path, fvs):
     to = tmp_path / "town.toml"
-    code, out, err = fvs("import", SHIPPED / "Net2.inp", to, "--hour", "7", "--wave-speed", "1000 m/s")
+    code, out, err = fvs(
+        "import", SHIPPED / "Net2.inp", to, "--hour", "7", "--wave-speed", "1000 m/s"
+    )
     assert code == 0 and str(to) in out and (tmp_path / "schema.json").exists()
     assert load(to).links["1"].wave_speed == 1000.0
-    code, _, err = fvs("import", SHIPPED / "Net2.inp", tmp_path / "long.toml", "--min-pipe-length", "100 m")
+    code, _, err = fvs(
+        "import", SHIPPED / "Net2.inp", tmp_path / "long.toml", "--min-pipe-length", "100 m"
+    )
     assert (
         code == 0
         and "lengthened to 100 m" in err
         and min(p.length for p in load(tmp_path / "long.toml").links.values()) == 100
     )
-    code, _, err = fvs("import", SHIPPED / "Net2.inp", tmp_path / "none.toml", "--min-pipe-length", "0 m")
+    code, _, err = fvs(
+        "import", SHIPPED / "Net2.inp", tmp_path / "none.toml", "--min-pipe-length", "0 m"
+    )
     assert code == 2 and "--min-pipe-length: 0 m is not positive" in err
     code, out, _ = fvs("check", to)
     assert code == 0 and "step" in out

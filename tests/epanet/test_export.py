@@ -17,7 +17,14 @@ from fvsolve.exchange.epanet import import_network, network_text  # noqa: E402
 from fvsolve.exchange.epanet.network_file import read_network, run_epanet, solution_at  # noqa: E402
 
 SHIPPED = Path(wntr.__file__).parent / "library" / "networks"
-NETWORKS = [("Net1", False), ("Net1", True), ("Net2", True), ("Net3", False), ("Net3", True), ("ky4", False)]
+NETWORKS = [
+    ("Net1", False),
+    ("Net1", True),
+    ("Net2", True),
+    ("Net3", False),
+    ("Net3", True),
+    ("ky4", False),
+]
 
 
 def written(text, tmp_path, name="back.inp"):
@@ -32,7 +39,10 @@ def test_a_network_that_was_imported_returns_with_its_heads(name, day, tmp_path)
     imported = import_network(SHIPPED / f"{name}.inp", day=day)
     text, _ = network_text(load(tomllib.loads(imported.text)))
     back = solution_at(read_network(written(text, tmp_path)), 0.0).solutions[0]
-    gaps = [abs(back.head[own] - imported.solution.head[original]) for original, own in imported.nodes.items()]
+    gaps = [
+        abs(back.head[own] - imported.solution.head[original])
+        for original, own in imported.nodes.items()
+    ]
     assert max(gaps) < 1e-3
 
 
@@ -47,32 +57,88 @@ def test_levels_over_a_day_are_those_of_the_original(name, tmp_path):
     back = run_epanet(read_network(written(text, tmp_path)), 86400, 60, times).solutions
     for tank in (tank.name for tank in imported.network.tanks()):
         levels = [solution.head[tank] for solution in first]
-        assert [solution.head[imported.nodes[tank]] for solution in back] == pytest.approx(levels, abs=0.02)
+        assert [solution.head[imported.nodes[tank]] for solution in back] == pytest.approx(
+            levels, abs=0.02
+        )
 
 
 SMALL = {
     "fluid": {"name": "Water", "law": "linear", "density": "999.563 kg/m3"},
     "nodes": {
         "lake": {"type": "reservoir", "head": "60 m"},
-        "a": {"type": "junction", "elevation": "10 m", "demand": "5 l/s", "required_pressure": "2 barg"},
-        "b": {"type": "junction", "elevation": "12 m", "demand": "3 l/s", "required_pressure": "2 barg"},
+        "a": {
+            "type": "junction",
+            "elevation": "10 m",
+            "demand": "5 l/s",
+            "required_pressure": "2 barg",
+        },
+        "b": {
+            "type": "junction",
+            "elevation": "12 m",
+            "demand": "3 l/s",
+            "required_pressure": "2 barg",
+        },
         "c": {"type": "junction", "elevation": "9 m"},
-        "tower": {"type": "tank", "elevation": "40 m", "area": "50 m2", "level": "3 m", "height": "6 m"},
+        "tower": {
+            "type": "tank",
+            "elevation": "40 m",
+            "area": "50 m2",
+            "level": "3 m",
+            "height": "6 m",
+        },
     },
     "links": {
-        "p1": {"type": "pipe", "from": "lake", "to": "a", "length": "400 m", "diameter": "250 mm",
-               "friction": {"model": "hazen-williams", "coefficient": 110}, "minor_loss": 2},
-        "v1": {"type": "valve", "from": "a", "to": "b", "diameter": "150 mm", "loss_coefficient": 4, "opening": 0.5},
-        "r1": {"type": "pressure-reducing", "from": "b", "to": "c", "set_pressure": "2.5 barg", "diameter": "200 mm",
-               "time_constant": "5 s", "loss_coefficient": 1},
-        "p2": {"type": "pipe", "from": "c", "to": "d", "length": "300 m", "diameter": "200 mm",
-               "friction": {"model": "hazen-williams", "coefficient": 120}},
-        "k1": {"type": "check-valve", "from": "d", "to": "tower", "diameter": "200 mm", "loss_coefficient": 2},
+        "p1": {
+            "type": "pipe",
+            "from": "lake",
+            "to": "a",
+            "length": "400 m",
+            "diameter": "250 mm",
+            "friction": {"model": "hazen-williams", "coefficient": 110},
+            "minor_loss": 2,
+        },
+        "v1": {
+            "type": "valve",
+            "from": "a",
+            "to": "b",
+            "diameter": "150 mm",
+            "loss_coefficient": 4,
+            "opening": 0.5,
+        },
+        "r1": {
+            "type": "pressure-reducing",
+            "from": "b",
+            "to": "c",
+            "set_pressure": "2.5 barg",
+            "diameter": "200 mm",
+            "time_constant": "5 s",
+            "loss_coefficient": 1,
+        },
+        "p2": {
+            "type": "pipe",
+            "from": "c",
+            "to": "d",
+            "length": "300 m",
+            "diameter": "200 mm",
+            "friction": {"model": "hazen-williams", "coefficient": 120},
+        },
+        "k1": {
+            "type": "check-valve",
+            "from": "d",
+            "to": "tower",
+            "diameter": "200 mm",
+            "loss_coefficient": 2,
+        },
         "hole": {"type": "leak", "from": "a", "coefficient": 1e-6, "exponent": 0.5},
     },
     "numerics": {"end": "24 h", "pipe_model": "quasi-steady"},
-}  # fmt: skip
-SMALL["nodes"]["d"] = {"type": "junction", "elevation": "8 m", "demand": "4 l/s", "required_pressure": "2 barg"}
+}
+SMALL["nodes"]["d"] = {
+    "type": "junction",
+    "elevation": "8 m",
+    "demand": "4 l/s",
+    "required_pressure": "2 barg",
+}
 
 
 def test_valves_leaks_and_demands_of_an_own_case_have_equal_heads(tmp_path):
@@ -117,7 +183,9 @@ def test_features_that_epanet_cannot_express_are_refused_all_at_once():
     )
     with pytest.raises(FvsolveError, match="2 parts that EPANET cannot express") as caught:
         network_text(case)
-    assert "nodes.c: EPANET has no chamber" in str(caught.value) and "links.p2.friction" in str(caught.value)
+    assert "nodes.c: EPANET has no chamber" in str(caught.value) and "links.p2.friction" in str(
+        caught.value
+    )
 
 
 def test_the_command_writes_a_file_that_imports_again(tmp_path, fvs):
@@ -129,6 +197,10 @@ def test_the_command_writes_a_file_that_imports_again(tmp_path, fvs):
     assert code == 2 and "exists" in err
     assert fvs("export", case)[0] == 2
     again = import_network(tmp_path / "back.inp", day=True)
-    levels = [fvsolve.run(load(tomllib.loads(item.text), {"output.units": {}}), pictures=False)["nodes.2.level"]
-              for item in (imported, again)]  # fmt: skip
+    levels = [
+        fvsolve.run(load(tomllib.loads(item.text), {"output.units": {}}), pictures=False)[
+            "nodes.2.level"
+        ]
+        for item in (imported, again)
+    ]
     assert levels[1] == pytest.approx(levels[0], abs=5e-3)

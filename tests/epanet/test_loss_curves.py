@@ -97,7 +97,7 @@ NETWORKS = {
     "PBV in kPa": {"valve": "PBV 100 0", "options": "PRESSURE KPA"},
     "PBV fixed open": {"valve": "PBV 10 5", "status": "v OPEN"},
     "GPV that opens and shuts": {"controls": "LINK v CLOSED AT TIME 5\nLINK v OPEN AT TIME 9"},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", NETWORKS)
@@ -121,12 +121,32 @@ def test_heads_at_an_hour_are_those_of_epanet(name, hour, tmp_path):
 
 
 CURVES = {
-    "from no flow": ([[0.0, 0.0], [1.0, 2.0], [2.0, 5.0]], [(0.0, 0.0), (1.0, 2.0), (2.0, 5.0)], False),
-    "first point on the line to no flow": ([[1.0, 2.0], [2.0, 4.0]], [(0.0, 0.0), (1.0, 2.0), (2.0, 4.0)], False),
+    "from no flow": (
+        [[0.0, 0.0], [1.0, 2.0], [2.0, 5.0]],
+        [(0.0, 0.0), (1.0, 2.0), (2.0, 5.0)],
+        False,
+    ),
+    "first point on the line to no flow": (
+        [[1.0, 2.0], [2.0, 4.0]],
+        [(0.0, 0.0), (1.0, 2.0), (2.0, 4.0)],
+        False,
+    ),
     "loss at no flow": ([[1.0, 2.0], [2.0, 3.0]], [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)], False),
-    "negative at small flows": ([[1.0, 1.0], [2.0, 5.0]], [(0.0, 0.0), (0.75, 0.0), (1.0, 1.0), (2.0, 5.0)], True),
-    "negative points": ([[0.0, -2.0], [1.0, -1.0], [2.0, 3.0]], [(0.0, 0.0), (1.25, 0.0), (2.0, 3.0)], True),
-    "no loss at first": ([[0.0, 0.0], [1.0, 0.0], [2.0, 3.0]], [(0.0, 0.0), (1.0, 0.0), (2.0, 3.0)], False),
+    "negative at small flows": (
+        [[1.0, 1.0], [2.0, 5.0]],
+        [(0.0, 0.0), (0.75, 0.0), (1.0, 1.0), (2.0, 5.0)],
+        True,
+    ),
+    "negative points": (
+        [[0.0, -2.0], [1.0, -1.0], [2.0, 3.0]],
+        [(0.0, 0.0), (1.25, 0.0), (2.0, 3.0)],
+        True,
+    ),
+    "no loss at first": (
+        [[0.0, 0.0], [1.0, 0.0], [2.0, 3.0]],
+        [(0.0, 0.0), (1.0, 0.0), (2.0, 3.0)],
+        False,
+    ),
     "negative flows": ([[-2.0, 0.0], [-1.0, 1.0], [1.0, 2.0]], [(0.0, 1.5), (1.0, 2.0)], False),
     "falling": ([[0.0, 3.0], [1.0, 2.0]], [], False),
     "no loss": ([[0.0, 0.0], [1.0, 0.0]], [], False),
@@ -140,7 +160,9 @@ def test_the_points_of_a_curve_are_those_of_epanets_lines(name):
     assert part_tables.general_losses(curve) == (points, negative)
 
 
-@pytest.mark.parametrize("setting, loss, most", [(2.0, 400.0, 60.0), (20.0, 3.0, 60.0), (20.0, 3.0, 10.0)])
+@pytest.mark.parametrize(
+    "setting, loss, most", [(2.0, 400.0, 60.0), (20.0, 3.0, 60.0), (20.0, 3.0, 10.0)]
+)
 def test_points_of_a_pressure_breaker_lie_near_its_greater_loss(setting, loss, most):
     points = part_tables.breaker_losses(setting, loss, 0.15, most)
     square = part_tables.MINOR_LOSS * loss / 0.15**4
@@ -150,7 +172,9 @@ def test_points_of_a_pressure_breaker_lie_near_its_greater_loss(setting, loss, m
     flows, losses = zip(*points, strict=True)
     between = np.linspace(0.0, math.sqrt(max(most, setting) / square), 10001)
     exact = np.maximum(setting, square * between**2)
-    assert np.interp(between, flows, losses) == pytest.approx(exact, abs=1.01 * part_tables.LINE_ERROR)
+    assert np.interp(between, flows, losses) == pytest.approx(
+        exact, abs=1.01 * part_tables.LINE_ERROR
+    )
 
 
 def import_notes(imported):
@@ -171,7 +195,9 @@ def test_losses_that_a_link_cannot_have_are_named(tmp_path):
 def test_a_negative_flow_through_a_pressure_breaker_during_the_day_is_named(tmp_path):
     """The tower feeds the junction before the valve once its demand exceeds what the lake supplies."""
     path = town(tmp_path, "PBV 10 0")
-    path.write_text(path.read_text().replace("a 5 0", "a 5 25 late").replace("day 0.6", "late 0 0 9 9\nday 0.6"))
+    path.write_text(
+        path.read_text().replace("a 5 0", "a 5 25 late").replace("day 0.6", "late 0 0 9 9\nday 0.6")
+    )
     imported, found = day_of(path, tmp_path)
     assert not imported.causes and found.agrees
     assert found.causes == ["PBV raises the head along a negative flow, which a loss cannot do (v)"]
@@ -181,18 +207,25 @@ def test_a_negative_flow_through_a_pressure_breaker_during_the_day_is_named(tmp_
 def test_settings_by_controls_are_listed(tmp_path):
     path = town(tmp_path, "PBV 10 0", controls="LINK v 12 IF NODE tower BELOW 2.5")
     imported = import_network(path, day=True)
-    assert import_notes(imported) == {"not imported, because it sets a valve of this kind": ["control 1"]}
+    assert import_notes(imported) == {
+        "not imported, because it sets a valve of this kind": ["control 1"]
+    }
 
 
 def test_a_general_valve_has_its_points_and_no_note(tmp_path):
     for day in (False, True):
         imported = import_network(town(tmp_path), day=day)
         loss = tomllib.loads(imported.text)["links"]["v"]["loss"]
-        assert loss == {"flow": ["0 l/s", "5 l/s", "12 l/s", "20 l/s"], "head": ["0 m", "2 m", "9 m", "24 m"]}
+        assert loss == {
+            "flow": ["0 l/s", "5 l/s", "12 l/s", "20 l/s"],
+            "head": ["0 m", "2 m", "9 m", "24 m"],
+        }
         assert not import_notes(imported)
 
 
-@pytest.mark.parametrize("name", ["GPV", "GPV with a loss at no flow", "PBV", "PBV with a greater minor loss"])
+@pytest.mark.parametrize(
+    "name", ["GPV", "GPV with a loss at no flow", "PBV", "PBV with a greater minor loss"]
+)
 def test_a_loss_curve_is_exported_as_a_general_valve(name, tmp_path):
     imported = import_network(town(tmp_path, **NETWORKS[name]))
     case = load(tomllib.loads(imported.text))
@@ -210,7 +243,10 @@ def test_drops_are_exported_as_heads(tmp_path):
     table = tomllib.loads(import_network(town(tmp_path)).text)
     head = [0.0, 2.0, 9.0, 24.0]
     weight = load(table).properties.density * load(table).gravity
-    table["links"]["v"]["loss"] = {"flow": [0.0, 0.005, 0.012, 0.02], "drop": [weight * item for item in head]}
+    table["links"]["v"]["loss"] = {
+        "flow": [0.0, 0.005, 0.012, 0.02],
+        "drop": [weight * item for item in head],
+    }
     back = tmp_path / "back.inp"
     back.write_text(network_text(load(table))[0])
     assert [loss for _, loss in read_network(back).links["v"].curve] == pytest.approx(head)

@@ -14,7 +14,13 @@ pytest.importorskip("epanet", reason="EPANET's toolkit, the extra `epanet`, is n
 from fvsolve.case import load  # noqa: E402
 from fvsolve.core.model.build import build  # noqa: E402
 from fvsolve.errors import FvsolveError  # noqa: E402
-from fvsolve.exchange.epanet import import_network, network_file, self_check, switching, toolkit_process  # noqa: E402
+from fvsolve.exchange.epanet import (
+    import_network,
+    network_file,
+    self_check,
+    switching,
+    toolkit_process,
+)  # noqa: E402
 
 OPTIONS = "[OPTIONS]\nUNITS LPS\nHEADLOSS H-W\n[END]\n"
 PUMPED = """[JUNCTIONS]
@@ -142,7 +148,11 @@ def test_a_fault_has_its_line_and_a_remedy(good, tmp_path):
     path = written(tmp_path, (MAIN + OPTIONS).replace(good, bad, 1))
     with pytest.raises(FvsolveError, match="reported by EPANET") as caught:
         import_network(path)
-    assert said in str(caught.value) and remedy in str(caught.value) and "net.inp:" in str(caught.value)
+    assert (
+        said in str(caught.value)
+        and remedy in str(caught.value)
+        and "net.inp:" in str(caught.value)
+    )
 
 
 def test_a_binary_file_is_refused_by_its_kind(tmp_path):
@@ -197,9 +207,9 @@ v OPEN
         imported = import_network(written(tmp_path, text.format(kind=kind) + OPTIONS))
         case = load(_case(imported, tmp_path))
         flow = build(case).checks["pipes"]
-        assert flow["p1"]["flow"] == pytest.approx(0.662, abs=5e-4) and flow["p2"]["flow"] == pytest.approx(
-            0.562, abs=5e-4
-        )
+        assert flow["p1"]["flow"] == pytest.approx(0.662, abs=5e-4) and flow["p2"][
+            "flow"
+        ] == pytest.approx(0.562, abs=5e-4)
 
 
 def _case(imported, tmp_path):
@@ -243,11 +253,15 @@ def test_an_emitter_above_its_pressure_is_named(tmp_path):
     text += "p2 A B 300 150 110 0 Open\np3 A C 300 150 110 0 Open\n[EMITTERS]\nB 2.0\n"
     imported = import_network(written(tmp_path, text + OPTIONS))
     found = compared(imported, tmp_path)
-    assert found.agrees and found.compared[0].above and "emitter above its pressure" in found.causes[0]
+    assert (
+        found.agrees and found.compared[0].above and "emitter above its pressure" in found.causes[0]
+    )
     assert "B (" in found.causes[0] or "(B)" in found.causes[0]
     assert heads(imported, tmp_path)["B"] == pytest.approx(88.12, abs=0.01)  # EPANET: 89.35 m
     # EPANET 2.3 can forbid the flow; then both agree
-    closed = import_network(written(tmp_path, text + OPTIONS.replace("[END]", "BACKFLOW ALLOWED NO\n[END]")))
+    closed = import_network(
+        written(tmp_path, text + OPTIONS.replace("[END]", "BACKFLOW ALLOWED NO\n[END]"))
+    )
     assert not closed.causes and not compared(closed, tmp_path).compared[0].above
 
 
@@ -275,9 +289,15 @@ def test_pressure_dependent_demands_as_in_epanet(tmp_path, fvs):
     assert compared(soft, tmp_path).agrees
     assert heads(soft, tmp_path)["a"] > heads(plain, tmp_path)["a"] + 0.1
     written_in_file = import_network(
-        written(tmp_path, text + OPTIONS.replace("[END]", "DEMAND MODEL PDA\nREQUIRED PRESSURE 20\n[END]"), "pda.inp")
+        written(
+            tmp_path,
+            text + OPTIONS.replace("[END]", "DEMAND MODEL PDA\nREQUIRED PRESSURE 20\n[END]"),
+            "pda.inp",
+        )
     )
-    assert heads(written_in_file, tmp_path)["a"] == pytest.approx(heads(soft, tmp_path)["a"], abs=1e-9)
+    assert heads(written_in_file, tmp_path)["a"] == pytest.approx(
+        heads(soft, tmp_path)["a"], abs=1e-9
+    )
     code, _, err = fvs("import", path, tmp_path / "soft.toml", "--pressure-dependent", "20 mH2O")
     assert code == 0 and "required_pressure" in (tmp_path / "soft.toml").read_text(), err
 
@@ -297,7 +317,7 @@ SETTINGS = {
     "order": "LINK lift OPEN IF NODE tower BELOW 2.5\nLINK lift CLOSED IF NODE tower ABOVE 4.5",
     "three speeds": "LINK lift 0.9 IF NODE tower BELOW 3.4\nLINK lift 1.0 IF NODE tower BELOW 2.8\n"
     "LINK lift 0 IF NODE tower ABOVE 4.5",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -305,7 +325,9 @@ def test_settings_of_pumps_stop_and_start_them(name, tmp_path):
     _, found = day_of(pumped(controls=SETTINGS[name]), tmp_path)
     assert not found.fault and found.agrees and found.compared[0].difference < 5e-3
     if name == "0 and 1":
-        run = fvsolve.run(load(_case(import_network(tmp_path / "net.inp", day=True), tmp_path)), pictures=False)
+        run = fvsolve.run(
+            load(_case(import_network(tmp_path / "net.inp", day=True), tmp_path)), pictures=False
+        )
         at = int(abs(run.t - 68_700.0 / 3600.0).argmin())  # rows in h
         assert run["nodes.tower.level"][at] == pytest.approx(4.493, abs=2e-3)
 
@@ -355,12 +377,15 @@ def test_demands_by_pressure_behind_an_empty_tower_end_and_return_as_in_epanet(t
     assert not found.fault and found.agrees and not found.causes
     assert max(item.difference for item in found.compared) < 2e-3
     run = fvsolve.run(
-        load(_case(imported, tmp_path), {"output.probes": ["b.head"], "output.units": {}}), pictures=False
+        load(_case(imported, tmp_path), {"output.probes": ["b.head"], "output.units": {}}),
+        pictures=False,
     )
     network = network_file.run_epanet(imported.network, 86400, 10, [21600, 82800])
     for solution in network.solutions:
         assert solution.head["b"] == pytest.approx(8.0, abs=1e-3)
-        assert run["b.head"][np.searchsorted(run.t, solution.seconds)] == pytest.approx(8.0, abs=1e-3)
+        assert run["b.head"][np.searchsorted(run.t, solution.seconds)] == pytest.approx(
+            8.0, abs=1e-3
+        )
     (note,) = [note for note in run.warnings if note.kind == "unsupplied"]
     assert "tower-altitude (the tank is empty)" in note.text
 
@@ -368,7 +393,9 @@ def test_demands_by_pressure_behind_an_empty_tower_end_and_return_as_in_epanet(t
 def test_emitters_that_feed_a_drained_town_in_epanet_are_named(tmp_path):
     """Behind the empty tower the emitter at b leaks 0.57 l/s, which EPANET takes from the emitter above it, at c."""
     _, found = day_of(EMPTIED.format(b=0, c=0, emitters="b 1.0\nc 0.3") + OPTIONS, tmp_path)
-    assert found.agrees and found.causes == ["EPANET lets emitters above their pressure feed the network (c)"]
+    assert found.agrees and found.causes == [
+        "EPANET lets emitters above their pressure feed the network (c)"
+    ]
     assert found.compared[0].quantity == "levels" and found.compared[0].difference < 2e-3
 
 
@@ -419,7 +446,11 @@ def test_a_psv_that_alone_supplies_nodes_is_open_over_a_day_as_in_epanet(ends, t
     """The head before it falls below its set head in the second hour."""
     text = ALONE.format(kind="PSV", setting=26, ends=ends)
     imported, found = day_of(text + OPTIONS, tmp_path)
-    assert found.agrees and not imported.causes and max(item.difference for item in found.compared) < 5e-3
+    assert (
+        found.agrees
+        and not imported.causes
+        and max(item.difference for item in found.compared) < 5e-3
+    )
     assert any("alone supplies" in text and names == ["v"] for text, names in imported.notes)
     beside = text.replace("p3 b c", "p4 T c 900 100 110 0 Open\np3 b c")
     notes = import_network(written(tmp_path, beside + OPTIONS), day=True).notes
@@ -428,11 +459,17 @@ def test_a_psv_that_alone_supplies_nodes_is_open_over_a_day_as_in_epanet(ends, t
 
 def test_a_tank_that_stays_full_is_named_where_its_links_cycle(tmp_path):
     """EPANET lets a full tank give and take in turn at each step; an altitude valve has a differential of 5 mm."""
-    text = ALONE.format(kind="PRV", setting=20, ends="a b").replace("T 30 3 0 6 8 0", "T 30 2.9 0 3 2 0")
+    text = ALONE.format(kind="PRV", setting=20, ends="a b").replace(
+        "T 30 3 0 6 8 0", "T 30 2.9 0 3 2 0"
+    )
     text = text.replace("p3 b c", "p5 T b 300 50 110 0 Open\np3 b c")
     imported, found = day_of(text + OPTIONS, tmp_path)
-    assert found.agrees and any(cause.endswith("in EPANET at each step: T") for cause in found.causes)
-    planted = replace(imported, text=imported.text.replace('full_level = "3 m"', 'full_level = "2.95 m"'))
+    assert found.agrees and any(
+        cause.endswith("in EPANET at each step: T") for cause in found.causes
+    )
+    planted = replace(
+        imported, text=imported.text.replace('full_level = "3 m"', 'full_level = "2.95 m"')
+    )
     assert planted.text != imported.text
     wrong = self_check.check_day(planted, _case(planted, tmp_path))
     assert not wrong.agrees and not wrong.causes  # levels differ by 5 cm, which no cycle explains
@@ -446,7 +483,9 @@ def test_heads_far_above_every_source_are_named(tmp_path):
     low, high = (replace(solution, head={**solution.head, "b": head}) for head in (900.0, 6700.0))
     (cause,) = self_check.extreme_heads(powered, [solution, high])
     assert "(lift)" in cause and "6.66e+03 m above every source" in cause
-    assert not self_check.extreme_heads(powered, [solution, low]) and not self_check.extreme_heads(network, [high])
+    assert not self_check.extreme_heads(powered, [solution, low]) and not self_check.extreme_heads(
+        network, [high]
+    )
 
 
 def test_a_tank_that_gives_water_at_its_least_level_is_named(tmp_path):
@@ -458,12 +497,19 @@ def test_a_tank_that_gives_water_at_its_least_level_is_named(tmp_path):
         tower = replace(network.nodes["tower"], **keys)
         head = {**solution.head, "tower": tower.elevation + level}
         changed = replace(solution, head=head, demand={**solution.demand, "tower": inflow})
-        return self_check.crossed_limits(replace(network, nodes=network.nodes | {"tower": tower}), [solution, changed])
+        return self_check.crossed_limits(
+            replace(network, nodes=network.nodes | {"tower": tower}), [solution, changed]
+        )
 
     for level, inflow in ((1.0, -1e-4), (6.0, 1e-4)):
         (cause,) = causes(level, inflow)
         assert cause.endswith("greatest level take it: tower")
-    assert not causes(1.0, 1e-4) and not causes(6.0, -1e-4) and not causes(3.0, -1e-4) and not causes(1.0, -1e-9)
+    assert (
+        not causes(1.0, 1e-4)
+        and not causes(6.0, -1e-4)
+        and not causes(3.0, -1e-4)
+        and not causes(1.0, -1e-9)
+    )
     assert not causes(6.0, 1e-4, overflow=True)
 
 
@@ -471,7 +517,10 @@ def test_controls_at_the_limit_of_a_tank_and_late_switches_are_named():
     def event(time, name, what):
         return {"time": time, "name": name, "what": what}
 
-    full = [event(60.0, "T-altitude", "shuts: the tank is full"), event(60.0, "controls.P", "turns off")]
+    full = [
+        event(60.0, "T-altitude", "shuts: the tank is full"),
+        event(60.0, "controls.P", "turns off"),
+    ]
     (cause,) = self_check.switches_at_limits([*full, event(70.0, "controls.Q", "turns on")])
     assert cause.endswith("misses by rounding: P")
     assert not self_check.switches_at_limits([full[0], event(61.0, "controls.P", "turns off")])
@@ -483,14 +532,19 @@ def test_controls_at_the_limit_of_a_tank_and_late_switches_are_named():
 
 def test_an_efficiency_at_no_flow_alone_holds_at_every_flow(tmp_path):
     energy = "[ENERGY]\nGlobal Price 0.1\nPump lift Efficiency e\n[CURVES]\ne 0 65\n"
-    imported = import_network(written(tmp_path, pumped().replace("[OPTIONS]", energy + "[OPTIONS]")), day=True)
+    imported = import_network(
+        written(tmp_path, pumped().replace("[OPTIONS]", energy + "[OPTIONS]")), day=True
+    )
     assert load(_case(imported, tmp_path)).links["lift"].overall_efficiency is not None
     assert "overall_efficiency = 0.65" in imported.text
 
 
 def test_a_pump_that_is_off_all_day_does_not_lift_a_set_pressure(tmp_path):
     """Without it no source reaches the set head, and the case reader refused the case of the importer."""
-    text = ALONE.format(kind="PRV", setting=60, ends="a b") + "[PUMPS]\nboost R a HEAD h\n[CURVES]\nh 10 50\n"
+    text = (
+        ALONE.format(kind="PRV", setting=60, ends="a b")
+        + "[PUMPS]\nboost R a HEAD h\n[CURVES]\nh 10 50\n"
+    )
     text += "[STATUS]\nboost Closed\n"
     imported, found = day_of(text + OPTIONS, tmp_path)
     assert found.agrees and any("set head above every source" in note for note, _ in imported.notes)
@@ -515,7 +569,9 @@ def test_a_valve_that_regulates_is_partly_open_and_sets_no_step(kind, setting, t
     """EPANET's open valve has no loss. With it the valve would act within microseconds."""
     text = ACTING.format(kind=kind, setting=setting) + OPTIONS
     if kind != "PRV":
-        text = text.replace("R 60", "R 60\nlow 12").replace("p2 c b", "p3 low b 500 100 110 0 Open\np2 c b")
+        text = text.replace("R 60", "R 60\nlow 12").replace(
+            "p2 c b", "p3 low b 500 100 110 0 Open\np2 c b"
+        )
     imported = import_network(written(tmp_path, text))
     assert not compared(imported, tmp_path).compared[0].above
     assert build(load(_case(imported, tmp_path))).checks["step"] > 1e-3
@@ -526,7 +582,10 @@ def test_a_pipe_to_be_designed_has_no_waves(tmp_path):
     """Its friction would make each explicit step unstable: the pipe of 2.5 micrometres stands beside a main."""
     text = MAIN.replace("p1 R a", "none R a 500 0.00254 110 0 Open\np1 R a") + OPTIONS
     imported = import_network(written(tmp_path, text))
-    assert any(text.startswith("narrower than 1 mm") and names == ["none"] for text, names in imported.notes)
+    assert any(
+        text.startswith("narrower than 1 mm") and names == ["none"]
+        for text, names in imported.notes
+    )
     case = load(_case(imported, tmp_path))
     stops = {"time": [0.0, 1.0, 5.0], "value": ["20 l/s", "20 l/s", "0 l/s"]}
     run = fvsolve.run(case, {"nodes.a.demand": stops, "numerics.end": 8.0})
@@ -535,16 +594,23 @@ def test_a_pipe_to_be_designed_has_no_waves(tmp_path):
 
 @pytest.mark.parametrize("speed, is_named", [(75, True), (1.2, False)])
 def test_a_speed_that_is_no_relative_speed_is_named(speed, is_named, tmp_path):
-    text = pumped(controls=f"LINK lift {speed} IF NODE tower BELOW 1\nLINK lift CLOSED IF NODE tower ABOVE 5.5")
+    text = pumped(
+        controls=f"LINK lift {speed} IF NODE tower BELOW 1\nLINK lift CLOSED IF NODE tower ABOVE 5.5"
+    )
     imported = import_network(written(tmp_path, text), day=True)
-    assert any("relative speed above 3" in cause and "lift" in cause for cause in imported.causes) == is_named
+    assert (
+        any("relative speed above 3" in cause and "lift" in cause for cause in imported.causes)
+        == is_named
+    )
 
 
 def test_the_day_of_a_large_network_is_compared_on_request(tmp_path, fvs, monkeypatch):
     monkeypatch.setattr("fvsolve.cli.file_commands.MOST_NODES", 1)
     path = written(tmp_path, pumped())
     for options, is_compared in (((), False), (("--check",), True), (("--no-check",), False)):
-        code, _, err = fvs("import", path, tmp_path / f"day{len(options)}{is_compared}.toml", "--day", *options)
+        code, _, err = fvs(
+            "import", path, tmp_path / f"day{len(options)}{is_compared}.toml", "--day", *options
+        )
         assert code == 0 and ("levels, greatest difference" in err) == is_compared
         assert ("is not compared; --check compares it" in err) == (options == ())
 
@@ -565,7 +631,8 @@ ELSE PIPE p3 STATUS IS OPEN
     pipe = TOWER["pipe"] + "\np3 a b 500 80 110 0 Open"
     imported, found = day_of(pumped(rules=rules, pipe=pipe), tmp_path)
     assert not [note for note, _ in imported.notes if note.startswith("not imported")]
-    assert not found.fault and found.compared[0].difference < 0.05  # the switch by pressure is 10 s late in both
+    # the switch by pressure is 10 s late in both
+    assert not found.fault and found.compared[0].difference < 0.05
 
 
 def test_the_first_rule_of_equal_priority_prevails_and_the_highest_of_others(tmp_path):
@@ -602,7 +669,9 @@ def test_and_and_or_are_read_in_the_order_of_epanet():
         clause = switching.rule_clause(None, [premise(part) for part in text.split(",")], 86400.0)
         for k in range(8):
             states = [bool(k & 1), bool(k & 2), bool(k & 4)]
-            values = {("open", name): float(state) for name, state in zip("ABC", states, strict=True)}
+            values = {
+                ("open", name): float(state) for name, state in zip("ABC", states, strict=True)
+            }
             assert clause.holds(values) == rule(*states)
 
 
@@ -635,7 +704,8 @@ SET = {
     "PSV 60": "LINK v 64 AT TIME 4\nLINK v 58 AT TIME 12",
     "FCV 12": "LINK v 8 AT TIME 4\nLINK v 14 AT TIME 12\nLINK v CLOSED AT TIME 20",
     "TCV 40": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 12\nLINK v CLOSED AT TIME 20",
-    "TCV 40 20 ;": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 8\nLINK v OPEN AT TIME 15",  # minor loss 20
+    # minor loss 20
+    "TCV 40 20 ;": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 8\nLINK v OPEN AT TIME 15",
     "PRV 41": "LINK v 35 IF NODE tower ABOVE 8\nLINK v 42 IF NODE tower BELOW 6",
 }
 
@@ -656,7 +726,8 @@ def test_prices_and_efficiencies_of_pumps_are_imported(tmp_path):
     )
     run = fvsolve.run(load(_case(imported, tmp_path)), pictures=False)
     lift, total = run.summary["energy_use"]["pumps"]["lift"], run.summary["energy_use"]["total"]
-    assert lift["cost"] == pytest.approx(0.12 * lift["energy"] / 3.6e6, rel=0.05)  # the mean of the tariff is 1
+    # the mean of the tariff is 1
+    assert lift["cost"] == pytest.approx(0.12 * lift["energy"] / 3.6e6, rel=0.05)
     assert total["demand_charge"] == pytest.approx(3.0 * lift["peak_power"] / 1e3)
     assert 0.5 < lift["efficiency"] < 0.78  # by the curve, not the global 0.7
 
@@ -669,18 +740,24 @@ def test_the_self_check_finds_planted_differences(tmp_path):
     case = load(_case(imported, tmp_path))
     good = self_check.check_start(imported, case)
     assert good.agrees and not good.compared[0].above
-    wrong = replace(imported, solution=replace(imported.solution, head=imported.solution.head | {"a": 40.0}))
+    wrong = replace(
+        imported, solution=replace(imported.solution, head=imported.solution.head | {"a": 40.0})
+    )
     bad = self_check.check_start(wrong, case)
     assert not bad.agrees and bad.compared[0].name == "a" and bad.compared[0].above == ["a"]
     assert any("cause unknown" in line for line in bad.lines())
     named = self_check.check_start(replace(wrong, causes=["a known cause"]), case)
     assert named.agrees and any("a known cause" in line for line in named.lines())
     flows = {name: 2.0 * flow for name, flow in imported.solution.flow.items()}
-    doubled = self_check.check_start(replace(imported, solution=replace(imported.solution, flow=flows)), case)
+    doubled = self_check.check_start(
+        replace(imported, solution=replace(imported.solution, flow=flows)), case
+    )
     assert not doubled.agrees and doubled.compared[1].above == ["p1"]
 
 
-def test_the_command_prints_the_comparison_and_fails_at_an_unknown_difference(tmp_path, fvs, monkeypatch):
+def test_the_command_prints_the_comparison_and_fails_at_an_unknown_difference(
+    tmp_path, fvs, monkeypatch
+):
     path = written(tmp_path, MAIN + OPTIONS)
     code, _, err = fvs("import", path, tmp_path / "one.toml")
     assert code == 0 and "self-check: 2 heads, greatest difference" in err
@@ -695,7 +772,11 @@ def test_a_demand_without_supply_is_reported_with_epanets_heads(tmp_path):
     text = MAIN.replace("a 10 20", "a 10 20\nb 5 3") + "p2 a b 100 100 110 0 Closed\n"
     imported = import_network(written(tmp_path, text + OPTIONS))
     found = self_check.check_start(imported, load(_case(imported, tmp_path)))
-    assert not found.agrees and "EPANET has no physical solution either" in found.fault and "nodes.b" in found.fault
+    assert (
+        not found.agrees
+        and "EPANET has no physical solution either" in found.fault
+        and "nodes.b" in found.fault
+    )
 
 
 def test_a_valve_that_cannot_sustain_passes_flow_as_in_epanet(tmp_path):
@@ -715,7 +796,9 @@ v J2 J3 250 PSV 70 0
 """
     imported = import_network(written(tmp_path, text + OPTIONS.replace("LPS", "CMH")))
     assert compared(imported, tmp_path).agrees
-    assert [names for note, names in imported.notes if note.startswith("PSV cannot sustain")] == [["v"]]
+    assert [names for note, names in imported.notes if note.startswith("PSV cannot sustain")] == [
+        ["v"]
+    ]
 
 
 def test_units_of_the_toolkit():

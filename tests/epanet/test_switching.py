@@ -9,7 +9,11 @@ from fvsolve.exchange.epanet import switching
 
 END = 100.0
 TIMES = (0.0, 2.5, 5.0, 37.5, 60.0, 99.9)
-VALUES = {("level", "a"): (0.5, 1.5, 2.5, 4.5), ("level", "b"): (0.5, 1.95, 2.05, 3.5), ("flow", "p"): (-3.5, 0.5, 2.5)}
+VALUES = {
+    ("level", "a"): (0.5, 1.5, 2.5, 4.5),
+    ("level", "b"): (0.5, 1.95, 2.05, 3.5),
+    ("flow", "p"): (-3.5, 0.5, 2.5),
+}
 
 
 def clause_of(draw, depth=0):
@@ -21,7 +25,9 @@ def clause_of(draw, depth=0):
         return switching.interval_clause(switching.clipped(spans, END))
     if kind < 0.75 or depth > 2:
         relation = draw.choice(["<", ">", "<=", ">=", "=", "<>"])
-        return switching.value_clause(draw.choice(list(VALUES)), relation, float(draw.randint(1, 4)), 0.1)
+        return switching.value_clause(
+            draw.choice(list(VALUES)), relation, float(draw.randint(1, 4)), 0.1
+        )
     parts = [clause_of(draw, depth + 1) for _ in range(draw.randint(1, 3))]
     clause = switching.combined(draw.random() < 0.6, parts)
     return switching.opposite(clause) if draw.random() < 0.3 else clause
@@ -49,14 +55,25 @@ def holds(clause, time, values):
 def test_joined_actions_have_the_effect_of_all_actions(seed):
     draw, found = random.Random(seed), set()
     for _ in range(200):
-        actions = [(clause_of(draw), draw.choice([0.0, 1.0, 2.0])) for _ in range(draw.randint(1, 6))]
+        actions = [
+            (clause_of(draw), draw.choice([0.0, 1.0, 2.0])) for _ in range(draw.randint(1, 6))
+        ]
         fewer = switching.simplified(actions)
         sources = list(dict.fromkeys(source for clause, _ in fewer for source in clause.sources))
-        formulas = switching.prevailing(fewer, {source: f"x{k}" for k, source in enumerate(sources)})
+        formulas = switching.prevailing(
+            fewer, {source: f"x{k}" for k, source in enumerate(sources)}
+        )
         for _ in range(10):
-            time, values = draw.choice(TIMES), {source: draw.choice(own) for source, own in VALUES.items()}
+            time, values = (
+                draw.choice(TIMES),
+                {source: draw.choice(own) for source, own in VALUES.items()},
+            )
             acting = [value for clause, value in actions if holds(clause, time, values)]
-            on = [value for value, formula in formulas.items() if value_of(formula, sources, time, values) > 0.5]
+            on = [
+                value
+                for value, formula in formulas.items()
+                if value_of(formula, sources, time, values) > 0.5
+            ]
             assert on == acting[-1:]  # the last action that holds prevails
             found.add(acting[-1] if acting else None)
     assert found == {0.0, 1.0, 2.0, None}

@@ -33,16 +33,27 @@ def probe(case, name: str):
 def fork(opening, **numerics) -> dict:
     """Case of three pipes at a junction, with a valve to ambient at the end of one pipe."""
     nodes = {
-        "lake": scenes.reservoir(6e5), "fork": scenes.junction(scenes.ramp(0.3, 0.2, 0.01, 0.03)),
-        "blind": scenes.junction(), "gate": scenes.junction(), "out": scenes.reservoir(scenes.AMBIENT),
-    }  # fmt: skip
+        "lake": scenes.reservoir(6e5),
+        "fork": scenes.junction(scenes.ramp(0.3, 0.2, 0.01, 0.03)),
+        "blind": scenes.junction(),
+        "gate": scenes.junction(),
+        "out": scenes.reservoir(scenes.AMBIENT),
+    }
     valve = scenes.valve("gate", "out", 5e-4, opening)
     links = {
         "supply": scenes.pipe("lake", "fork", 500.0, 0.4, 1230.0, 20),
         "branch": scenes.pipe("fork", "blind", 347.1, 0.3, 1111.0, 16),
-        "lower": scenes.pipe("fork", "gate", 271.9, 0.25, 1017.0, 12), "valve": valve,
-    }  # fmt: skip
-    probes = ["gate.pressure", "fork.pressure", "blind.pressure", "valve.flow", "lower.flow@0.4", "supply.pressure@0.7"]
+        "lower": scenes.pipe("fork", "gate", 271.9, 0.25, 1017.0, 12),
+        "valve": valve,
+    }
+    probes = [
+        "gate.pressure",
+        "fork.pressure",
+        "blind.pressure",
+        "valve.flow",
+        "lower.flow@0.4",
+        "supply.pressure@0.7",
+    ]
     given = {**scenes.SMOOTH, **numerics}
     return scenes.scene(nodes, links, 3.0, given, probes, exact={"name": "rays"})
 
@@ -83,14 +94,22 @@ def test_cell_averages_of_rays_are_integrals_of_the_other_tracer():
         a, b = edges[k] / 271.9, edges[k + 1] / 271.9
         kinks = np.linspace(a, b, 14)[1:-1]
         for j, mine in ((0, pressure[k]), (1, flow[k])):
-            whole = quad(lambda x, j=j: truth.inside("lower", x, 2.0)[j], a, b, points=kinks, limit=400, epsrel=1e-7)[0]
+            whole = quad(
+                lambda x, j=j: truth.inside("lower", x, 2.0)[j],
+                a,
+                b,
+                points=kinks,
+                limit=400,
+                epsrel=1e-7,
+            )[0]
             assert mine == approx(whole / (b - a), rel=3e-7, abs=1e-9)
 
 
 def test_averages_next_to_a_front_are_exact():
     """A jump of demand by dq causes a pressure jump of rho a dq / A; a cell that the front cuts has a share of it."""
     case, found = solved(pulses.front(end=0.07))
-    edges = np.linspace(0.0, 100.0, 8)  # the front is at 100 m - 1000 m/s (0.07 s - 0.02 s) = 50 m, within a cell
+    # the front is at 100 m - 1000 m/s (0.07 s - 0.02 s) = 50 m, within a cell
+    edges = np.linspace(0.0, 100.0, 8)
     pressure, _ = found.averages("main", edges, 0.07)
     high = scenes.RHO * 1000.0 * 0.05 / scenes.area(0.5)
     share = np.clip((edges[1:] - 50.0) / np.diff(edges), 0.0, 1.0)
@@ -122,13 +141,19 @@ def test_elevations_and_a_start_that_is_no_equilibrium_are_traced():
     nodes = {"high": scenes.lake(30.0, elevation=10.0), "low": scenes.lake(20.0, elevation=0.0)}
     links = {"main": scenes.pipe("high", "low", 100.0, 0.5, 1000.0, 20)}
     numerics = {**scenes.SMOOTH, "initial": "rest"}
-    case = scenes.scene(nodes, links, 0.5, numerics, ["main.flow@0.5", "main.head@0.5"], exact={"name": "rays"})
+    case = scenes.scene(
+        nodes, links, 0.5, numerics, ["main.flow@0.5", "main.head@0.5"], exact={"name": "rays"}
+    )
     case, found = solved(case)
     t = np.array([0.025, 0.1, 0.2, 0.4])
-    assert found.probe(probe(case, "main.flow@0.5"), t) == approx(9.80665 * 10.0 / 100.0 * scenes.area(0.5) * t)
+    assert found.probe(probe(case, "main.flow@0.5"), t) == approx(
+        9.80665 * 10.0 / 100.0 * scenes.area(0.5) * t
+    )
     assert found.probe(probe(case, "main.head@0.5"), t) == approx(np.full(4, 25.0))
     run = outcome(case)
-    assert run.rows[:, 1] == approx(found.probe(probe(case, "main.flow@0.5"), run.rows[:, 0]), abs=1e-5)
+    assert run.rows[:, 1] == approx(
+        found.probe(probe(case, "main.flow@0.5"), run.rows[:, 0]), abs=1e-5
+    )
 
 
 # lumped parts -----------------------------------------------------------------------------------------------------
@@ -166,8 +191,17 @@ def column(initial: float | None, drop: float, factor: float, valve: bool) -> di
     nodes = {"high": scenes.reservoir(3e5), "low": scenes.reservoir(3e5 - drop)}
     friction = {"model": "steady", "factor": factor} if factor else scenes.NO_FRICTION
     more = {} if initial is None else {"initial_flow": initial}
-    links = {"column": {"type": "rigid-column", "from": "high", "to": end, "length": 50.0, "diameter": 0.2,
-                        "friction": friction, **more}}  # fmt: skip
+    links = {
+        "column": {
+            "type": "rigid-column",
+            "from": "high",
+            "to": end,
+            "length": 50.0,
+            "diameter": 0.2,
+            "friction": friction,
+            **more,
+        }
+    }
     probes = ["column.flow"]
     if valve:
         nodes["gate"] = scenes.junction()
@@ -191,7 +225,9 @@ def test_a_rigid_column_moves_as_by_scipy(initial, drop, factor):
     def rate(_, q):
         return area / (scenes.RHO * 50.0) * (drop - loss * np.abs(q) * q)
 
-    truth = solve_ivp(rate, (0.0, 6.0), [initial], t_eval=t, rtol=1e-11, atol=1e-14, method="DOP853").y[0]
+    truth = solve_ivp(
+        rate, (0.0, 6.0), [initial], t_eval=t, rtol=1e-11, atol=1e-14, method="DOP853"
+    ).y[0]
     assert found.probe(probe(case, "column.flow"), t) == approx(truth, rel=1e-8, abs=1e-10)
 
 
@@ -209,7 +245,15 @@ def test_a_rigid_column_behind_a_valve_that_jumps_moves_as_by_scipy():
     q, truth = 0.3 * cd * np.sqrt(2 * 1e4 / scenes.RHO), []
     for a, b in ((0.0, 1.0), (1.0, 3.0), (3.0, 6.0)):
         rate = lambda s, x: area / (scenes.RHO * 50.0) * (1e4 - drop(s, x))  # noqa: E731
-        part = solve_ivp(rate, (a, np.nextafter(b, a)), [q], dense_output=True, rtol=1e-11, atol=1e-14, method="DOP853")
+        part = solve_ivp(
+            rate,
+            (a, np.nextafter(b, a)),
+            [q],
+            dense_output=True,
+            rtol=1e-11,
+            atol=1e-14,
+            method="DOP853",
+        )
         truth += [float(part.sol(s)[0]) for s in t if a <= s < b]
         q = float(part.y[0, -1])
     assert found.probe(probe(case, "column.flow"), t) == approx(truth, rel=1e-8)
@@ -221,11 +265,24 @@ def test_a_rigid_column_behind_a_valve_that_jumps_moves_as_by_scipy():
 @pytest.mark.parametrize("lake", [False, True])
 def test_an_oscillation_between_tanks_is_that_of_scipy(lake):
     nodes = {"a": scenes.tank(2.0, 3.0), "b": scenes.lake(2.5) if lake else scenes.tank(5.0, 2.5)}
-    links = {"column": {"type": "rigid-column", "from": "a", "to": "b", "length": 30.0, "diameter": 0.3,
-                        "friction": scenes.NO_FRICTION, "initial_flow": 0.01}}  # fmt: skip
+    links = {
+        "column": {
+            "type": "rigid-column",
+            "from": "a",
+            "to": "b",
+            "length": 30.0,
+            "diameter": 0.3,
+            "friction": scenes.NO_FRICTION,
+            "initial_flow": 0.01,
+        }
+    }
     numerics = {"scheme": "muscl", "method": "dormand-prince", "rtol": 1e-10}
     probes = ["a.level", "a.pressure", "column.flow"]
-    case, found = solved(scenes.scene(nodes, links, 200.0, numerics, probes, every=5.0, exact={"name": "oscillation"}))
+    case, found = solved(
+        scenes.scene(
+            nodes, links, 200.0, numerics, probes, every=5.0, exact={"name": "oscillation"}
+        )
+    )
     other = 0.0 if lake else 1 / 5.0
 
     def rates(_, y):
@@ -233,7 +290,9 @@ def test_an_oscillation_between_tanks_is_that_of_scipy(lake):
         return [-q / 2.0, -q * (0.5 + other), 9.80665 * scenes.area(0.3) / 30.0 * drop]
 
     t = np.linspace(0.0, 200.0, 21)
-    truth = solve_ivp(rates, (0, 200), [3.0, 0.5, 0.01], t_eval=t, rtol=1e-11, atol=1e-13, method="DOP853").y
+    truth = solve_ivp(
+        rates, (0, 200), [3.0, 0.5, 0.01], t_eval=t, rtol=1e-11, atol=1e-13, method="DOP853"
+    ).y
     assert found.probe(probe(case, "a.level"), t) == approx(truth[0], abs=1e-8)
     assert found.probe(probe(case, "column.flow"), t) == approx(truth[2], abs=1e-9)
     run = outcome(case)
@@ -243,20 +302,36 @@ def test_an_oscillation_between_tanks_is_that_of_scipy(lake):
 @pytest.mark.parametrize("damping", [0.0, 40.0, 2 * np.sqrt(4.0 * 900.0), 500.0])
 def test_a_mass_on_springs_is_that_of_scipy(damping):
     nodes = {
-        "lake": scenes.reservoir(3e5), "wall": {"type": "frame"}, "far": {"type": "frame", "initial_position": 2.0},
+        "lake": scenes.reservoir(3e5),
+        "wall": {"type": "frame"},
+        "far": {"type": "frame", "initial_position": 2.0},
         "body": {"type": "mass", "mass": 4.0, "initial_position": 1.0, "initial_velocity": 0.5},
-    }  # fmt: skip
+    }
     links = {
-        "left": {"type": "spring", "from": "wall", "to": "body", "stiffness": 600.0, "free_length": 0.9},
-        "right": {"type": "spring", "from": "body", "to": "far", "stiffness": 300.0, "preload": 12.0},
+        "left": {
+            "type": "spring",
+            "from": "wall",
+            "to": "body",
+            "stiffness": 600.0,
+            "free_length": 0.9,
+        },
+        "right": {
+            "type": "spring",
+            "from": "body",
+            "to": "far",
+            "stiffness": 300.0,
+            "preload": 12.0,
+        },
         "push": {"type": "force", "to": "body", "force": 25.0},
-    }  # fmt: skip
+    }
     if damping:
         links["oil"] = {"type": "damper", "from": "far", "to": "body", "damping": damping}
     del nodes["lake"]
     numerics = {"scheme": "muscl", "method": "dormand-prince", "rtol": 1e-10}
     probes = ["body.position", "body.velocity"]
-    case = scenes.scene(nodes, links, 2.0, numerics, probes, every=0.05, exact={"name": "spring-mass"})
+    case = scenes.scene(
+        nodes, links, 2.0, numerics, probes, every=0.05, exact={"name": "spring-mass"}
+    )
     case, found = solved(case)
 
     def rates(_, y):
@@ -265,12 +340,18 @@ def test_a_mass_on_springs_is_that_of_scipy(damping):
         return [v, (left - right + 25.0 - damping * v) / 4.0]
 
     t = np.linspace(0.0, 2.0, 21)
-    truth = solve_ivp(rates, (0, 2), [1.0, 0.5], t_eval=t, rtol=1e-12, atol=1e-14, max_step=5e-3, method="DOP853").y
+    truth = solve_ivp(
+        rates, (0, 2), [1.0, 0.5], t_eval=t, rtol=1e-12, atol=1e-14, max_step=5e-3, method="DOP853"
+    ).y
     assert found.probe(probe(case, "body.position"), t) == approx(truth[0], abs=1e-9)
     assert found.probe(probe(case, "body.velocity"), t) == approx(truth[1], abs=1e-8)
     run = outcome(case)
-    assert run.rows[:, 1] == approx(found.probe(probe(case, "body.position"), run.rows[:, 0]), abs=1e-7)
-    case, found = solved(load(case, {"numerics.initial": "equilibrium", "nodes.body.initial_velocity": 0}))
+    assert run.rows[:, 1] == approx(
+        found.probe(probe(case, "body.position"), run.rows[:, 0]), abs=1e-7
+    )
+    case, found = solved(
+        load(case, {"numerics.initial": "equilibrium", "nodes.body.initial_velocity": 0})
+    )
     rests = 1.0 + (600.0 * -0.1 - 12.0 + 25.0) / 900.0
     assert outcome(case).rows[:, 1] == approx(rests, abs=1e-14)
     assert found.probe(probe(case, "body.position"), t) == approx(rests, abs=1e-14)
@@ -284,7 +365,9 @@ SCHEDULES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("schedule", SCHEDULES, ids=["constant", "linear", "ramp", "step", "smooth"])
+@pytest.mark.parametrize(
+    "schedule", SCHEDULES, ids=["constant", "linear", "ramp", "step", "smooth"]
+)
 def test_schedules_have_the_values_that_kernels_read(schedule):
     case = pulses.front()
     case["nodes"]["gate"] = scenes.junction(schedule)
@@ -294,7 +377,9 @@ def test_schedules_have_the_values_that_kernels_read(schedule):
     index = int(model.tables.nodes[model.node_names.index("gate")]["schedule"])
     t = np.array([0.0, 0.1, 0.15, 0.2, 0.33, 0.5, 0.7])
     read = [
-        value_with_limit(model.tables.schedules, model.tables.pieces, index, float(s), np.inf) / scenes.RHO for s in t
+        value_with_limit(model.tables.schedules, model.tables.pieces, index, float(s), np.inf)
+        / scenes.RHO
+        for s in t
     ]
     assert value(model.case.nodes["gate"].demand, t) == approx(read, abs=1e-14)
     assert value(model.case.nodes["gate"].demand, t - 1e-12) == approx(
@@ -311,7 +396,9 @@ def test_averages_of_a_polynomial_are_exact():
 def test_a_case_retains_its_exact_solution_when_written_out(tmp_path):
     case = load("cases/gradual-closure.toml")
     (tmp_path / "again.toml").write_text(case.resolved(), encoding="utf-8")
-    assert load(tmp_path / "again.toml") == case and load(tmp_path / "again.toml").exact.name == "rays"
+    assert (
+        load(tmp_path / "again.toml") == case and load(tmp_path / "again.toml").exact.name == "rays"
+    )
 
 
 def changed(case: dict, where: str, value) -> dict:
@@ -352,13 +439,19 @@ def test_settings_that_leave_no_exact_solution_take_it_out():
     assert case.exact is None and "exact" not in case.table()
     assert load(case, {"fluid.law": "log"}).exact is None
     assert load(case, {"links.main.friction": {"model": "none"}}).exact.name == "rays"
-    refused("cases/gradual-closure.toml", "without friction", set={**friction, "exact.name": "rays"})
+    refused(
+        "cases/gradual-closure.toml", "without friction", set={**friction, "exact.name": "rays"}
+    )
 
 
 SHIPPED = sorted(path.name for path in folders.CASES.glob("*.toml"))
 
 
-IN_TURN = [(file, [*exact.NAMES][(k + j) % len(exact.NAMES)]) for k, file in enumerate(SHIPPED) for j in range(3)]
+IN_TURN = [
+    (file, [*exact.NAMES][(k + j) % len(exact.NAMES)])
+    for k, file in enumerate(SHIPPED)
+    for j in range(3)
+]
 
 
 @pytest.mark.parametrize("file, name", IN_TURN)
@@ -377,12 +470,21 @@ def unsupported_case(name: str) -> dict:
     held = {"a": scenes.reservoir(3e5), "b": scenes.reservoir(2e5)}
     if name == "column":
         main = {"type": "rigid-column", "from": "a", "to": "b", "length": 9.0, "diameter": 0.1}
-        links = {"main": main | {"friction": scenes.NO_FRICTION}, "stray": scenes.valve("b", "a", 1e-4)}
+        links = {
+            "main": main | {"friction": scenes.NO_FRICTION},
+            "stray": scenes.valve("b", "a", 1e-4),
+        }
         return scenes.scene(held, links, 1.0, {}, exact={"name": name})
-    bodies = {"wall": {"type": "frame", "initial_position": 0.0}, "far": {"type": "frame", "initial_position": 2.0},
-              "load": {"type": "mass", "mass": 1.0, "initial_position": 1.0, "initial_velocity": 0.0}}  # fmt: skip
+    bodies = {
+        "wall": {"type": "frame", "initial_position": 0.0},
+        "far": {"type": "frame", "initial_position": 2.0},
+        "load": {"type": "mass", "mass": 1.0, "initial_position": 1.0, "initial_velocity": 0.0},
+    }
     spring = {"type": "spring", "stiffness": 100.0, "preload": 0.0}
-    links = {"own": spring | {"from": "wall", "to": "load"}, "stray": spring | {"from": "wall", "to": "far"}}
+    links = {
+        "own": spring | {"from": "wall", "to": "load"},
+        "stray": spring | {"from": "wall", "to": "far"},
+    }
     return scenes.scene(bodies, links, 1.0, {}, exact={"name": name})
 
 
@@ -394,13 +496,25 @@ def test_a_part_of_a_known_kind_in_the_wrong_place_is_refused(name):
 # laminar line -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ends, distance", [(("tank", "gate"), [64.0, 64.0]), (("gate", "tank"), [36.0, 36.0])])
+@pytest.mark.parametrize(
+    "ends, distance", [(("tank", "gate"), [64.0, 64.0]), (("gate", "tank"), [36.0, 36.0])]
+)
 def test_the_wave_front_in_a_laminar_line_moves_from_the_demand_at_the_wave_speed(ends, distance):
     """The demand jumps at 10 ms; the front is 36 m from it 30 ms later, and on its way back 137 ms later."""
     nodes = {"tank": scenes.reservoir(6e5), "gate": scenes.junction(scenes.step(0.01, 0.0, 1e-4))}
-    links = {"line": scenes.pipe(*ends, 100.0, 0.05, 1200.0, 10, friction={"model": "unsteady", "roughness": 0.0})}
-    case = scenes.scene(nodes, links, 0.2, {"method": "rk4", "courant": 0.9}, ["gate.pressure"],
-                        exact={"name": "laminar-line"})  # fmt: skip
+    links = {
+        "line": scenes.pipe(
+            *ends, 100.0, 0.05, 1200.0, 10, friction={"model": "unsteady", "roughness": 0.0}
+        )
+    }
+    case = scenes.scene(
+        nodes,
+        links,
+        0.2,
+        {"method": "rk4", "courant": 0.9},
+        ["gate.pressure"],
+        exact={"name": "laminar-line"},
+    )
     case["fluid"]["viscosity"] = 0.05
     _, truth = solved(case)
     assert truth.kinks("line", 0.009) == approx([])

@@ -18,7 +18,10 @@ def test_steady_flows_balance_gravity_friction_and_momentum(name, data):
     flow, step = SOLUTIONS[name](x, 0.0, **data), x[1] - x[0]
     h, q = flow.depth, flow.discharge
     assert q == pytest.approx(np.full_like(x, data.get("flow", data_of(name)["flow"])))
-    friction = GRAVITY * data.get("manning", 0.0) ** 2 * q**2 / h ** (7 / 3) + data.get("factor", 0.0) * q**2 / 8 / h**2
+    friction = (
+        GRAVITY * data.get("manning", 0.0) ** 2 * q**2 / h ** (7 / 3)
+        + data.get("factor", 0.0) * q**2 / 8 / h**2
+    )
     left = np.gradient(q**2 / h + GRAVITY * h**2 / 2, step)
     right = -GRAVITY * h * np.gradient(flow.bed, step) - friction
     smooth = np.abs(np.diff(h, append=h[-1])) < 0.01
@@ -46,8 +49,13 @@ def test_a_dam_break_conserves_mass_and_momentum(right):
 
 def test_the_fan_of_dressler_without_friction_is_ritters():
     x = np.linspace(600.0, 1100.0, 501)
-    rough, smooth = SOLUTIONS["dressler"](x, 40.0, chezy=1e6), SOLUTIONS["dam-break"](x, 40.0, 6.0, 0.0, 1000.0)
-    assert rough.depth == pytest.approx(smooth.depth, rel=1e-6) and rough.u == pytest.approx(smooth.u, abs=1e-6)
+    rough, smooth = (
+        SOLUTIONS["dressler"](x, 40.0, chezy=1e6),
+        SOLUTIONS["dam-break"](x, 40.0, 6.0, 0.0, 1000.0),
+    )
+    assert rough.depth == pytest.approx(smooth.depth, rel=1e-6) and rough.u == pytest.approx(
+        smooth.u, abs=1e-6
+    )
     slower = SOLUTIONS["dressler"](x, 40.0)
     known = np.isfinite(slower.u) & (x > 1000.0)
     assert known.sum() > 50 and (slower.u < smooth.u)[known].all()
@@ -61,7 +69,10 @@ def test_the_swinging_parabola_conserves_its_water_and_obeys_newton():
         now, before, after = (SOLUTIONS["parabola"](x, t + shift) for shift in (0.0, -dt, dt))
         wet = now.depth > 1e-3
         slope = np.gradient(now.surface, x)[wet]
-        assert (after.u - before.u)[wet] / (2 * dt) == pytest.approx(-GRAVITY * slope, rel=1e-6, abs=1e-6)
+        assert (after.u - before.u)[wet] / (2 * dt) == pytest.approx(
+            -GRAVITY * slope, rel=1e-6, abs=1e-6
+        )
         assert np.ptp(now.u[wet]) == 0.0
         volumes.append(np.trapezoid(now.depth, x))
-    assert volumes == pytest.approx([2.0 / 3.0] * 3, rel=1e-6)  # of h0 (1 - s^2) over a width of 2 a
+    # of h0 (1 - s^2) over a width of 2 a
+    assert volumes == pytest.approx([2.0 / 3.0] * 3, rel=1e-6)

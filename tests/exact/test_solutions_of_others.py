@@ -41,8 +41,13 @@ GROUP = "fvsolve.exact_solutions"
 @pytest.fixture(autouse=True)
 def home(tmp_path, monkeypatch):
     """Installed package with two solutions that can be read, and three that cannot."""
-    places = {"free-mass": "carts:FREE_MASS", "rays": "carts:FREE_MASS", "lost": "carts.lost:X",
-              "function": "carts:solution", "broken": "carts.broken:X"}  # fmt: skip
+    places = {
+        "free-mass": "carts:FREE_MASS",
+        "rays": "carts:FREE_MASS",
+        "lost": "carts.lost:X",
+        "function": "carts:solution",
+        "broken": "carts.broken:X",
+    }
     files = {"carts/__init__.py": SOLUTIONS, "carts/broken.py": "1 / 0\n"}
     monkeypatch.syspath_prepend(install(tmp_path, "carts", files, {GROUP: places}))
     yield
@@ -68,10 +73,26 @@ def test_a_case_names_a_solution_of_another_package():
 @pytest.mark.parametrize(
     "name, error, message",
     [
-        ("free-mas", CaseError, 'exact.name: no exact solution named "free-mas"; did you mean "free-mass"?'),
-        ("lost", FvsolveError, "lost of .* carts.lost:X cannot be read: No module named 'carts.lost'; correct or"),
-        ("broken", FvsolveError, "broken of .* carts: carts.broken:X cannot be read: division by zero; correct or"),
-        ("function", FvsolveError, "function of .* carts:solution cannot be read: it is not an Exact; expected"),
+        (
+            "free-mas",
+            CaseError,
+            'exact.name: no exact solution named "free-mas"; did you mean "free-mass"?',
+        ),
+        (
+            "lost",
+            FvsolveError,
+            "lost of .* carts.lost:X cannot be read: No module named 'carts.lost'; correct or",
+        ),
+        (
+            "broken",
+            FvsolveError,
+            "broken of .* carts: carts.broken:X cannot be read: division by zero; correct or",
+        ),
+        (
+            "function",
+            FvsolveError,
+            "function of .* carts:solution cannot be read: it is not an Exact; expected",
+        ),
     ],
 )
 def test_a_name_that_cannot_be_used_is_explained(name, error, message):
@@ -83,9 +104,13 @@ def test_a_built_in_name_stays_built_in():
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # no other package is read
         assert exact.NAMES.load("rays").links == ("pipe", "valve", "orifice")
-        assert fvsolve.load(CASES / "two-tanks.toml").exact.name == "levelling" and "carts" not in sys.modules
+        assert (
+            fvsolve.load(CASES / "two-tanks.toml").exact.name == "levelling"
+            and "carts" not in sys.modules
+        )
     with pytest.warns(
-        RuntimeWarning, match='rays of .* carts: carts:FREE_MASS cannot be read: .* "rays" exists already'
+        RuntimeWarning,
+        match='rays of .* carts: carts:FREE_MASS cannot be read: .* "rays" exists already',
     ):
         assert len({*exact.NAMES}) == 7 + 4
 

@@ -53,18 +53,30 @@ print((highest[0] <= highest[1]).all(), abs(highest[1] - highest[2]).max() < 1e-
 
 def test_built_in_features_have_slots_of_their_own():
     headers = list(features.headers())
-    assert len({header.slot for header in headers}) == len(headers) == len(features.FEATURES.own()) == 6
+    assert (
+        len({header.slot for header in headers})
+        == len(headers)
+        == len(features.FEATURES.own())
+        == 6
+    )
     assert all(header.declaration.load().slot == header.slot for header in headers)
     assert all(header.declaration.load().wakes == header.wakes for header in headers)
 
 
 def test_a_feature_that_cannot_be_imported_is_named_and_left_out(tmp_path):
     """Every case asks the class of an entry point for its words; a fault there must not end the run."""
-    home = install(tmp_path, "broken", {"broken.py": "import no_such_module\n"}, {
-        "fvsolve.features": {"lost": "broken:Lost"}})  # fmt: skip
+    home = install(
+        tmp_path,
+        "broken",
+        {"broken.py": "import no_such_module\n"},
+        {"fvsolve.features": {"lost": "broken:Lost"}},
+    )
     done = python(home, "-m", "fvsolve", "check", "two-tanks")
     assert "lost of the entry points fvsolve.features of broken" in done.stderr
-    assert "broken:Lost cannot be read: No module named 'no_such_module'; correct or remove it" in done.stderr
+    assert (
+        "broken:Lost cannot be read: No module named 'no_such_module'; correct or remove it"
+        in done.stderr
+    )
 
 
 SAME_SLOT = """
@@ -79,7 +91,10 @@ def test_two_features_with_the_same_slot_are_refused(tmp_path, monkeypatch):
     (tmp_path / "twin.py").write_text(SAME_SLOT, encoding="utf-8")
     monkeypatch.setenv("FVSOLVE_FEATURES", str(tmp_path / "twin.py"))
     fvsolve.build(fvsolve.load("valve-closure"))  # it wakes neither
-    with pytest.raises(fvsolve.FvsolveError, match="DelayLines and Twin both have the slot 0; expected another slot"):
+    with pytest.raises(
+        fvsolve.FvsolveError,
+        match="DelayLines and Twin both have the slot 0; expected another slot",
+    ):
         fvsolve.build(fvsolve.load("valve-closure", {"numerics.pipe_model": "auto"}))
 
 
@@ -112,7 +127,13 @@ def test_no_attribute_of_a_feature_hides_a_method_of_the_protocol(name):
     """The core calls some methods only in rare studies, which would find a value in their place."""
     module = inspect.getmodule(features.FEATURES.load(name))
     classes = features.Feature, features.FeatureRun, features.FeaturePattern
-    methods = {key for one in classes for key, value in vars(one).items() if inspect.isfunction(value)}
-    nodes = [node for node in ast.walk(ast.parse(inspect.getsource(module))) if isinstance(node, ast.Attribute)]
+    methods = {
+        key for one in classes for key, value in vars(one).items() if inspect.isfunction(value)
+    }
+    nodes = [
+        node
+        for node in ast.walk(ast.parse(inspect.getsource(module)))
+        if isinstance(node, ast.Attribute)
+    ]
     assigned = {node.attr for node in nodes if isinstance(node.ctx, ast.Store)}
     assert "driven" in methods and not assigned & methods

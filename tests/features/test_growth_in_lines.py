@@ -25,7 +25,9 @@ def test_euler_gives_back_more_at_every_angle():
     for a in (0.1, 0.7):
         z = np.exp(1j * ANGLES) - 1.0
         right = np.abs((a - z) / (a + z))
-        assert np.abs(reflection_factor(method_named("euler"), a, 4.0)) == pytest.approx(right, rel=1e-12)
+        assert np.abs(reflection_factor(method_named("euler"), a, 4.0)) == pytest.approx(
+            right, rel=1e-12
+        )
         assert (right > 1.0).all()
 
 
@@ -44,15 +46,22 @@ def energy(case: dict) -> tuple[float, list]:
     warnings = run.go().warnings
     out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
     total = 0.5 * float(model.tables.nodes["stiffness"].max()) * float(run.loop.now[-1]) ** 2
-    for line, (r, l) in zip(lines_of(model), run.run_data.along(run.loop.t, out).values(), strict=True):  # noqa: E741
+    waves = run.run_data.along(run.loop.t, out).values()
+    for line, (r, l) in zip(lines_of(model), waves, strict=True):  # noqa: E741
         pipe = model.tables.pipes[line["pipe"]]
         r, l = r + 0.5 * pipe["flow"], l - 0.5 * pipe["flow"]  # noqa: E741
-        total += float(np.mean(r**2 + l**2) * line["tau"] * line["stretches"] * pipe["speed"] / pipe["area"])
-    return total, [one for one in warnings if "waves between this part and the delay lines grow" in one.text]
+        total += float(
+            np.mean(r**2 + l**2) * line["tau"] * line["stretches"] * pipe["speed"] / pipe["area"]
+        )
+    return total, [
+        one for one in warnings if "waves between this part and the delay lines grow" in one.text
+    ]
 
 
 @pytest.mark.in_turn
-@pytest.mark.parametrize("method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "ssp-rk3"])
+@pytest.mark.parametrize(
+    "method", ["euler", "implicit-midpoint", "rk4", "ssp-rk2", "trapezoid", "ssp-rk3"]
+)
 @pytest.mark.parametrize("volume", [0.6, 0.15])
 def test_stores_with_a_notice_of_growth_grow(method, volume):
     """The energy after 30 s is 1000 times that after 1 s if a notice predicts growth, otherwise at most 1.2 times.
@@ -60,7 +69,9 @@ def test_stores_with_a_notice_of_growth_grow(method, volume):
     The step is 0.24 or 0.96 of the filling time of the chamber. Jumps within steps add some energy, up to a seventh at
     the longer step.
     """
-    (early, _), (late, told) = (energy(vessel(method, 0.01, end, volume, 200)) for end in (1.0, 30.0))
+    (early, _), (late, told) = (
+        energy(vessel(method, 0.01, end, volume, 200)) for end in (1.0, 30.0)
+    )
     assert all(not one.ok for one in told)
     if told:
         assert late > 1e3 * early

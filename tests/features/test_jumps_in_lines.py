@@ -34,14 +34,19 @@ from fvsolve.features.delay_lines.kernels.line_rates import smooth_wave_linear
 from fvsolve.studies.outcome import RowSink
 
 METHODS = {
-    "euler": {"courant": 0.9}, "rk4": {"step": 0.0137}, "gauss-4": {"step": 0.05}, "rodas-5p": {"rtol": 1e-4},
-}  # fmt: skip
+    "euler": {"courant": 0.9},
+    "rk4": {"step": 0.0137},
+    "gauss-4": {"step": 0.05},
+    "rodas-5p": {"rtol": 1e-4},
+}
 
 
 def in_cells(case: dict, size: float) -> dict:
     """Case with characteristics at Courant number 1 in cells of length `size` [m]."""
-    links = {name: link | {"cells": round(link["length"] / size)} if link["type"] == "pipe" else link
-             for name, link in case["links"].items()}  # fmt: skip
+    links = {
+        name: link | {"cells": round(link["length"] / size)} if link["type"] == "pipe" else link
+        for name, link in case["links"].items()
+    }
     kept = {key: value for key, value in case["numerics"].items() if key in ("end", "start")}
     return {**case, "links": links, "numerics": kept | EXACT}
 
@@ -55,10 +60,27 @@ def same_extremes(found: fvsolve.Result, truth: fvsolve.Result, share: float) ->
 
 def stub(length: float, numerics: dict, end: float = 4.0) -> dict:
     """Case of a valve that shuts at once at the end of a short narrow pipe behind a long pipe."""
-    nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
-    links = {"main": line("lake", "j", 1000.0), "short": line("j", "gate", length, 0.15),
-             "v": valve("gate", "out", 0.00061, {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"})}  # fmt: skip
-    return scene(nodes, links, end, {"pipe_model": "delay-line", **numerics}, ["gate.head", "j.head", "v.flow"], 0.05)
+    nodes = {
+        "lake": lake(50.0),
+        "j": junction(),
+        "gate": junction(),
+        "out": {"type": "reservoir", "pressure": AMBIENT},
+    }
+    links = {
+        "main": line("lake", "j", 1000.0),
+        "short": line("j", "gate", length, 0.15),
+        "v": valve(
+            "gate", "out", 0.00061, {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"}
+        ),
+    }
+    return scene(
+        nodes,
+        links,
+        end,
+        {"pipe_model": "delay-line", **numerics},
+        ["gate.head", "j.head", "v.flow"],
+        0.05,
+    )
 
 
 @pytest.mark.in_turn
@@ -85,23 +107,67 @@ def test_three_short_lines_and_a_step_longer_than_all():
 
 
 DEVICES = {
-    "check-valve": ({"type": "check-valve", "from": "side", "to": "n", "diameter": 0.3, "loss_coefficient": 1.0}, 40.0),
-    "relief-valve": ({"type": "relief-valve", "from": "n", "to": "side", "diameter": 0.1, "set_pressure": "6 barg",
-                      "overpressure": "0.5 bar"}, 2.0),
-    "rupture-disc": ({"type": "rupture-disc", "from": "n", "to": "side", "diameter": 0.1,
-                      "burst_pressure": "6 bar"}, 2.0),
-    "pump": ({"type": "pump", "from": "side", "to": "n", "check_valve": True,
-              "curve": {"flow": [0.0, 0.05, 0.1], "head": [48.0, 40.0, 20.0]}}, 0.0),
-}  # fmt: skip
+    "check-valve": (
+        {
+            "type": "check-valve",
+            "from": "side",
+            "to": "n",
+            "diameter": 0.3,
+            "loss_coefficient": 1.0,
+        },
+        40.0,
+    ),
+    "relief-valve": (
+        {
+            "type": "relief-valve",
+            "from": "n",
+            "to": "side",
+            "diameter": 0.1,
+            "set_pressure": "6 barg",
+            "overpressure": "0.5 bar",
+        },
+        2.0,
+    ),
+    "rupture-disc": (
+        {
+            "type": "rupture-disc",
+            "from": "n",
+            "to": "side",
+            "diameter": 0.1,
+            "burst_pressure": "6 bar",
+        },
+        2.0,
+    ),
+    "pump": (
+        {
+            "type": "pump",
+            "from": "side",
+            "to": "n",
+            "check_valve": True,
+            "curve": {"flow": [0.0, 0.05, 0.1], "head": [48.0, 40.0, 20.0]},
+        },
+        0.0,
+    ),
+}
 
 
 def demand_near_device(device: str, numerics: dict, before: float, after: float) -> dict:
     """Case of a demand that changes at once, 100 m from an instantaneous device."""
     link, head = DEVICES[device]
-    nodes = {"side": lake(head), "r": lake(50.0), "n": junction(), "m": junction(step(0.5, before, after))}
+    nodes = {
+        "side": lake(head),
+        "r": lake(50.0),
+        "n": junction(),
+        "m": junction(step(0.5, before, after)),
+    }
     links = {"device": link, "p": line("n", "m", 100.0), "p2": line("m", "r", 370.0)}
     return scene(
-        nodes, links, 1.3, {"pipe_model": "delay-line", **numerics}, ["n.head", "device.flow", "p.flow@0"], 0.05
+        nodes,
+        links,
+        1.3,
+        {"pipe_model": "delay-line", **numerics},
+        ["n.head", "device.flow", "p.flow@0"],
+        0.05,
     )
 
 
@@ -121,7 +187,9 @@ def test_a_device_that_acts_before_the_arrival_of_a_jump_is_noted(device, method
         assert found["n.head"][-1] == pytest.approx(truth["n.head"][-1], rel=1e-6)
     else:
         same_extremes(found, truth, 1e-3)
-    told, right = ([(one["what"], one["time"]) for one in run.summary["events"]] for run in (found, truth))
+    told, right = (
+        [(one["what"], one["time"]) for one in run.summary["events"]] for run in (found, truth)
+    )
     assert [one for one, _ in told] == [one for one, _ in right]
     assert [t for _, t in told] == pytest.approx([t for _, t in right], abs=0.005)
 
@@ -141,9 +209,15 @@ def pulse(numerics: dict, end: float = 1.9) -> dict:
     demand = {"time": [0.0, 0.5, 0.503], "value": [0.05, 0.0, 0.05], "kind": "step"}
     nodes = {"lake": lake(50.0), "j": junction(demand), "d": junction()}
     links = {"one": line("lake", "j", 1000.0), "two": line("j", "d", 313.7)}
-    return scene(nodes, links, end, {"pipe_model": "delay-line", **numerics}, ["j.head", "d.head", "two.head@0.31"],
-                 0.05,
-                 limits={"high": {"on": "d", "quantity": "head", "maximum": 100.0}})  # fmt: skip
+    return scene(
+        nodes,
+        links,
+        end,
+        {"pipe_model": "delay-line", **numerics},
+        ["j.head", "d.head", "two.head@0.31"],
+        0.05,
+        limits={"high": {"on": "d", "quantity": "head", "maximum": 100.0}},
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -172,7 +246,12 @@ def test_small_jumps_that_arrive_together_count_by_their_sum(turn):
     for k in range(many):
         demand = {"time": [0.0, 0.5, 0.503], "value": [0.0, flow, 0.0], "kind": "step"}
         nodes[f"d{k}"], links[f"p{k}"] = junction(demand), line("j", f"d{k}", 100.0, bore)
-    numerics = {"pipe_model": "delay-line", "method": "rk4", "step": 0.0137, "delay_tolerance": 0.16}
+    numerics = {
+        "pipe_model": "delay-line",
+        "method": "rk4",
+        "step": 0.0137,
+        "delay_tolerance": 0.16,
+    }
     probe = "main.head@0.1" if turn else "main.head@0.9"  # 100 m from the junction
     case = scene(nodes, links, 0.78, numerics, [probe], 0.05)
     found = fvsolve.run(turned(case) if turn else case)
@@ -184,12 +263,20 @@ def test_small_jumps_that_arrive_together_count_by_their_sum(turn):
 @pytest.mark.parametrize("share", [0.5, 0.25, 0.3])
 def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
     """At joints of stretches and between them, rows, extremes and envelopes are those of the line turned round."""
-    nodes = {"lake": lake(50.0), "gate": junction({"start": 0.013, "duration": 0.21, "value": [0.05, 0.0]})}
+    nodes = {
+        "lake": lake(50.0),
+        "gate": junction({"start": 0.013, "duration": 0.21, "value": [0.05, 0.0]}),
+    }
     friction = {"model": "steady", "factor": 0.2}
     found = []
     for ends, at in ((("lake", "gate"), share), (("gate", "lake"), 1.0 - share)):
         links = {"main": line(*ends, 1000.0, friction=friction)}
-        numerics = {"pipe_model": "delay-line", "method": "euler", "step": 0.0137, "delay_tolerance": 0.004}
+        numerics = {
+            "pipe_model": "delay-line",
+            "method": "euler",
+            "step": 0.0137,
+            "delay_tolerance": 0.004,
+        }
         found.append(fvsolve.run(scene(nodes, links, 3.0, numerics, [f"main.head@{at}"], 0.01)))
     one, other = found
     name, turned_name = f"main.head@{share}", f"main.head@{1.0 - share}"
@@ -198,23 +285,34 @@ def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
     for key in ("minimum", "maximum", "t_min", "t_max"):
         assert getattr(same[0], key) == pytest.approx(getattr(same[1], key), abs=1e-9)
     for key in ("min_pressure", "max_pressure"):
-        assert one.envelope["main"][key] == pytest.approx(other.envelope["main"][key][::-1], abs=1e-4)
+        assert one.envelope["main"][key] == pytest.approx(
+            other.envelope["main"][key][::-1], abs=1e-4
+        )
 
 
 def test_pulses_that_cross_between_two_places_of_a_line():
     """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 
     def stop(t):
-        return {"time": [0.0, t, t + 0.002], "value": [0.0, -0.05, 0.0], "kind": "step"}  # fmt: skip
+        return {"time": [0.0, t, t + 0.002], "value": [0.0, -0.05, 0.0], "kind": "step"}
 
     nodes = {"a": junction(stop(0.5)), "b": junction(stop(0.53)), "lake": lake(50.0)}
     links = {"one": line("a", "b", 300.0, cells=2), "far": line("b", "lake", 5000.0)}
     found = fvsolve.run(
-        scene(nodes, links, 0.75, {"pipe_model": "delay-line", "method": "euler", "step": 0.02}, ["a.head"])
+        scene(
+            nodes,
+            links,
+            0.75,
+            {"pipe_model": "delay-line", "method": "euler", "step": 0.02},
+            ["a.head"],
+        )
     )
     rise = RHO * SPEED * 0.05 / (np.pi / 4 * 0.3**2)
-    greatest = np.max(found.envelope["one"]["max_pressure"]) - np.min(found.envelope["one"]["min_pressure"])
-    assert greatest == pytest.approx(1.5 * rise, rel=1e-6)  # the second pulse divides between two pipes
+    greatest = np.max(found.envelope["one"]["max_pressure"]) - np.min(
+        found.envelope["one"]["min_pressure"]
+    )
+    # the second pulse divides between two pipes
+    assert greatest == pytest.approx(1.5 * rise, rel=1e-6)
 
 
 def test_a_small_jump_leaves_its_line_though_fewer_jumps_are_on_their_way_than_before():
@@ -224,25 +322,47 @@ def test_a_small_jump_leaves_its_line_though_fewer_jumps_are_on_their_way_than_b
     """
     at, many = np.concatenate([[0.0], 0.5 + 1e-4 * np.arange(40)]), 0.05 * np.linspace(1.0, 0.0, 41)
     small = 6e-5 * 0.05
-    nodes = {"lake": lake(50.0), "side": lake(2.0), "n": junction(), "m": junction(step(0.5, 0.0, -2.0 * small)),
-             "busy": junction({"time": at.tolist(), "value": many.tolist(), "kind": "step"})}  # fmt: skip
-    links = {"disc": DEVICES["rupture-disc"][0], "p": line("n", "m", 1030.0), "p2": line("m", "lake", 5000.0),
-             "main": line("lake", "busy", 1000.0)}  # fmt: skip
-    numerics = {"pipe_model": "delay-line", "method": "euler", "step": 0.05, "delay_tolerance": 1e-9}
+    nodes = {
+        "lake": lake(50.0),
+        "side": lake(2.0),
+        "n": junction(),
+        "m": junction(step(0.5, 0.0, -2.0 * small)),
+        "busy": junction({"time": at.tolist(), "value": many.tolist(), "kind": "step"}),
+    }
+    links = {
+        "disc": DEVICES["rupture-disc"][0],
+        "p": line("n", "m", 1030.0),
+        "p2": line("m", "lake", 5000.0),
+        "main": line("lake", "busy", 1000.0),
+    }
+    numerics = {
+        "pipe_model": "delay-line",
+        "method": "euler",
+        "step": 0.05,
+        "delay_tolerance": 1e-9,
+    }
     found = fvsolve.run(scene(nodes, links, 2.7, numerics, ["n.head", "m.head"], 0.01))
     rise, start = SPEED * small / (np.pi / 4 * 0.3**2) / 9.80665, found["n.head"][0]
     for name, first, before in (("n.head", 1.53, 0.0), ("m.head", 2.56, 1.0)):
         for t, share in ((first - 0.015, before), (first + 0.015, 2.0), (first + 0.1, 2.0)):
-            assert np.interp(t, found.t, found[name]) - start == pytest.approx(share * rise, abs=1e-6 * rise), (name, t)
+            assert np.interp(t, found.t, found[name]) - start == pytest.approx(
+                share * rise, abs=1e-6 * rise
+            ), (name, t)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_arrives_before_its_jump(method):
     """With friction the flow at the lake is constant until the jump arrives at 2 s, then that of characteristics."""
-    nodes = {"lake": lake(50.0), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
+    nodes = {
+        "lake": lake(50.0),
+        "gate": junction(),
+        "out": {"type": "reservoir", "pressure": AMBIENT},
+    }
     friction = {"model": "steady", "factor": 0.01}
-    links = {"main": line("lake", "gate", 1000.0, friction=friction, minor_loss=100.0),
-             "v": valve("gate", "out", 0.01, {"time": [0.0, 1.0], "value": [1.0, 0.0], "kind": "step"})}  # fmt: skip
+    links = {
+        "main": line("lake", "gate", 1000.0, friction=friction, minor_loss=100.0),
+        "v": valve("gate", "out", 0.01, {"time": [0.0, 1.0], "value": [1.0, 0.0], "kind": "step"}),
+    }
     numerics = {"pipe_model": "delay-line", "method": method, **METHODS[method]}
     found = fvsolve.run(scene(nodes, links, 2.4, numerics, ["main.flow@0"], 0.01))
     before, flow = found.t < 1.999, found["main.flow@0"]
@@ -256,11 +376,17 @@ def test_nothing_arrives_before_its_jump(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
     """An air valve opens as a jump arrives and keeps ambient pressure, where the wave alone would give -123 m."""
-    nodes = {"lake": lake(20.0), "n": {"type": "air-valve", "inlet": 0.1, "outlet": 0.05},
-             "m": junction(step(0.5, 0.0, 0.1))}  # fmt: skip
+    nodes = {
+        "lake": lake(20.0),
+        "n": {"type": "air-valve", "inlet": 0.1, "outlet": 0.05},
+        "m": junction(step(0.5, 0.0, 0.1)),
+    }
     links = {"p": line("n", "m", 100.0), "p2": line("lake", "n", 400.0)}
-    numerics = {"pipe_model": "delay-line", "method": method,
-                **({"step": 0.002} if method == "euler" else METHODS[method])}  # fmt: skip
+    numerics = {
+        "pipe_model": "delay-line",
+        "method": method,
+        **({"step": 0.002} if method == "euler" else METHODS[method]),
+    }
     case = scene(nodes, links, 0.75, numerics, ["n.head", "p2.flow@1"], 0.01)
     found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
     assert found.extremes["n.head"].minimum > -1.0
@@ -296,7 +422,8 @@ def test_a_ramp_too_quick_for_the_steps_is_reported(length, ramp, step):
 
 LENGTH, BORE, FLOW, HEAD = 300.0, 0.3, 0.05, 50.0
 AFTER = 0.55  # time since the arrival of the jump, before any other wave [s]
-Y, JUMP = area(BORE) / SPEED, RHO * SPEED * FLOW / area(BORE)  # admittance [kg/(s Pa)], Joukowsky jump [Pa]
+# admittance [kg/(s Pa)], Joukowsky jump [Pa]
+Y, JUMP = area(BORE) / SPEED, RHO * SPEED * FLOW / area(BORE)
 NARROW, VOLUME = 4e-3, 30.0  # effective area of the valve [m2], volume of the chamber [m3]
 COLUMN = 40.0 / area(0.2)  # length over area of the column [1/m]
 COLUMN_LINK = {"type": "rigid-column", "from": "j", "to": "behind", "length": 40.0, "diameter": 0.2}
@@ -307,10 +434,23 @@ def ran(behind: dict, gap: dict, method: str, h: float) -> fvsolve.Result:
 
     The link `gap` joins the junction to the node `behind`.
     """
-    nodes = {"lake": lake(HEAD), "j": junction(), "gate": junction(step(0.1, FLOW, 0.0)), "behind": behind}
-    links = {"far": pipe("lake", "j", 2 * LENGTH, BORE, SPEED, 4), "near": pipe("j", "gate", LENGTH, BORE, SPEED, 4)}
-    numerics, end = {"pipe_model": "delay-line", "method": method, "step": h}, 0.1 + LENGTH / SPEED + AFTER
-    found = fvsolve.run(scene(nodes, {**links, "gap": gap}, end, numerics, ["behind.pressure", "gap.flow"], end))
+    nodes = {
+        "lake": lake(HEAD),
+        "j": junction(),
+        "gate": junction(step(0.1, FLOW, 0.0)),
+        "behind": behind,
+    }
+    links = {
+        "far": pipe("lake", "j", 2 * LENGTH, BORE, SPEED, 4),
+        "near": pipe("j", "gate", LENGTH, BORE, SPEED, 4),
+    }
+    numerics, end = (
+        {"pipe_model": "delay-line", "method": method, "step": h},
+        0.1 + LENGTH / SPEED + AFTER,
+    )
+    found = fvsolve.run(
+        scene(nodes, {**links, "gap": gap}, end, numerics, ["behind.pressure", "gap.flow"], end)
+    )
     assert found.reason == "finished"
     assert abs(found.ledger["mass"]["relative"]) < 1e-14
     return found
@@ -326,7 +466,11 @@ def test_a_chamber_behind_a_valve(method):
         flow = np.sqrt(half**2 + k * max(JUMP - p[0], 0.0)) - half
         return [WATER["bulk_modulus"] / (RHO * VOLUME) * flow]
 
-    exact = AMBIENT + RHO * GRAVITY * HEAD + solve_ivp(rate, (0.0, AFTER), [0.0], rtol=1e-11, atol=1e-3).y[0, -1]
+    exact = (
+        AMBIENT
+        + RHO * GRAVITY * HEAD
+        + solve_ivp(rate, (0.0, AFTER), [0.0], rtol=1e-11, atol=1e-3).y[0, -1]
+    )
     for h in (0.037, 0.017, 0.0041):
         found = ran(chamber(VOLUME), valve("j", "behind", NARROW), method, h)
         assert abs(found["behind.pressure"][-1] / exact - 1.0) < 0.6 * h**2
@@ -349,11 +493,16 @@ def test_a_store_that_fills_in_less_than_a_step_takes_no_more_than_there_is(h):
     """A small chamber next to a lake never stores more energy than the kinetic energy of the stopped flow."""
     flow, long, volume = 0.03, 317.0, 0.15
     nodes = {"lake": lake(600.0), "a": junction(step(0.0503, flow, 0.0)), "v": chamber(volume)}
-    links = {"up": pipe("lake", "a", long, BORE, 1200.0, 2), "neck": pipe("a", "v", 123.0, 0.1, 1200.0, 2)}
+    links = {
+        "up": pipe("lake", "a", long, BORE, 1200.0, 2),
+        "neck": pipe("a", "v", 123.0, 0.1, 1200.0, 2),
+    }
     numerics = {"pipe_model": "delay-line", "method": "trapezoid", "step": h}
     found = fvsolve.run(scene(nodes, links, 30.0, numerics, ["v.pressure"], 0.05))
     risen = np.max(np.abs(found["v.pressure"] - found["v.pressure"][0]))
-    assert volume * risen**2 / (2.0 * WATER["bulk_modulus"]) < RHO * flow**2 * long / (2.0 * area(BORE))
+    assert volume * risen**2 / (2.0 * WATER["bulk_modulus"]) < RHO * flow**2 * long / (
+        2.0 * area(BORE)
+    )
 
 
 def closing(start: float, numerics: dict) -> dict:
@@ -363,8 +512,12 @@ def closing(start: float, numerics: dict) -> dict:
     return case
 
 
-BOUNDED = [(stub(130.0, METHODS["euler"]), 100), (stub(130.0, METHODS["rodas-5p"]), 100),
-           (closing(-64.0, METHODS["euler"]), 0), (closing(0.0, METHODS["rk4"]), 0)]  # fmt: skip
+BOUNDED = [
+    (stub(130.0, METHODS["euler"]), 100),
+    (stub(130.0, METHODS["rodas-5p"]), 100),
+    (closing(-64.0, METHODS["euler"]), 0),
+    (closing(0.0, METHODS["rk4"]), 0),
+]
 
 
 @pytest.mark.parametrize("case, jumps_seen", BOUNDED)
@@ -377,13 +530,27 @@ def test_bounds_by_the_selection_of_cells_contain_all_waves(case, jumps_seen):
     run = Run(model, initial_state(model), RowSink(), None)
     assert run.go().finished
     past, random, checked, varied = history_of(run.run_data), np.random.default_rng(7), 0, 0.0
-    places, clock = history.offsets_of(past), history.reading_data(past, int(past[history.COUNT]) - 1)
+    places, clock = (
+        history.offsets_of(past),
+        history.reading_data(past, int(past[history.COUNT]) - 1),
+    )
     wrap = int(past[history.CAPACITY]) - 1
-    longest = max(np.diff([history.time_of(past, k) for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))]))
+    longest = max(
+        np.diff(
+            [
+                history.time_of(past, k)
+                for k in range(history.PROFILE_ENTRIES, int(past[history.COUNT]))
+            ]
+        )
+    )
     for row, wave in ((lines_of(model)[k].copy(), wave) for k in range(2) for wave in range(2)):
         bounds = history.bounds_of(places, row, 0)
-        wave_bounds.write_bounds(past, places, clock, row, 0, wave)  # anew, because those of the last entry are there
-        (ring, mask), head = history.ring_of(places, row, 0), history.jump_head(places, int(row["stretch"]), wave)
+        # anew, because those of the last entry are there
+        wave_bounds.write_bounds(past, places, clock, row, 0, wave)
+        (ring, mask), head = (
+            history.ring_of(places, row, 0),
+            history.jump_head(places, int(row["stretch"]), wave),
+        )
 
         def sent_wave(t, ring=ring, mask=mask, head=head, wave=wave):
             jumps = history.jumps_until(past, places, head, t + clock[4])
@@ -403,7 +570,8 @@ def test_bounds_by_the_selection_of_cells_contain_all_waves(case, jumps_seen):
             times = np.array([*np.linspace(begin, end, 20), *sent, *(np.array(sent) - 1e-6)])
             found = [sent_wave(t) for t in times[times >= begin]]
             assert least <= min(found) and max(found) <= greatest
-            near = np.linspace(begin - longest, min(end + longest, clock[1]), 40)  # with the entries on both sides
+            # with the entries on both sides
+            near = np.linspace(begin - longest, min(end + longest, clock[1]), 40)
             around = [sent_wave(t) for t in near]
             assert greatest - least <= 2.0 * np.ptp([*found, *around]) + 1.0
             checked, varied = checked + len(sent), max(varied, np.ptp(found))

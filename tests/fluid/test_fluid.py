@@ -45,7 +45,9 @@ def isentropic_density(name, temperature, pressure, reached) -> float:
     """Density at `reached` from the temperature of equal entropy (CoolProp's own flash has errors up to 1e-9)."""
     entropy = PropsSI("S", "T", temperature, "P", pressure, name)
     span = (temperature - 5.0, temperature + 60.0)
-    found = brentq(lambda t: PropsSI("S", "T", t, "P", reached, name) - entropy, *span, xtol=1e-11, rtol=1e-14)
+    found = brentq(
+        lambda t: PropsSI("S", "T", t, "P", reached, name) - entropy, *span, xtol=1e-11, rtol=1e-14
+    )
     return PropsSI("D", "T", found, "P", reached, name)
 
 
@@ -85,11 +87,18 @@ def test_any_pure_liquid_agrees_with_coolprop(name):
 
 @pytest.mark.parametrize(
     "name, temperature, pressure",
-    [("Water", ROOM, ATM), ("Water", 473.15, 3e6), ("n-Dodecane", ROOM, ATM), ("Propane", 320.0, 3e6)],
+    [
+        ("Water", ROOM, ATM),
+        ("Water", 473.15, 3e6),
+        ("n-Dodecane", ROOM, ATM),
+        ("Propane", 320.0, 3e6),
+    ],
 )
 def test_table_follows_the_isentrope_within_its_stated_error(name, temperature, pressure):
     table = properties(name, temperature, pressure, law="table").table
-    between = np.random.default_rng(1).uniform(table.pressure[0] * 1.001 + 1.0, table.pressure[-1], 100)
+    between = np.random.default_rng(1).uniform(
+        table.pressure[0] * 1.001 + 1.0, table.pressure[-1], 100
+    )
     truth = np.array([isentropic_density(name, temperature, pressure, p) for p in between])
     assert 0.0 < table.error < 1e-9
     assert np.max(np.abs(np.exp(hermite(table, between)) / truth - 1.0)) < table.error + 1e-11
@@ -125,7 +134,9 @@ def test_constant_modulus_is_more_than_5_kg_too_dense_at_1000_bar():
 
 
 def test_given_keys_stand_in_place_of_coolprops():
-    water = properties("Water", ROOM, ATM, density=1000.0, bulk_modulus=2e9, viscosity=1e-3, vapor_pressure=0.0)
+    water = properties(
+        "Water", ROOM, ATM, density=1000.0, bulk_modulus=2e9, viscosity=1e-3, vapor_pressure=0.0
+    )
     values = (water.density, water.bulk_modulus, water.viscosity, water.vapor_pressure)
     assert values == (1000.0, 2e9, 1e-3, 0.0)
 
@@ -173,16 +184,31 @@ def test_a_viscosity_coolprop_does_not_have_is_none():
         (("Water", ROOM, 2000.0), {}, "pressure", "2339.3"),
         (("R134a", ROOM, ATM), {}, "pressure", "expected a liquid"),
         (("Water", 373.1242958476844, ATM + 1e-3), {}, "pressure", "two-phase"),
-        (("user", ROOM, ATM), dict(density=1e3, bulk_modulus=2e9, vapor_pressure=2e5), "pressure", "vapour"),
+        (
+            ("user", ROOM, ATM),
+            dict(density=1e3, bulk_modulus=2e9, vapor_pressure=2e5),
+            "pressure",
+            "vapour",
+        ),
         (("INCOMP::DowQ", ROOM, ATM), {}, "bulk_modulus", "no compressibility"),
         (("user", ROOM, ATM), dict(density=870.0), "bulk_modulus", "`bulk_modulus` is missing"),
         (("user", ROOM, ATM), dict(bulk_modulus=1e9), "density", "`density` is missing"),
-        (("user", ROOM, ATM), dict(density=-1.0, bulk_modulus=1e9), "density", "expected a finite number above 0"),
+        (
+            ("user", ROOM, ATM),
+            dict(density=-1.0, bulk_modulus=1e9),
+            "density",
+            "expected a finite number above 0",
+        ),
         (("Water", ROOM, math.nan), {}, "pressure", "expected a finite number above 0"),
         (("Water", ROOM, ATM, "tabel"), {}, "law", 'did you mean "table"?'),
         (("user", ROOM, ATM, "table"), dict(density=1e3, bulk_modulus=2e9), "law", 'not "user"'),
         (("INCOMP::DowQ", ROOM, ATM, "table"), dict(bulk_modulus=2e9), "law", 'not "INCOMP::DowQ"'),
-        (("Water", ROOM, ATM, "table"), dict(bulk_modulus=2e9), "bulk_modulus", "leave out the key `bulk_modulus`"),
+        (
+            ("Water", ROOM, ATM, "table"),
+            dict(bulk_modulus=2e9),
+            "bulk_modulus",
+            "leave out the key `bulk_modulus`",
+        ),
         (("Nitrogen", ROOM, ATM, "table"), {}, "law", "needs a liquid"),
     ],
 )
@@ -207,7 +233,9 @@ print(json.dumps([numbers, "CoolProp" in sys.modules, "scipy" in sys.modules]))
 """
 
     def process_output():
-        return json.loads(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout)
+        return json.loads(
+            subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout
+        )
 
     cold, warm = process_output(), process_output()
     assert cold[1] is True
@@ -227,7 +255,12 @@ def test_equal_questions_give_equal_fluids_and_unequal_ones_unequal(empty_cache)
 
 
 @pytest.mark.parametrize(
-    "damage", [lambda text: "", lambda text: text[: len(text) // 2], lambda text: text.replace("998.2", "989.2", 1)]
+    "damage",
+    [
+        lambda text: "",
+        lambda text: text[: len(text) // 2],
+        lambda text: text.replace("998.2", "989.2", 1),
+    ],
 )
 def test_a_damaged_cache_file_is_computed_again(empty_cache, damage):
     density = properties("Water", ROOM, ATM).density
@@ -244,7 +277,9 @@ def test_a_new_version_of_coolprop_is_evaluated_again(empty_cache, monkeypatch):
     assert len(list(empty_cache.iterdir())) == 2
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a file in the folder's place is a different error on Windows")
+@pytest.mark.skipif(
+    os.name == "nt", reason="a file in the folder's place is a different error on Windows"
+)
 def test_a_cache_that_cannot_be_written_costs_only_time(empty_cache):
     empty_cache.parent.mkdir(parents=True, exist_ok=True)
     empty_cache.touch()
@@ -261,7 +296,8 @@ def test_an_oil_has_its_grade_at_40_degC_and_viscosity_index_100(grade):
     assert 1e6 * oil.viscosity / oil.density == approx(grade, rel=1e-12)
     hot = properties(f"ISO VG {grade}", 100 + C, ATM)
     y = 1e6 * hot.viscosity / hot.density
-    table = {5.3: 31.40, 5.4: 32.37, 6.7: 45.33, 6.8: 46.44, 8.7: 67.64, 8.8: 68.79}  # D2270, Table 1: H over Y
+    # D2270, Table 1: H over Y
+    table = {5.3: 31.40, 5.4: 32.37, 6.7: 45.33, 6.8: 46.44, 8.7: 67.64, 8.8: 68.79}
     low = max(key for key in table if key <= y)
     h = table[low] + (y - low) / 0.1 * (table[round(low + 0.1, 1)] - table[low])
     assert h == approx(grade, rel=2e-3)
@@ -289,7 +325,10 @@ def test_density_follows_the_measured_oil_and_the_petroleum_tables():
         measured = 1047.03 * (1 - 5.761668e-4 * (t + C))
         assert properties("ISO VG 32", t + C, ATM).density == approx(measured, rel=6e-3)
     assert properties("ISO VG 46", 15 + C, ATM).density == approx(876.0, rel=1e-12)
-    squeezed = properties("ISO VG 46", 40 + C, 200e5).density / properties("ISO VG 46", 40 + C, ATM).density
+    squeezed = (
+        properties("ISO VG 46", 40 + C, 200e5).density
+        / properties("ISO VG 46", 40 + C, ATM).density
+    )
     assert squeezed == approx(1.0128, abs=3e-4)  # Tait with C = 0.0733, b = 1035.6 bar
 
 
@@ -312,7 +351,16 @@ def test_the_bulk_modulus_is_isentropic_rises_with_pressure_and_falls_with_tempe
 
 
 def test_an_oil_goes_by_the_spellings_of_the_field():
-    for name in ("ISO VG 46", "iso vg 46", "ISO-VG-46", "ISO VG46", "VG 46", "HLP 46", "HLP46", "HM 46"):
+    for name in (
+        "ISO VG 46",
+        "iso vg 46",
+        "ISO-VG-46",
+        "ISO VG46",
+        "VG 46",
+        "HLP 46",
+        "HLP46",
+        "HM 46",
+    ):
         assert oil_name(name) == "ISO VG 46"
     assert oil_name("Water") is None and oil_name("INCOMP::HY45") is None
 
@@ -320,8 +368,22 @@ def test_an_oil_goes_by_the_spellings_of_the_field():
 @pytest.mark.parametrize(
     "name, temperature, pressure, law, key, text",
     [
-        ("ISO VG 22", 313.15, ATM, "log", "name", "expected one of ISO VG 32, ISO VG 46, ISO VG 68"),
-        ("ISO VG 46", 253.15, ATM, "log", "temperature", "-20 degC is outside the range of ISO VG 46"),
+        (
+            "ISO VG 22",
+            313.15,
+            ATM,
+            "log",
+            "name",
+            "expected one of ISO VG 32, ISO VG 46, ISO VG 68",
+        ),
+        (
+            "ISO VG 46",
+            253.15,
+            ATM,
+            "log",
+            "temperature",
+            "-20 degC is outside the range of ISO VG 46",
+        ),
         ("ISO VG 46", 313.15, 2e8, "log", "pressure", "above the range"),
         ("ISO VG 46", 313.15, ATM, "table", "law", "compressible fluid of CoolProp"),
         ("ISO VC 46", 313.15, ATM, "log", "name", 'did you mean "ISO VG 46"?'),

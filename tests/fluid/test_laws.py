@@ -19,7 +19,11 @@ AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
 GIVEN = {"mixture": {"air_fraction": 0.004}}  # further keys of a law
 PRESSURES = [3e4, 1e5, 2e5, 7e5, 4e6, 3e7]
 DENSE = [name for name, law in LAWS.items() if issubclass(law, DenseLaw)]
-QUESTIONS = {name: one for name, one in vars(kernels).items() if getattr(one, "__module__", "") == kernels.__name__}
+QUESTIONS = {
+    name: one
+    for name, one in vars(kernels).items()
+    if getattr(one, "__module__", "") == kernels.__name__
+}
 OF_THE_FLUID = {"log_density", "enthalpy", "pressure_of_log", "pressure_of_enthalpy"}
 
 
@@ -41,13 +45,20 @@ def a_pipe(of) -> np.void:
 def integral(f, low: float, high: float) -> float:
     """Integral of f over pressure in ln p, where gas is smooth; a table has kinks of its third derivative."""
     return quad(
-        lambda x: math.exp(x) * f(math.exp(x)), math.log(low), math.log(high), epsabs=0, epsrel=1e-11, limit=2000
+        lambda x: math.exp(x) * f(math.exp(x)),
+        math.log(low),
+        math.log(high),
+        epsabs=0,
+        epsrel=1e-11,
+        limit=2000,
     )[0]
 
 
 def test_a_case_file_can_name_exactly_these():
     (choice,) = FluidSpec.model_fields["law"].metadata
-    assert tuple(choice.words) == tuple(LAWS) and len({one.code for one in LAWS.values()}) == len(LAWS)
+    assert tuple(choice.words) == tuple(LAWS) and len({one.code for one in LAWS.values()}) == len(
+        LAWS
+    )
 
 
 def public(cls) -> set[str]:
@@ -59,12 +70,18 @@ def test_each_answers_the_same_questions():
         assert public(LinearLaw) <= public(one), name
     for name in set(DENSE):
         module = getattr(kernels, f"{name}_law")
-        answered = QUESTIONS.keys() & vars(module).keys()  # questions of walls too, if the walls of a law are its own
+        # questions of walls too, if the walls of a law are its own
+        answered = QUESTIONS.keys() & vars(module).keys()
         assert answered in (OF_THE_FLUID, QUESTIONS.keys() - {"force_of_mass"}), name
         for question in answered:
             asked = QUESTIONS[question]
-            own = inspect.signature(getattr(getattr(module, question), "py_func", getattr(module, question)))
-            assert own.parameters.keys() == inspect.signature(getattr(asked, "py_func", asked)).parameters.keys()
+            own = inspect.signature(
+                getattr(getattr(module, question), "py_func", getattr(module, question))
+            )
+            assert (
+                own.parameters.keys()
+                == inspect.signature(getattr(asked, "py_func", asked)).parameters.keys()
+            )
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -72,20 +89,30 @@ def test_density_is_the_slope_of_pressure_over_enthalpy_and_potential(name):
     one = law(name)
     for p in PRESSURES:
         rise = 1e-4 * p
-        slope = 2.0 * rise * one.rho / (one.potential_of(p + rise, 3.0) - one.potential_of(p - rise, 3.0))
+        slope = (
+            2.0
+            * rise
+            * one.rho
+            / (one.potential_of(p + rise, 3.0) - one.potential_of(p - rise, 3.0))
+        )
         assert slope == approx(one.density(p), rel=2e-7)
         assert one.pressure_of(one.potential_of(p, -40.0), -40.0) == approx(p, rel=1e-12)
         head = one.head(p, 0.0)
         assert one.pressure_under(head) == approx(p, rel=1e-11) and np.isfinite(head)
-    assert one.head(AMBIENT, 12.0) == approx(12.0) and one.open_density == approx(float(one.density(AMBIENT)))
+    assert one.head(AMBIENT, 12.0) == approx(12.0) and one.open_density == approx(
+        float(one.density(AMBIENT))
+    )
 
 
 @pytest.mark.parametrize("name", DENSE)
 def test_enthalpy_is_the_integral_of_specific_volume(name):
     one = law(name)
     for p in PRESSURES:
-        found = integral(lambda q: 1.0 / float(one.density(q)), min(p, REFERENCE), max(p, REFERENCE))
-        assert abs(one.enthalpy(p)) == approx(found, rel=5e-9, abs=1e-12)  # a table has an error of 1e-9
+        found = integral(
+            lambda q: 1.0 / float(one.density(q)), min(p, REFERENCE), max(p, REFERENCE)
+        )
+        # a table has an error of 1e-9
+        assert abs(one.enthalpy(p)) == approx(found, rel=5e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -112,7 +139,9 @@ def test_the_compiled_questions_agree_with_quadrature(name):
         assert m == approx(kernels.density(st, floats, p) * area, rel=1e-13)
         near = [kernels.mass_of_pressure(st, floats, row, p + side * rise)[0] for side in (-1, 1)]
         assert dm == approx((near[1] - near[0]) / (2.0 * rise), rel=1e-4)
-        assert value == approx(math.log(kernels.density(st, floats, p) / one.rho), rel=1e-13, abs=1e-15)
+        assert value == approx(
+            math.log(kernels.density(st, floats, p) / one.rho), rel=1e-13, abs=1e-15
+        )
         c = math.sqrt(area / dm)
         assert kernels.local_speed(st, floats, row, p) == approx(c, rel=1e-12)
         assert kernels.impedance(st, floats, row, p) == approx(m / area * c, rel=1e-12)
@@ -123,7 +152,9 @@ def test_the_compiled_questions_agree_with_quadrature(name):
         assert kernels.pressure_of_log(st, floats, 0.0, value) == approx(p, rel=1e-9)
     low, high = 3e5, 4e6
     force = kernels.thrust(st, floats, row, high) - kernels.thrust(st, floats, row, low)
-    assert force == approx(integral(lambda q: kernels.wall_area(st, floats, row, q), low, high), rel=1e-10)
+    assert force == approx(
+        integral(lambda q: kernels.wall_area(st, floats, row, q), low, high), rel=1e-10
+    )
     change = integral(lambda q: 1.0 / kernels.impedance(st, floats, row, q), low, high)
     assert kernels.velocity_change(st, floats, row, low, high) == approx(change, rel=1e-7)
 
@@ -133,8 +164,16 @@ def answers(name: str, code: int | None = None) -> dict[str, np.ndarray]:
     one = law(name)
     st, row = one.st.copy(), a_pipe(one)
     st["law"] = st["law"] if code is None else code
-    given = {"h": 900.0, "compliance": 1e-10, "q": 1e-4, "pipe": row, "m": 1.0005 * one.rho * row["area"], "p": 1.3e6,
-             "p_from": 1e6, "p_to": 2e6}  # fmt: skip
+    given = {
+        "h": 900.0,
+        "compliance": 1e-10,
+        "q": 1e-4,
+        "pipe": row,
+        "m": 1.0005 * one.rho * row["area"],
+        "p": 1.3e6,
+        "p_from": 1e6,
+        "p_to": 2e6,
+    }
     found = {}
     for question, asked in QUESTIONS.items():
         names = [*inspect.signature(getattr(asked, "py_func", asked)).parameters][2:]
@@ -160,5 +199,7 @@ def test_a_code_that_is_no_law_of_theirs_gives_nan(code):
 def test_a_mixture_with_nothing_mixed_in_is_log():
     fluid = properties("Water", 293.15, REFERENCE, law="mixture")
     plain = LAWS["mixture"](fluid, AMBIENT, GRAVITY)
-    assert np.array_equal(plain.density(np.array(PRESSURES)), law("log").density(np.array(PRESSURES)))
+    assert np.array_equal(
+        plain.density(np.array(PRESSURES)), law("log").density(np.array(PRESSURES))
+    )
     assert plain.family == "barotropic" and not plain.cavitates

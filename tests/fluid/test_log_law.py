@@ -5,16 +5,31 @@ import pytest
 from reference import scenes
 from reference.log_law import LogFluid, Riemann, SimpleWave
 from reference.orders import observed_order
-from reference.scenes import AMBIENT, chamber, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
+from reference.scenes import (
+    AMBIENT,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    stiff_pipe,
+    valve,
+)
 from scipy.optimize import brentq
 
 import fvsolve
 
 EXACT = LogFluid(1000.0, 1e5, AMBIENT)
 SOFT = {
-    "name": "user", "density": 1000.0, "bulk_modulus": 1e5, "viscosity": 1e-3, "vapor_pressure": 100.0,
-    "pressure": AMBIENT, "law": "log",
-}  # fmt: skip
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": 1e5,
+    "viscosity": 1e-3,
+    "vapor_pressure": 100.0,
+    "pressure": AMBIENT,
+    "law": "log",
+}
 C = 10.0
 LENGTH, DIAMETER, END = 100.0, 0.5, 1.8
 AREA = scenes.area(DIAMETER)
@@ -23,7 +38,9 @@ AREA = scenes.area(DIAMETER)
 def resting_pipe(cells: int, **numerics) -> fvsolve.Model:
     """Model of a closed pipe at reference pressure with a distant reservoir; only its inside is used."""
     nodes = {"left": reservoir(AMBIENT), "right": junction()}
-    links = {"main": stiff_pipe("left", "right", LENGTH, DIAMETER, cells, friction=scenes.NO_FRICTION)}
+    links = {
+        "main": stiff_pipe("left", "right", LENGTH, DIAMETER, cells, friction=scenes.NO_FRICTION)
+    }
     case = scene(nodes, links, 10.0, numerics, ["right.pressure"], 0.1, fluid=SOFT)
     return fvsolve.build(fvsolve.load(case))
 
@@ -64,7 +81,9 @@ def riemann_run(name: str, cells: int, scheme: str, method: str = "ssp-rk3"):
     riemann = Riemann(EXACT, left, right)
     sampled = []
     for place in x[inner]:
-        rays = [(place - LENGTH / 2 + LENGTH / cells * s) / END for s in (np.arange(8) + 0.5) / 8 - 0.5]
+        rays = [
+            (place - LENGTH / 2 + LENGTH / cells * s) / END for s in (np.arange(8) + 0.5) / 8 - 0.5
+        ]
         found = np.array([(EXACT.rho(p), EXACT.rho(p) * u) for p, u in map(riemann.at, rays)])
         sampled.append(found.mean(axis=0))
     exact = np.array(sampled).T
@@ -79,7 +98,9 @@ def test_riemann_problem_reaches_the_exact_middle_state(name, scheme):
     x, found, exact, riemann = riemann_run(name, 400, scheme)
     p, u = riemann.middle()
     inside = np.abs(x / END - u) < 0.5 * C
-    jump = max(abs(EXACT.rho(s[0]) - EXACT.rho(p)) + EXACT.rho(p) / C * abs(s[1] - u) for s in STATES[name])
+    jump = max(
+        abs(EXACT.rho(s[0]) - EXACT.rho(p)) + EXACT.rho(p) / C * abs(s[1] - u) for s in STATES[name]
+    )
     assert inside.sum() > 20
     assert found[0][inside] == pytest.approx(float(EXACT.rho(p)), abs=1e-3 * jump)
     assert found[1][inside] == pytest.approx(float(EXACT.rho(p) * u), abs=1e-3 * jump * C)
@@ -182,7 +203,9 @@ def simple_wave_error(cells: int, scheme: str, height: float = 2.0) -> float:
     def velocity(x):
         return height * np.exp(-(((x - centre) / width) ** 2))
 
-    wave = SimpleWave(EXACT, AMBIENT, velocity, lambda x: -2 * (x - centre) / width**2 * velocity(x))
+    wave = SimpleWave(
+        EXACT, AMBIENT, velocity, lambda x: -2 * (x - centre) / width**2 * velocity(x)
+    )
     edges = np.linspace(0, LENGTH, cells + 1)
     assert 0.4 < end / wave.breaks(edges) < 0.7
     model = resting_pipe(cells, scheme=scheme, method="dormand-prince", courant=0.5)
@@ -191,12 +214,21 @@ def simple_wave_error(cells: int, scheme: str, height: float = 2.0) -> float:
     state = fvsolve.advance(model, state, end)
     rho, flux = wave.averages(edges, end)
     found = read(state, cells)
-    return float(np.mean(np.abs(found[0] - rho)) / np.ptp(rho) + np.mean(np.abs(found[1] - flux)) / np.ptp(flux))
+    return float(
+        np.mean(np.abs(found[0] - rho)) / np.ptp(rho)
+        + np.mean(np.abs(found[1] - flux)) / np.ptp(flux)
+    )
 
 
 @pytest.mark.parametrize(
     "scheme, order, cells",
-    [("upwind", 1, 800), ("muscl", 2, 400), ("upwind3", 3, 400), ("upwind5", 5, 800), ("weno5", 5, 800)],
+    [
+        ("upwind", 1, 800),
+        ("muscl", 2, 400),
+        ("upwind3", 3, 400),
+        ("upwind5", 5, 800),
+        ("weno5", 5, 800),
+    ],
 )
 def test_a_smooth_simple_wave_is_followed_at_the_order_of_the_scheme(scheme, order, cells):
     errors = [simple_wave_error(n, scheme) for n in (cells, 2 * cells)]
@@ -210,7 +242,9 @@ def test_a_simple_wave_leaves_the_other_family_alone():
     def velocity(x):
         return 0.5 * np.exp(-(((x - centre) / width) ** 2))
 
-    wave = SimpleWave(EXACT, AMBIENT, velocity, lambda x: -2 * (x - centre) / width**2 * velocity(x))
+    wave = SimpleWave(
+        EXACT, AMBIENT, velocity, lambda x: -2 * (x - centre) / width**2 * velocity(x)
+    )
     model = resting_pipe(200, scheme="upwind5", method="rk4", courant=0.5)
     state = fvsolve.initial_state(model)
     fill(state, *wave.averages(np.linspace(0, LENGTH, 201), 0.0))
@@ -247,7 +281,9 @@ def test_under_the_table_law_a_stopped_stream_rises_along_the_isentrope_of_coolp
     def volume(q: float) -> float:
         return 1 / PropsSI("D", "P", q, "S", entropy, "Water")
 
-    wanted = brentq(lambda q: (q - p) * (volume(p) - volume(q)) - u**2, p + 1e6, p + 1e8, rtol=1e-13)
+    wanted = brentq(
+        lambda q: (q - p) * (volume(p) - volume(q)) - u**2, p + 1e6, p + 1e8, rtol=1e-13
+    )
     found = result["gate.pressure"][(result.t > 0.1) & (result.t < 0.5)]
     assert u == pytest.approx(velocity, rel=1e-3)
     assert found - p == pytest.approx(wanted - p, rel=1e-4)
@@ -258,17 +294,34 @@ def test_a_valve_without_flow_is_solved_to_the_rounding_of_pressures(law):
     """A chamber behind a valve is in equilibrium with a flowing main; the rounding of its drop causes no flow."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 1e-4}}
     nodes = {
-        "hill": lake(60.0), "low": lake(40.0), "top": junction(elevation=48.0), "fork": junction(elevation=5.0),
+        "hill": lake(60.0),
+        "low": lake(40.0),
+        "top": junction(elevation=48.0),
+        "fork": junction(elevation=5.0),
         "pot": chamber(0.1, elevation=20.0),
-    }  # fmt: skip
+    }
     links = {
         "up": pipe("hill", "top", 200.0, 0.1, 1200.0, 12, **rough),
         "down": pipe("top", "fork", 300.0, 0.1, 1100.0, 18, **rough),
         "on": pipe("fork", "low", 150.0, 0.08, 1200.0, 9, **rough),
         "neck": valve("fork", "pot", 1e-4),
     }
-    fluid = {"name": "user", "density": 870.0, "bulk_modulus": 1.7e9, "viscosity": 0.04, "vapor_pressure": 10.0, **law}
-    case = scene(nodes, links, 0.5, {"scheme": "weno5", "method": "rk4", "courant": 0.4}, ["pot.pressure"], fluid=fluid)
+    fluid = {
+        "name": "user",
+        "density": 870.0,
+        "bulk_modulus": 1.7e9,
+        "viscosity": 0.04,
+        "vapor_pressure": 10.0,
+        **law,
+    }
+    case = scene(
+        nodes,
+        links,
+        0.5,
+        {"scheme": "weno5", "method": "rk4", "courant": 0.4},
+        ["pot.pressure"],
+        fluid=fluid,
+    )
     done = fvsolve.run(case)
     assert done.ok, done.reason
     assert np.ptp(done["pot.pressure"]) == 0.0
@@ -291,16 +344,30 @@ def test_flows_that_are_given_are_volumes_at_the_reference_density(where):
 @pytest.mark.parametrize("law", ["log", "table"])
 @pytest.mark.parametrize("heads", [(60.0, 58.0), (58.0, 60.0), (60.0, 59.99)])
 @pytest.mark.parametrize("length, diameter", [(30.0, 0.5), (2.0, 2.0), (1.0, 0.05), (500.0, 1.5)])
-def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(law, heads, length, diameter):
+def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(
+    law, heads, length, diameter
+):
     """f L / D v^2 / 2 + v^2 / 2 = g dH, also if the jet takes more than friction, or nearly everything."""
     fluid = {**scenes.WATER, "law": "log"} if law == "log" else {"name": "Water", "law": "table"}
     factor = 0.011
     friction = {"model": "quasi-steady", "factor": factor}
     links = {"main": stiff_pipe("a", "b", length, diameter, 4, friction=friction)}
     model = fvsolve.build(
-        fvsolve.load(scene({"a": lake(heads[0]), "b": lake(heads[1])}, links, 1.0, {}, ["main.flow"], 0.1, fluid=fluid))
+        fvsolve.load(
+            scene(
+                {"a": lake(heads[0]), "b": lake(heads[1])},
+                links,
+                1.0,
+                {},
+                ["main.flow"],
+                0.1,
+                fluid=fluid,
+            )
+        )
     )
-    asked = np.sqrt(2.0 * scenes.GRAVITY * abs(heads[0] - heads[1]) / (factor * length / diameter + 1.0))
+    asked = np.sqrt(
+        2.0 * scenes.GRAVITY * abs(heads[0] - heads[1]) / (factor * length / diameter + 1.0)
+    )
     assert abs(model.checks["pipes"]["main"]["velocity"]) == pytest.approx(asked, rel=1e-3)
     still = np.abs(model.rhs(0.0, fvsolve.initial_state(model).y))
     assert still.max() <= 1e-9 * abs(model.checks["pipes"]["main"]["velocity"]) * 1000.0
@@ -308,7 +375,11 @@ def test_a_short_wide_pipe_starts_with_its_friction_and_the_jet_that_leaves_it(l
 
 def test_heads_beyond_the_range_of_a_law_are_refused_by_the_name_of_the_pipe():
     fluid = {"name": "Water", "law": "table"}
-    links = {"main": stiff_pipe("a", "b", 1.0, 2.0, 4, friction={"model": "quasi-steady", "factor": 0.01})}
+    links = {
+        "main": stiff_pipe(
+            "a", "b", 1.0, 2.0, 4, friction={"model": "quasi-steady", "factor": 0.01}
+        )
+    }
     case = scene({"a": lake(1e6), "b": lake(0.0)}, links, 1.0, {}, ["main.flow"], 0.1, fluid=fluid)
     with pytest.raises(fvsolve.FvsolveError, match="main"):
         fvsolve.build(fvsolve.load(case))

@@ -82,7 +82,11 @@ def test_a_state_from_bytes_continues_with_the_same_bits(name, slave):
         running.do_step(k * step, step)
     stored = running._get_fmu_state()
     data = running._fmu_state_to_bytes(stored)
-    assert data == running._fmu_state_to_bytes(stored) == running._fmu_state_to_bytes(running._get_fmu_state())
+    assert (
+        data
+        == running._fmu_state_to_bytes(stored)
+        == running._fmu_state_to_bytes(running._get_fmu_state())
+    )
 
     def last() -> tuple:
         for k in range(3, 6):
@@ -106,19 +110,27 @@ def test_the_description_states_variables_units_and_ranges():
     root = description_of(case)
     real = {entry.get("name"): entry.find("Real").attrib for entry in root.iter("ScalarVariable")}
     causality = {entry.get("name"): entry.get("causality") for entry in root.iter("ScalarVariable")}
-    assert [name for name in real if causality[name] == "output"] == [probe.text for probe in case.probes]
-    assert real["lake.head"]["unit"] == "m" and float(real["lake.head"]["start"]) == pytest.approx(112.0)
+    assert [name for name in real if causality[name] == "output"] == [
+        probe.text for probe in case.probes
+    ]
+    assert real["lake.head"]["unit"] == "m" and float(real["lake.head"]["start"]) == pytest.approx(
+        112.0
+    )
     assert real["generator.torque"] == {"start": "-600000.0", "unit": "N m"}
     assert real["unit.speed"] == {"unit": "rad/s", "displayUnit": "rpm"}
-    assert "unit.opening" not in real and "controls.governor.output" not in real  # a control drives both
+    # a control drives both
+    assert "unit.opening" not in real and "controls.governor.output" not in real
     assert real["controls.governor.setpoint"] == {"start": "1.0", "unit": "1"}
     unit = {entry.get("name"): entry for entry in root.iter("Unit")}
     assert unit["Pa"].find("BaseUnit").attrib == {"kg": "1", "m": "-1", "s": "-2"}
     assert unit["rad/s"].find("BaseUnit").attrib == {"s": "-1", "rad": "1"}
     rpm = unit["rad/s"].find("DisplayUnit")
-    assert float(rpm.get("factor")) == pytest.approx(30.0 / np.pi) and float(rpm.get("offset")) == 0.0
+    assert (
+        float(rpm.get("factor")) == pytest.approx(30.0 / np.pi) and float(rpm.get("offset")) == 0.0
+    )
     unknowns = [entry.get("index") for entry in root.iter("Unknown")]
-    assert unknowns[: len(unknowns) // 2] == unknowns[len(unknowns) // 2 :]  # Outputs, then InitialUnknowns
+    # Outputs, then InitialUnknowns
+    assert unknowns[: len(unknowns) // 2] == unknowns[len(unknowns) // 2 :]
 
 
 def test_a_gauge_unit_of_the_output_has_an_offset():
@@ -127,17 +139,22 @@ def test_a_gauge_unit_of_the_output_has_an_offset():
     display = pascal.find("DisplayUnit[@name='barg']")
     assert float(display.get("factor")) == pytest.approx(1e-5)
     assert float(display.get("offset")) == pytest.approx(-1.01325)
-    opening = next(entry for entry in root.iter("ScalarVariable") if entry.get("name") == "valve.opening")
+    opening = next(
+        entry for entry in root.iter("ScalarVariable") if entry.get("name") == "valve.opening"
+    )
     assert opening.find("Real").attrib == {"start": "1.0", "min": "0.0", "max": "1.0", "unit": "1"}
 
 
 @pytest.mark.parametrize("unit", ["1", "m3/s/Pa", "W/m2/K", "N m/rad", "ohm", "kg m2/s"])
 def test_base_units_multiply_to_the_unit(unit):
     known = {
-        "1": {}, "m3/s/Pa": {"m": "4", "s": "1", "kg": "-1"}, "W/m2/K": {"kg": "1", "s": "-3", "K": "-1"},
+        "1": {},
+        "m3/s/Pa": {"m": "4", "s": "1", "kg": "-1"},
+        "W/m2/K": {"kg": "1", "s": "-3", "K": "-1"},
         "N m/rad": {"kg": "1", "m": "2", "s": "-2", "rad": "-1"},
-        "ohm": {"kg": "1", "m": "2", "s": "-3", "A": "-2"}, "kg m2/s": {"kg": "1", "m": "2", "s": "-1"},
-    }  # fmt: skip
+        "ohm": {"kg": "1", "m": "2", "s": "-3", "A": "-2"},
+        "kg m2/s": {"kg": "1", "m": "2", "s": "-1"},
+    }
     assert base_exponents(unit) == known[unit]
 
 
@@ -149,7 +166,10 @@ def test_names_that_an_input_and_a_probe_share_are_refused_together(fvs, tmp_pat
         assert f'"{name}" is the name of an input and of a probe' in str(refused.value)
         assert f'expected "links.{name}" for the probe' in str(refused.value)
     probes = {"output.probes": ["spiral.head", "links.unit.speed", "links.unit.opening"]}
-    names = [variable.name for variable in variables_of(fvsolve.build(fvsolve.load("hydropower", probes)))]
+    names = [
+        variable.name
+        for variable in variables_of(fvsolve.build(fvsolve.load("hydropower", probes)))
+    ]
     assert len({*names}) == len(names) and {"unit.speed", "links.unit.speed"} <= {*names}
 
 
@@ -162,7 +182,9 @@ def test_an_input_without_effect_is_none():
 
 def test_the_head_and_the_pressure_of_a_reservoir_are_held_by_the_last_value(slave):
     running = slave("valve-closure")
-    start = dict(zip(("lake.head", "lake.pressure"), running.get("lake.head", "lake.pressure"), strict=True))
+    start = dict(
+        zip(("lake.head", "lake.pressure"), running.get("lake.head", "lake.pressure"), strict=True)
+    )
     running.set("lake.pressure", 7e5)
     running.set("lake.head", 50.0)
     assert running.held == {"lake.head": 50.0}
@@ -172,7 +194,11 @@ def test_the_head_and_the_pressure_of_a_reservoir_are_held_by_the_last_value(sla
 def test_values_out_of_range_and_outputs_are_refused_in_words(slave, capsys):
     running = slave("valve-closure")
     for name, value, words in (
-        ("valve.opening", 1.5, "valve.opening = 1.5 is out of range; expected a number from 0, shut, to 1, open"),
+        (
+            "valve.opening",
+            1.5,
+            "valve.opening = 1.5 is out of range; expected a number from 0, shut, to 1, open",
+        ),
         ("lake.pressure", np.nan, "lake.pressure = nan is not finite"),
         ("gate.head", 1.0, "gate.head is an output of the FMU"),
     ):
@@ -187,7 +213,10 @@ def test_times_of_the_host_are_checked_in_words(slave, capsys):
     running = slave("two-tanks")
     running.setup_experiment(0.0, 320.0, None)
     assert capsys.readouterr().err == ""
-    with pytest.raises(FvsolveError, match="the start time is 5 s, but the case starts at 0 s; expected startTime = 0"):
+    with pytest.raises(
+        FvsolveError,
+        match="the start time is 5 s, but the case starts at 0 s; expected startTime = 0",
+    ):
         running.setup_experiment(5.0, None, None)
     capsys.readouterr()
     running.setup_experiment(0.0, 400.0, None)
@@ -223,10 +252,15 @@ def test_a_missing_package_is_named_with_its_remedy(fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "pythonfmu", None)
     code, printed, error = fvs("fmu", "two-tanks")
-    assert code == 2 and error.strip() == 'an FMU needs the package PythonFMU: pip install "fvsolve[fmi]"'
+    assert (
+        code == 2
+        and error.strip() == 'an FMU needs the package PythonFMU: pip install "fvsolve[fmi]"'
+    )
     assert not [*tmp_path.glob("*.fmu")]
 
 
 def test_a_name_of_another_type_is_refused(tmp_path):
-    with pytest.raises(FvsolveError, match=r"tanks.zip: unknown type of file; expected a name that ends in .fmu"):
+    with pytest.raises(
+        FvsolveError, match=r"tanks.zip: unknown type of file; expected a name that ends in .fmu"
+    ):
         write_fmu(fvsolve.load("two-tanks"), str(tmp_path / "tanks.zip"))

@@ -32,11 +32,17 @@ class Host:
         self.description = fmpy.read_model_description(str(path))
         unpacked = fmpy.extract(str(path), str(folder))
         identifier = self.description.coSimulation.modelIdentifier
-        self.fmu = FMU2Slave(guid=self.description.guid, unzipDirectory=unpacked, modelIdentifier=identifier,
-                             instanceName=name)  # fmt: skip
+        self.fmu = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=unpacked,
+            modelIdentifier=identifier,
+            instanceName=name,
+        )
         variables = self.description.modelVariables
         self.reference = {variable.name: variable.valueReference for variable in variables}
-        self.listed = [variable.valueReference for variable in variables if variable.causality == "output"]
+        self.listed = [
+            variable.valueReference for variable in variables if variable.causality == "output"
+        ]
         self.fmu.instantiate()
         self.begin()
 
@@ -69,12 +75,16 @@ def host(tmp_path):
         running.fmu.freeInstance()
 
 
-@pytest.mark.parametrize("name", [*CASES, "valve-closure", "digital-pressure", "dc-motor-pump", "tracer-basin"])
+@pytest.mark.parametrize(
+    "name", [*CASES, "valve-closure", "digital-pressure", "dc-motor-pump", "tracer-basin"]
+)
 def test_validation_finds_nothing(name, tmp_path):
     path, variables = write_fmu(fvsolve.load(name), tmp_path / f"{name}.fmu")
     assert validate_fmu(str(path)) == []
     description = fmpy.read_model_description(str(path))
-    assert [variable.name for variable in description.modelVariables] == [variable.name for variable in variables]
+    assert [variable.name for variable in description.modelVariables] == [
+        variable.name for variable in variables
+    ]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -116,7 +126,9 @@ def test_two_fmus_share_a_process(host):
 def test_the_driver_of_fmpy_reaches_the_end_of_the_case(tmp_path):
     path, _ = write_fmu(fvsolve.load("two-tanks"), tmp_path / "two-tanks.fmu")
     result = fmpy.simulate_fmu(str(path))
-    assert result["time"][-1] == pytest.approx(320.0) and result["high.level"][-1] == pytest.approx(3.0, abs=1e-6)
+    assert result["time"][-1] == pytest.approx(320.0) and result["high.level"][-1] == pytest.approx(
+        3.0, abs=1e-6
+    )
 
 
 def test_the_same_case_gives_the_same_file_with_the_files_of_the_case(tmp_path):
@@ -124,8 +136,13 @@ def test_the_same_case_gives_the_same_file_with_the_files_of_the_case(tmp_path):
     assert paths[0].read_bytes() == paths[1].read_bytes()
     with zipfile.ZipFile(paths[0]) as archive:
         names = {*archive.namelist()}
-        assert {"resources/case/governor.toml", "resources/case/hydropower.csv", "binaries/linux64/governor.so",
-                "binaries/win64/governor.dll", "documentation/index.html"} <= names  # fmt: skip
+        assert {
+            "resources/case/governor.toml",
+            "resources/case/hydropower.csv",
+            "binaries/linux64/governor.so",
+            "binaries/win64/governor.dll",
+            "documentation/index.html",
+        } <= names
         assert b"needs Python 3.11 or later with fvsolve" in archive.read("modelDescription.xml")
 
 
@@ -133,7 +150,10 @@ BEFORE = {
     "another version": "import fvsolve; fvsolve.__version__ = '0.0.9'",
     "no fvsolve": "import sys; sys.modules['fvsolve'] = None",
 }
-FOUND = {"another version": "the host has fvsolve 0.0.9", "no fvsolve": "fvsolve cannot be imported"}
+FOUND = {
+    "another version": "the host has fvsolve 0.0.9",
+    "no fvsolve": "fvsolve cannot be imported",
+}
 
 
 @pytest.mark.parametrize("before", BEFORE)
@@ -152,7 +172,10 @@ def test_the_command_writes_the_file_and_prints_the_variables(fvs, tmp_path, mon
     code, printed, _ = fvs("fmu", "two-tanks")
     assert code == 0 and (tmp_path / "two-tanks.fmu").is_file()
     assert "hole.opening" in printed and "m3/s" in printed and "two-tanks.fmu" in printed
-    assert fvs("fmu", "two-tanks", "--out", "folder/tanks.fmu")[0] == 0 and (tmp_path / "folder/tanks.fmu").is_file()
+    assert (
+        fvs("fmu", "two-tanks", "--out", "folder/tanks.fmu")[0] == 0
+        and (tmp_path / "folder/tanks.fmu").is_file()
+    )
     code, _, error = fvs("fmu", "hydropower")
     assert code == 2 and "hydropower.toml: 2 faults" in error
 

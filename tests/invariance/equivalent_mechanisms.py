@@ -18,14 +18,18 @@ def part(probe: str) -> tuple[str, str, str]:
     name, _, what = probe.rpartition(".")
     found = (what[:-1], what[-1:])
     return (
-        (name, *found) if found[1] in "xyz" and found[0] in (*AXIAL, *POLAR) and "@" not in what else (probe, "-", "")
+        (name, *found)
+        if found[1] in "xyz" and found[0] in (*AXIAL, *POLAR) and "@" not in what
+        else (probe, "-", "")
     )
 
 
 def otherwise(case: dict) -> dict:
     """Case with its parts in reverse order, so that bodies precede their carriers."""
     restated = copy.deepcopy(case)
-    return restated | {table: dict(reversed(restated[table].items())) for table in ("nodes", "links")}
+    return restated | {
+        table: dict(reversed(restated[table].items())) for table in ("nodes", "links")
+    }
 
 
 def later(value: Any, wait: float) -> Any:
@@ -47,17 +51,36 @@ def at_a_later_time(case: dict, wait: float) -> dict:
 
 
 TEXT = {
-    "mass": (1e-3, "t"), "inertia": (1e4, "kg cm2"), "centre_of_mass": (1e3, "mm"), "points": (100.0, "cm"),
-        "at": (1e-3, "km"),
-    "velocity": (3.6, "km/h"), "axis": None, "attitude": (180.0 / math.pi, "deg"), "closed_length": (1e3, "mm"),
-    "stroke": (100.0, "cm"), "area_A": (1e4, "cm2"), "area_B": (1e6, "mm2"), "dead_volume_A": (1e3, "l"),
-    "dead_volume_B": (1e6, "ml"), "stiffness": (1e-3, "kN/m"), "free_length": (1e3, "mm"), "preload": (1e-3, "kN"),
-    "maximum": (1e3, "mm"), "force": (1e-3, "kN"), "torque": (1e-3, "kN m"), "level": (1e3, "mm"),
-        "zone": (100.0, "cm"),
-    "length": (1e3, "mm"), "diameter": (100.0, "cm"), "initial_position": (1e3, "mm"),
-        "initial_velocity": (3.6, "km/h"),
-    "travel": (1e3, "mm"), "rotational_stiffness": (1e-3, "kN m"), "thickness": (1e3, "mm"),
-}  # fmt: skip
+    "mass": (1e-3, "t"),
+    "inertia": (1e4, "kg cm2"),
+    "centre_of_mass": (1e3, "mm"),
+    "points": (100.0, "cm"),
+    "at": (1e-3, "km"),
+    "velocity": (3.6, "km/h"),
+    "axis": None,
+    "attitude": (180.0 / math.pi, "deg"),
+    "closed_length": (1e3, "mm"),
+    "stroke": (100.0, "cm"),
+    "area_A": (1e4, "cm2"),
+    "area_B": (1e6, "mm2"),
+    "dead_volume_A": (1e3, "l"),
+    "dead_volume_B": (1e6, "ml"),
+    "stiffness": (1e-3, "kN/m"),
+    "free_length": (1e3, "mm"),
+    "preload": (1e-3, "kN"),
+    "maximum": (1e3, "mm"),
+    "force": (1e-3, "kN"),
+    "torque": (1e-3, "kN m"),
+    "level": (1e3, "mm"),
+    "zone": (100.0, "cm"),
+    "length": (1e3, "mm"),
+    "diameter": (100.0, "cm"),
+    "initial_position": (1e3, "mm"),
+    "initial_velocity": (3.6, "km/h"),
+    "travel": (1e3, "mm"),
+    "rotational_stiffness": (1e-3, "kN m"),
+    "thickness": (1e3, "mm"),
+}
 
 
 def in_other_units(value: Any, key: str = "", kind: str = "") -> Any:
@@ -68,16 +91,24 @@ def in_other_units(value: Any, key: str = "", kind: str = "") -> Any:
             other = dict(value)
             for one in ("mean", "amplitude"):
                 other[one] = restated_value(
-                    value[one], "travel" if key == "travel" else "attitude" if key == "angle" else key
+                    value[one],
+                    "travel" if key == "travel" else "attitude" if key == "angle" else key,
                 )
             return other | {"period": f"{1e3 * value['period']!r} ms"}
         if key in ("points", "attitude"):
-            return {name: restated_value(one, key) if name != "matrix" else one for name, one in value.items()}
+            return {
+                name: restated_value(one, key) if name != "matrix" else one
+                for name, one in value.items()
+            }
         return {name: in_other_units(one, name, kind) for name, one in value.items()}
     if key == "angle":
         return restated_value(value, "attitude")
     if key == "rate" and kind in ("revolute", "ball", "free"):
-        return [f"{60.0 / (2.0 * math.pi) * x!r} rpm" for x in value] if isinstance(value, list) else value
+        return (
+            [f"{60.0 / (2.0 * math.pi) * x!r} rpm" for x in value]
+            if isinstance(value, list)
+            else value
+        )
     return restated_value(value, key)
 
 
@@ -85,14 +116,21 @@ def restated_value(value: Any, key: str) -> Any:
     factor = TEXT.get(key)
     if isinstance(value, list):
         return [restated_value(one, key) for one in value]
-    return value if factor is None or not isinstance(value, (int, float)) else f"{factor[0] * value!r} {factor[1]}"
+    return (
+        value
+        if factor is None or not isinstance(value, (int, float))
+        else f"{factor[0] * value!r} {factor[1]}"
+    )
 
 
 def swapped(case: dict) -> dict:
     """Case with exchanged ends of links between points."""
     other = copy.deepcopy(case)
     for link in other["links"].values():
-        if link["type"] in ("spring", "damper", "end-stop", "pin", "bushing", "force") and "from" in link:
+        if (
+            link["type"] in ("spring", "damper", "end-stop", "pin", "bushing", "force")
+            and "from" in link
+        ):
             link["from"], link["to"] = link["to"], link["from"]
         if link["type"] == "cylinder":
             link["ports"] = {"rod": link["ports"]["case"], "case": link["ports"]["rod"]}
@@ -101,7 +139,10 @@ def swapped(case: dict) -> dict:
 
 def negative(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: negative(one) if key in ("mean", "amplitude", "value") else one for key, one in value.items()}
+        return {
+            key: negative(one) if key in ("mean", "amplitude", "value") else one
+            for key, one in value.items()
+        }
     return [negative(one) for one in value] if isinstance(value, list) else -value
 
 
@@ -114,7 +155,11 @@ def reversed_axes(case: dict) -> dict:
     for node in other["nodes"].values():
         joint = node.get("joint", {})
         if "axis" in joint:
-            joint |= {key: negative(joint[key]) for key in ("axis", "angle", "travel", "rate") if key in joint}
+            joint |= {
+                key: negative(joint[key])
+                for key in ("axis", "angle", "travel", "rate")
+                if key in joint
+            }
     for link in other["links"].values():
         for key, what in (("direction", "force"), ("axis", "torque")):
             if key in link:
@@ -128,7 +173,9 @@ def rotation(given: dict | None) -> np.ndarray:
     given = given or {}
     if "matrix" in given:
         return np.array(given["matrix"])
-    return Rotation.from_euler("ZYX", [given.get(one, 0.0) for one in ("yaw", "pitch", "roll")]).as_matrix()
+    return Rotation.from_euler(
+        "ZYX", [given.get(one, 0.0) for one in ("yaw", "pitch", "roll")]
+    ).as_matrix()
 
 
 def each_attitude(case: dict):
@@ -141,15 +188,22 @@ def each_attitude(case: dict):
 
 
 FORMS = {
-    "roll, pitch, yaw": lambda r: dict(zip(("yaw", "pitch", "roll"), r.as_euler("ZYX").tolist(), strict=True)),
+    "roll, pitch, yaw": lambda r: dict(
+        zip(("yaw", "pitch", "roll"), r.as_euler("ZYX").tolist(), strict=True)
+    ),
     "zyz": lambda r: {"zyz": r.as_euler("ZYZ").tolist()},
-    "axis and angle": lambda r: {"axis": (r.as_rotvec() / max(r.magnitude(),
-        1e-300) if r.magnitude() else np.array([0, 0, 1.0])).tolist(),
-                                 "angle": float(r.magnitude())},
+    "axis and angle": lambda r: {
+        "axis": (
+            r.as_rotvec() / max(r.magnitude(), 1e-300) if r.magnitude() else np.array([0, 0, 1.0])
+        ).tolist(),
+        "angle": float(r.magnitude()),
+    },
     "Euler parameters": lambda r: {"euler_parameters": np.roll(r.as_quat(), 1).tolist()},
-    "Euler parameters, negative": lambda r: {"euler_parameters": (-np.roll(r.as_quat(), 1)).tolist()},
+    "Euler parameters, negative": lambda r: {
+        "euler_parameters": (-np.roll(r.as_quat(), 1)).tolist()
+    },
     "matrix": lambda r: {"matrix": r.as_matrix().tolist()},
-}  # fmt: skip
+}
 
 
 def attitudes(case: dict, form: str) -> dict:
@@ -195,7 +249,9 @@ def as_turned(one: Outcome, angle: float):
         name, vector, axis = part(probe)
         if vector == "-":
             return values
-        return sum(turn["xyz".index(axis), k] * one.rows[f"{name}.{vector}{'xyz'[k]}"] for k in range(3))
+        return sum(
+            turn["xyz".index(axis), k] * one.rows[f"{name}.{vector}{'xyz'[k]}"] for k in range(3)
+        )
 
     return change
 
@@ -255,7 +311,9 @@ def mirrored(case: dict, axis: int) -> dict:
         link |= {"direction": polar(link["direction"])} if "direction" in link else {}
         link |= {"axis": axial(link["axis"])} if "axis" in link else {}
     sizes = {name: node["size"] for name, node in other["nodes"].items() if node["type"] == "basin"}
-    other["output"]["probes"] = [in_mirror(probe, axis, sizes) for probe in other["output"]["probes"]]
+    other["output"]["probes"] = [
+        in_mirror(probe, axis, sizes) for probe in other["output"]["probes"]
+    ]
     return other
 
 
@@ -295,8 +353,15 @@ def split(case: dict, name: str) -> dict:
     at = np.array([0.2, -0.1, 0.3])
     other["nodes"][name] |= {"mass": whole["mass"] / 3.0, "inertia": (inertia / 3.0).tolist()}
     other["nodes"][f"{name}-rest"] = {
-        "type": "body", "mass": whole["mass"] / 1.5, "inertia": (turn.T @ inertia @ turn / 1.5).tolist(),
+        "type": "body",
+        "mass": whole["mass"] / 1.5,
+        "inertia": (turn.T @ inertia @ turn / 1.5).tolist(),
         "centre_of_mass": (turn.T @ (centre - at)).tolist(),
-        "joint": {"kind": "fixed", "on": name, "at": at.tolist(), "attitude": {"matrix": turn.tolist()}},
-    }  # fmt: skip
+        "joint": {
+            "kind": "fixed",
+            "on": name,
+            "at": at.tolist(),
+            "attitude": {"matrix": turn.tolist()},
+        },
+    }
     return other

@@ -32,7 +32,11 @@ def called(probe: str, call) -> str:
 def reordered(case: dict, nodes: list[str], links: list[str]) -> dict:
     """Case with its nodes and links in the given order."""
     said = copy.deepcopy(case)
-    return {**said, "nodes": {n: said["nodes"][n] for n in nodes}, "links": {n: said["links"][n] for n in links}}
+    return {
+        **said,
+        "nodes": {n: said["nodes"][n] for n in nodes},
+        "links": {n: said["links"][n] for n in links},
+    }
 
 
 def swapped(case: dict, chosen: set[str]) -> dict:
@@ -45,18 +49,25 @@ def swapped(case: dict, chosen: set[str]) -> dict:
             chainage, elevation = link["profile"]["chainage"], link["profile"]["elevation"]
             turned = [chainage[0] + chainage[-1] - one for one in reversed(chainage)]
             link["profile"] = {"chainage": turned, "elevation": elevation[::-1]}
-    said["output"]["probes"] = [from_other_end(probe, case, chosen) for probe in said["output"]["probes"]]
+    said["output"]["probes"] = [
+        from_other_end(probe, case, chosen) for probe in said["output"]["probes"]
+    ]
     return said
 
 
 def drawn_from_other_end(case: dict, seed: int) -> tuple[dict, dict]:
     """Case with the ends of some links swapped, and arguments `name` and `change` of `alike` for it."""
-    chosen = some_of([name for name, link in case["links"].items() if link["type"] in STRAIGHT], seed)
+    chosen = some_of(
+        [name for name, link in case["links"].items() if link["type"] in STRAIGHT], seed
+    )
 
     def sign(probe, values):
         return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
 
-    return swapped(case, chosen), {"name": lambda probe: from_other_end(probe, case, chosen), "change": sign}
+    return swapped(case, chosen), {
+        "name": lambda probe: from_other_end(probe, case, chosen),
+        "change": sign,
+    }
 
 
 def from_other_end(probe: str, case: dict, chosen: set[str]) -> str:
@@ -88,10 +99,19 @@ def straight(case: dict) -> dict:
 
 
 TEXT = {
-    "length": (1e3, "mm"), "diameter": (100.0, "cm"), "wave_speed": (1e-3, "km/s"), "roughness": (1e6, "um"),
-    "pressure": (1e-5, "bar"), "head": (100.0, "cm"), "elevation": (1e-3, "km"), "level": (1e3, "mm"),
-    "volume": (1e3, "l"), "gas_volume": (1e6, "ml"), "demand": (1e3, "l/s"), "flow": (3600.0, "m3/h"),
-}  # fmt: skip
+    "length": (1e3, "mm"),
+    "diameter": (100.0, "cm"),
+    "wave_speed": (1e-3, "km/s"),
+    "roughness": (1e6, "um"),
+    "pressure": (1e-5, "bar"),
+    "head": (100.0, "cm"),
+    "elevation": (1e-3, "km"),
+    "level": (1e3, "mm"),
+    "volume": (1e3, "l"),
+    "gas_volume": (1e6, "ml"),
+    "demand": (1e3, "l/s"),
+    "flow": (3600.0, "m3/h"),
+}
 
 
 def in_other_units(value: Any, key: str = "") -> Any:
@@ -100,7 +120,8 @@ def in_other_units(value: Any, key: str = "") -> Any:
         return {**value, "value": [in_other_units(one, key) for one in value["value"]]}
     if isinstance(value, dict):
         return {
-            name: one if name in ("numerics", "output") else in_other_units(one, name) for name, one in value.items()
+            name: one if name in ("numerics", "output") else in_other_units(one, name)
+            for name, one in value.items()
         }
     if key in TEXT and isinstance(value, float):
         factor, unit = TEXT[key]
@@ -130,9 +151,17 @@ def shifted(value: Any, wait: float) -> Any:
     if isinstance(value, dict) and "value" in value:
         return {
             **value,
-            **({"time": [t + wait for t in value["time"]]} if "time" in value else {"start": value["start"] + wait}),
+            **(
+                {"time": [t + wait for t in value["time"]]}
+                if "time" in value
+                else {"start": value["start"] + wait}
+            ),
         }
-    return {key: shifted(one, wait) for key, one in value.items()} if isinstance(value, dict) else value
+    return (
+        {key: shifted(one, wait) for key, one in value.items()}
+        if isinstance(value, dict)
+        else value
+    )
 
 
 def denser(case: dict, times: float) -> dict:
@@ -172,4 +201,6 @@ def drawn_backwards(case: dict) -> dict:
 
 
 def negative(value: Any) -> Any:
-    return {**value, "value": [-one for one in value["value"]]} if isinstance(value, dict) else -value
+    return (
+        {**value, "value": [-one for one in value["value"]]} if isinstance(value, dict) else -value
+    )

@@ -28,7 +28,8 @@ REFUSALS = ("above every source", "no steady state", "follows the flow of this v
 # Relative error of a step: rounding may decide which steps Newton's method divides (summary key `parted`).
 IN_PARTS = 1e-3
 SCENES = {"built": 0, "dear": 0}
-FAIR, FIRST = 0.25, 2  # allowed share of costly cases, and number allowed in addition (0 of 550 were costly)
+# allowed share of costly cases, and number allowed in addition (0 of 550 were costly)
+FAIR, FIRST = 0.25, 2
 
 
 def outcome_of(source, **more) -> Outcome:
@@ -50,7 +51,9 @@ def outcome_of(source, **more) -> Outcome:
             raise
         return Outcome("refused", np.empty(0), {})
     ended = result.reason.split(" at ")[0]
-    return Outcome(ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
+    return Outcome(
+        ended, np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result
+    )
 
 
 @contextmanager
@@ -82,7 +85,10 @@ def broken_off_and_whole(case: dict, share: float) -> tuple[Run, Run]:
     run.left = 1.0
     assert run.go().reason.startswith("interrupted") and share * end < run.state().t < end
     other = fvsolve.build(fvsolve.load(case))
-    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
+    again, whole = (
+        Run(other, state, MemorySink(other), None)
+        for state in (run.state(), fvsolve.initial_state(other))
+    )
     ended = again.go(), whole.go()
     assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
     ends = again.state(), whole.state()
@@ -95,7 +101,12 @@ def kind_of(name: str) -> str:
 
 
 def alike(
-    one: Outcome, other: Outcome, within: float = 0.0, name: Callable[[str], str] = str, change=None, later=0.0
+    one: Outcome,
+    other: Outcome,
+    within: float = 0.0,
+    name: Callable[[str], str] = str,
+    change=None,
+    later=0.0,
 ) -> None:
     """Assert that two runs have equal ends and rows, to the bit or `within` the greatest value of each quantity.
 
@@ -103,24 +114,33 @@ def alike(
     """
     assert other.ended == one.ended
     assert len(other.t) == len(one.t)
-    if within > 0.0 and any(said.result is not None and said.result.summary.get("parted") for said in (one, other)):
+    if within > 0.0 and any(
+        said.result is not None and said.result.summary.get("parted") for said in (one, other)
+    ):
         within = max(within, IN_PARTS)
     if within == 0.0:
         assert np.array_equal(other.t, one.t + later)
     else:
         assert np.allclose(other.t - later, one.t, rtol=0.0, atol=1e-9)
     greatest: dict[str, float] = {}
-    wanted = {probe: values if change is None else change(probe, values) for probe, values in one.rows.items()}
+    wanted = {
+        probe: values if change is None else change(probe, values)
+        for probe, values in one.rows.items()
+    }
     for probe, values in wanted.items():
         kind = kind_of(probe)
         greatest[kind] = max(greatest.get(kind, 1e-9), float(np.max(np.abs(values), initial=0.0)))
-    apart = {probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0)) / greatest[kind_of(probe)]
-             for probe, values in wanted.items()}  # fmt: skip
+    apart = {
+        probe: float(np.max(np.abs(other.rows[name(probe)] - values), initial=0.0))
+        / greatest[kind_of(probe)]
+        for probe, values in wanted.items()
+    }
     worst = max(apart, key=apart.get, default=None)
     assert worst is None or apart[worst] <= within, (worst, apart[worst])
 
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
+# warning of numba while it compiles
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"
 ROUND = 1e-9
 
 

@@ -32,7 +32,12 @@ def at(mirror: str, x: float, y: float) -> tuple[float, float]:
 
 def formula(mirror: str, height: float, a: float, b: float) -> str:
     """Formula of a hump at the point that corresponds to (a, b)."""
-    x, y = {"x": (f"{LENGTH} - x", "y"), "y": ("x", f"{WIDTH} - y"), "turned": ("y", "x"), "": ("x", "y")}[mirror]
+    x, y = {
+        "x": (f"{LENGTH} - x", "y"),
+        "y": ("x", f"{WIDTH} - y"),
+        "turned": ("y", "x"),
+        "": ("x", "y"),
+    }[mirror]
     return f"{height}*" + HUMP.format(x=x, y=y, a=a, b=b)
 
 
@@ -42,9 +47,12 @@ def basin(mirror: str, drawing: dict) -> dict:
     side = drawing["side"] if not mirror else SIDES[mirror][drawing["side"]]
     turn = (lambda pair: pair[::-1]) if mirror == "turned" else list
     pool = {
-        "type": "basin", "physics": drawing["physics"], "size": turn([LENGTH, WIDTH]), "cells": turn(cells),
+        "type": "basin",
+        "physics": drawing["physics"],
+        "size": turn([LENGTH, WIDTH]),
+        "cells": turn(cells),
         "patches": {"gate": {"side": side}},
-    }  # fmt: skip
+    }
     hump = formula(mirror, drawing["height"], *drawing["hump"])
     if drawing["physics"] == "free-surface":
         pool |= {"level": 1.0, "start": {"level": f"1 + {hump}"}, "manning": 0.02}
@@ -60,7 +68,12 @@ def basin(mirror: str, drawing: dict) -> dict:
         probes += [f"pool.{seen}@{x},{y}", f"pool.u@{x},{y}", f"pool.v@{x},{y}"]
     pressure = 101325.0 if drawing["physics"] == "free-surface" else 1.9e5
     case = scene(
-        {"pool": pool, "out": reservoir(pressure)}, links, drawing["end"], numerics, probes, drawing["end"] / 16
+        {"pool": pool, "out": reservoir(pressure)},
+        links,
+        drawing["end"],
+        numerics,
+        probes,
+        drawing["end"] / 16,
     )
     case["output"]["fields"] = 0
     law = drawing["law"]
@@ -71,10 +84,16 @@ def basin(mirror: str, drawing: dict) -> dict:
 def basins(draw) -> dict:
     """Strategy for the settings that a basin and its mirror images share."""
     physics = draw(st.sampled_from(["free-surface", "liquid"]))
-    settings = draw(st.sampled_from([
-        {"method": "ssp-rk3", "courant": 0.5}, {"method": "ssp-rk2", "courant": 0.4}, {"method": "rk4", "courant": 0.5},
-        {"method": "rodas-5p", "rtol": 1e-5},
-    ]))  # fmt: skip
+    settings = draw(
+        st.sampled_from(
+            [
+                {"method": "ssp-rk3", "courant": 0.5},
+                {"method": "ssp-rk2", "courant": 0.4},
+                {"method": "rk4", "courant": 0.5},
+                {"method": "rodas-5p", "rtol": 1e-5},
+            ]
+        )
+    )
     return {
         "physics": physics,
         "law": draw(st.sampled_from(["linear", "log"])) if physics == "liquid" else "linear",
@@ -109,7 +128,9 @@ def test_in_a_mirror_or_turned(mirror, drawing):
         return f"{part}.{quantity}@{x},{y}"
 
     def sign(probe, values):
-        return -values if probe.split("@")[0] == {"x": "pool.u", "y": "pool.v"}.get(mirror) else values
+        return (
+            -values if probe.split("@")[0] == {"x": "pool.u", "y": "pool.v"}.get(mirror) else values
+        )
 
     within = 10 * drawing["numerics"].get("rtol", 1e-10)
     alike(one, outcome_of(basin(mirror, drawing)), within, name, sign)

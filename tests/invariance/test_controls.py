@@ -9,8 +9,12 @@ from reference.folders import CASES
 
 import fvsolve
 
-TURNED = {"tank-level-pi": [], "governor": ["penstock", "headrace"], "tank-relay": ["main"],
-          "digital-pressure": ["main"]}  # fmt: skip
+TURNED = {
+    "tank-level-pi": [],
+    "governor": ["penstock", "headrace"],
+    "tank-relay": ["main"],
+    "digital-pressure": ["main"],
+}
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 
 
@@ -26,14 +30,19 @@ def shipped(name: str) -> dict:
 def difference(first, other) -> float:
     """Greatest difference of the probes of two runs, each over its greatest value."""
     assert first.ok and other.ok and np.array_equal(first.t, other.t)
-    return max(np.max(np.abs(first[p] - other[p])) / np.max(np.abs(first[p])) for p in map(str, first.probes))
+    return max(
+        np.max(np.abs(first[p] - other[p])) / np.max(np.abs(first[p]))
+        for p in map(str, first.probes)
+    )
 
 
 @pytest.mark.parametrize("name", TURNED)
 def test_order_of_parts_and_blocks_and_direction_of_links(name):
     case = shipped(name)
     plain = fvsolve.run(case)
-    reordered = case | {group: dict(reversed(case[group].items())) for group in ("nodes", "links", "controls")}
+    reordered = case | {
+        group: dict(reversed(case[group].items())) for group in ("nodes", "links", "controls")
+    }
     assert difference(plain, fvsolve.run(reordered)) == 0.0
     turned = copy.deepcopy(case)
     for link in TURNED[name]:

@@ -35,7 +35,9 @@ def followed(case: dict, line: str) -> dict:
 
 def lines(*ways: str) -> st.SearchStrategy[dict]:
     """Strategy for networks under the linear law with delay lines, some shorter than a step."""
-    return st.builds(followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay-line", "auto")))
+    return st.builds(
+        followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay-line", "auto"))
+    )
 
 
 def given_steps() -> st.SearchStrategy[dict]:
@@ -93,7 +95,11 @@ def test_other_rows(case):
 @given(case=given_steps(), seed=SEEDS)
 def test_other_order(case, seed):
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
-    same(outcome_with_lines(case), outcome_with_lines(equivalent.reordered(case, nodes, links)), nearly(case))
+    same(
+        outcome_with_lines(case),
+        outcome_with_lines(equivalent.reordered(case, nodes, links)),
+        nearly(case),
+    )
 
 
 @examples(4)
@@ -106,10 +112,14 @@ def test_links_drawn_from_the_other_end(case, seed):
 @examples(3)
 @given(case=given_steps(), height=st.sampled_from([16.0, 1000.0]))
 def test_everything_higher(case, height):
-    same(outcome_with_lines(case), outcome_with_lines(equivalent.raised(case, height)), nearly(case))
+    same(
+        outcome_with_lines(case), outcome_with_lines(equivalent.raised(case, height)), nearly(case)
+    )
 
 
 @examples(3)
 @given(case=given_steps())
 def test_other_units(case):
-    same(outcome_with_lines(case), outcome_with_lines(equivalent.in_other_units(case)), nearly(case))
+    same(
+        outcome_with_lines(case), outcome_with_lines(equivalent.in_other_units(case)), nearly(case)
+    )

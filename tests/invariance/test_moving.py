@@ -17,15 +17,41 @@ from reference.scenes import scene
 import fvsolve
 from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
-from invariance.result_comparison import Outcome, alike, broken_off_and_whole, outcome_of, with_frames
+from invariance.result_comparison import (
+    Outcome,
+    alike,
+    broken_off_and_whole,
+    outcome_of,
+    with_frames,
+)
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
+# warning of numba while it compiles
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"
+# other warnings fail, such as of NaN values
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 ROUND, BY_DIFFERENCES = 1e-9, 1e-4
 EACH = ["rk4", "gauss-4", "rodas-4"]
-EXPLICIT, IMPLICIT = ["ssp-rk3", "rk4", "dormand-prince"], ["gauss-4", "implicit-midpoint", "radau-iia-5"]
-IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop", "carried", "rocking", "frozen",
-            "modes", "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
+EXPLICIT, IMPLICIT = (
+    ["ssp-rk3", "rk4", "dormand-prince"],
+    ["gauss-4", "implicit-midpoint", "radau-iia-5"],
+)
+IN_SPACE = [
+    "machine",
+    "machine log",
+    "machine table",
+    "machine mixture",
+    "loop",
+    "carried",
+    "rocking",
+    "frozen",
+    "modes",
+    "full",
+    "full log",
+    "full free",
+    "full table free",
+    "u-tube free",
+    "u-tube driven",
+]
 
 
 def with_methods(names: list[str], first: int) -> list[tuple[str, str]]:
@@ -113,7 +139,10 @@ def test_other_units(name, method):
 
 
 @pytest.mark.parametrize(
-    "name, method", with_methods([name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))], 2)
+    "name, method",
+    with_methods(
+        [name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))], 2
+    ),
 )
 def test_ends_of_links_swapped(name, method):
     alike(first(name, method), outcome_of(equivalent.swapped(SCENES[name](method))), near(method))
@@ -124,7 +153,12 @@ def test_axes_the_other_way(name, method):
     def change(probe, values):
         return -values if probe.endswith(SWINGS) else values
 
-    alike(first(name, method), outcome_of(equivalent.reversed_axes(SCENES[name](method))), near(method), change=change)
+    alike(
+        first(name, method),
+        outcome_of(equivalent.reversed_axes(SCENES[name](method))),
+        near(method),
+        change=change,
+    )
 
 
 @pytest.mark.parametrize("name, method", with_methods(IN_SPACE, 1))
@@ -140,8 +174,12 @@ def test_turned_about_the_vertical(name, method):
 
 def spatial(one: Outcome) -> Outcome:
     """Outcome without probes of single vector components, because a rotation needs all three."""
-    whole = {probe: values for probe, values in one.rows.items() if equivalent.part(probe)[1] == "-"
-             or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")}  # fmt: skip
+    whole = {
+        probe: values
+        for probe, values in one.rows.items()
+        if equivalent.part(probe)[1] == "-"
+        or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")
+    }
     return Outcome(one.ended, one.t, whole, one.result)
 
 
@@ -151,8 +189,13 @@ def test_in_a_mirror(name, method, axis):
     """A mirrored case gives mirrored results; a basin is then drawn from another corner."""
     case = SCENES[name](method)
     sizes = {one: node["size"] for one, node in case["nodes"].items() if node["type"] == "basin"}
-    alike(first(name, method), outcome_of(equivalent.mirrored(case, axis)), near(method),
-          lambda probe: equivalent.in_mirror(probe, axis, sizes), equivalent.as_mirrored(axis))  # fmt: skip
+    alike(
+        first(name, method),
+        outcome_of(equivalent.mirrored(case, axis)),
+        near(method),
+        lambda probe: equivalent.in_mirror(probe, axis, sizes),
+        equivalent.as_mirrored(axis),
+    )
 
 
 @pytest.mark.parametrize("name", IN_SPACE)
@@ -192,9 +235,13 @@ def test_a_body_in_two_that_are_fixed_to_each_other(part, method):
     one = first("machine", method)
     rows = {probe: values for probe, values in one.rows.items() if not probe.endswith(own)}
     if part == "kite":  # states of a free body refer to its centre of mass
-        rows = {probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")}
+        rows = {
+            probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")
+        }
     alike(
-        Outcome(one.ended, one.t, rows, one.result), outcome_of(equivalent.split(machine(method), part)), near(method)
+        Outcome(one.ended, one.t, rows, one.result),
+        outcome_of(equivalent.split(machine(method), part)),
+        near(method),
     )
 
 
@@ -210,30 +257,64 @@ def test_a_wall_of_a_mass_is_that_of_a_body_on_a_prismatic_joint(law, method):
 @pytest.mark.parametrize("law", ["linear", "log", "mixture"])
 def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
     """A mass on the axis moves as a body on an inclined prismatic joint without gravity."""
-    cylinder = {"type": "cylinder", "stroke": 0.5, "area_A": 1e-3, "area_B": 7e-4, "dead_volume_A": 1e-4,
+    cylinder = {
+        "type": "cylinder",
+        "stroke": 0.5,
+        "area_A": 1e-3,
+        "area_B": 7e-4,
+        "dead_volume_A": 1e-4,
         "dead_volume_B": 2e-4,
-                "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6,
-                    "initial_pressure_B": 3.2e6}  # fmt: skip
-    rest = {"spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2}, "stop": {"type": "end-stop",
-        "maximum": 0.31,
-            "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
+        "viscous_friction": 30.0,
+        "closed_length": 0.1,
+        "initial_pressure_A": 3e6,
+        "initial_pressure_B": 3.2e6,
+    }
+    rest = {
+        "spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2},
+        "stop": {"type": "end-stop", "maximum": 0.31, "stiffness": 1e6, "damping": 1e3},
+        "brake": {"type": "damper", "damping": 40.0},
+    }
     push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
-    probes = ["jack.force", "jack.position", "jack.velocity", "jack.A.pressure", "jack.B.pressure", "spring.force",
-              "stop.force"]  # fmt: skip
+    probes = [
+        "jack.force",
+        "jack.position",
+        "jack.velocity",
+        "jack.A.pressure",
+        "jack.B.pressure",
+        "spring.force",
+        "stop.force",
+    ]
 
     def case(nodes, near, far, **force):
         links = {name: {**one, "from": near, "to": far} for name, one in rest.items()}
-        links |= {"jack": {**cylinder, "ports": {"case": near, "rod": far}}, "push": {**push, "to": far, **force}}
+        links |= {
+            "jack": {**cylinder, "ports": {"case": near, "rod": far}},
+            "push": {**push, "to": far, **force},
+        }
         made = scene(nodes, links, 0.1, stepped(method, 5e-4), probes, 1 / 128, gravity=0.0)
-        return made | {"fluid": {**OIL, "law": law, **({"air_fraction": 1e-3} if law == "mixture" else {})}}
+        return made | {
+            "fluid": {**OIL, "law": law, **({"air_fraction": 1e-3} if law == "mixture" else {})}
+        }
 
-    one = case({"m": {"type": "mass", "mass": 20.0, "initial_position": 0.3, "initial_velocity": 0.4},
-        "ground": {"type": "frame"}},
-               "ground", "m")  # fmt: skip
+    one = case(
+        {
+            "m": {"type": "mass", "mass": 20.0, "initial_position": 0.3, "initial_velocity": 0.4},
+            "ground": {"type": "frame"},
+        },
+        "ground",
+        "m",
+    )
     way = [0.36, 0.48, 0.8]
     slides = {"kind": "prismatic", "axis": way, "travel": 0.3, "rate": 0.4}
-    other = case({"m": body(20.0, [1, 1, 1], slides), "ground": {"type": "frame", "points": {"eye": [0, 0, 0]}}},
-                 "ground.eye", "m", direction=way)  # fmt: skip
+    other = case(
+        {
+            "m": body(20.0, [1, 1, 1], slides),
+            "ground": {"type": "frame", "points": {"eye": [0, 0, 0]}},
+        },
+        "ground.eye",
+        "m",
+        direction=way,
+    )
     alike(outcome_of(one), outcome_of(other), near(method))
 
 
@@ -242,9 +323,13 @@ SAID = {
     "below": {"mean": 0.1, "amplitude": -0.2, "period": 0.9, "phase": 0.4 - np.pi},
     "a turn on": {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4 + 2 * np.pi},
     "shared": {"signal": "swing"},
-    "in other units": {"mean": "5.729577951308232 deg", "amplitude": "11.459155902616464 deg", "period": "900 ms",
-                       "phase": "22.91831180523293 deg"},
-}  # fmt: skip
+    "in other units": {
+        "mean": "5.729577951308232 deg",
+        "amplitude": "11.459155902616464 deg",
+        "period": "900 ms",
+        "phase": "22.91831180523293 deg",
+    },
+}
 
 
 @pytest.mark.in_turn
@@ -260,11 +345,22 @@ def test_a_joint_driven_in_other_words(way, method):
 def test_a_slider_that_is_driven_by_a_power_or_by_its_table(method):
     """A ramp x = (1 - t / 2)^2 and its smooth table drive a slider equally, with slope errors of order (0.01 s)^2."""
     found, times = [], np.linspace(-1.0, 3.0, 401)
-    for travel in ({"start": 0.0, "duration": 2.0, "value": [1.0, 0.0], "exponent": 2},
-                   {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(),
-                       "kind": "smooth"}):  # fmt: skip
-        nodes = {"cart": body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": travel}),
-                 "bob": body(1.0, [0.1, 0.1, 0.1], {"kind": "revolute", "on": "cart", "axis": [0, 1, 0], "angle": 0.3},
-                             centre_of_mass=[0, 0, -0.5])}  # fmt: skip
-        found.append(outcome_of(scene(nodes, {}, 1.0, stepped(method, 0.01), ["bob.angle", "cart.x"], 0.125)))
+    for travel in (
+        {"start": 0.0, "duration": 2.0, "value": [1.0, 0.0], "exponent": 2},
+        {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(), "kind": "smooth"},
+    ):
+        nodes = {
+            "cart": body(
+                3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": travel}
+            ),
+            "bob": body(
+                1.0,
+                [0.1, 0.1, 0.1],
+                {"kind": "revolute", "on": "cart", "axis": [0, 1, 0], "angle": 0.3},
+                centre_of_mass=[0, 0, -0.5],
+            ),
+        }
+        found.append(
+            outcome_of(scene(nodes, {}, 1.0, stepped(method, 0.01), ["bob.angle", "cart.x"], 0.125))
+        )
     alike(*found, 2e-5)

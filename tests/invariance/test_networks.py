@@ -19,7 +19,8 @@ from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import SEEDS, networks, shuffled
 from invariance.result_comparison import EXPERIMENTAL, alike, near, outcome_of, with_frames
 
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
+# other warnings fail, such as of NaN values
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 
 
 @examples(6)
@@ -67,7 +68,9 @@ def test_other_names(case):
         return f"{'zyxw'[len(name) % 4]}{name[::-1]}"
 
     alike(
-        outcome_of(case), outcome_of(equivalent.renamed(case, call)), name=lambda probe: equivalent.called(probe, call)
+        outcome_of(case),
+        outcome_of(equivalent.renamed(case, call)),
+        name=lambda probe: equivalent.called(probe, call),
     )
 
 
@@ -115,13 +118,16 @@ def test_without_profiles(case):
 @given(case=networks())
 def test_limits_and_points_that_are_watched_change_nothing(case):
     """Design limits do not change a bit of the results."""
-    limits = {"any": {"on": "pipes", "maximum": "1 GPa"},
-              "quick": {"on": "pipes", "quantity": "velocity", "maximum": 1e3},
-              "push": {"on": "pipes", "quantity": "force", "maximum": "1 GN"}}  # fmt: skip
+    limits = {
+        "any": {"on": "pipes", "maximum": "1 GPa"},
+        "quick": {"on": "pipes", "quantity": "velocity", "maximum": 1e3},
+        "push": {"on": "pipes", "quantity": "force", "maximum": "1 GN"},
+    }
     watched = outcome_of(case | {"limits": limits})
     alike(outcome_of(case), watched)
     if watched.result and watched.result.ok:
-        allowed = {"holds", "open"} if watched.result.marks else {"holds"}  # open below vapour pressure
+        # open below vapour pressure
+        allowed = {"holds", "open"} if watched.result.marks else {"holds"}
         assert {one.state for one in watched.result.verdicts} <= allowed
 
 
@@ -139,7 +145,12 @@ def test_two_copies_with_a_shut_valve_between(case):
     one = outcome_of(case)
     both = outcome_of(equivalent.twice(case, "n0"))
     alike(one, both, near(case))
-    alike(one, both, near(case), name=lambda probe: equivalent.called(probe, lambda part: f"{part}-too"))
+    alike(
+        one,
+        both,
+        near(case),
+        name=lambda probe: equivalent.called(probe, lambda part: f"{part}-too"),
+    )
 
 
 @examples(6)
@@ -157,7 +168,12 @@ def test_a_denser_fluid(case):
     def twice(probe, values):
         return 2.0 * values if ".pressure" in probe else values
 
-    alike(outcome_of(equivalent.denser(case, 1.0)), outcome_of(equivalent.denser(case, 2.0)), near(case), change=twice)
+    alike(
+        outcome_of(equivalent.denser(case, 1.0)),
+        outcome_of(equivalent.denser(case, 2.0)),
+        near(case),
+        change=twice,
+    )
 
 
 @examples(6)
@@ -189,5 +205,9 @@ def test_a_file_and_settings(case, tmp_path_factory):
     path = tmp_path_factory.mktemp("said") / "case.toml"
     path.write_text(write(wrong))
     pipe = case["links"]["p0"]
-    right = {"numerics.end": 1.0, "links.p0.length": pipe["length"], "links.p0.cells": pipe["cells"]}
+    right = {
+        "numerics.end": 1.0,
+        "links.p0.length": pipe["length"],
+        "links.p0.cells": pipe["cells"],
+    }
     alike(outcome_of(case), outcome_of(path, set=right))

@@ -21,24 +21,54 @@ SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
 COMPRESSOR = {"start": 0.28, "stop": 0.2, "flow": 1e-3}
 SWITCHES = {"switch": 3e3, "switch_velocity": 0.1}
 SLOW = {"time_constant": between(0.1, 5.0)}
-SIZE = st.one_of(st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
-                 st.fixed_dictionaries({"diameter": between(0.01, 0.08), "loss_coefficient": between(0.5, 20.0)}),
-                 st.fixed_dictionaries({"Kv": between(3.0, 100.0)}))  # fmt: skip
+SIZE = st.one_of(
+    st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
+    st.fixed_dictionaries(
+        {"diameter": between(0.01, 0.08), "loss_coefficient": between(0.5, 20.0)}
+    ),
+    st.fixed_dictionaries({"Kv": between(3.0, 100.0)}),
+)
 MOVING = st.one_of(
     st.fixed_dictionaries({"time_constant": between(0.02, 0.5)}),
-    st.fixed_dictionaries({"natural_frequency": between(1.0, 10.0), "damping_ratio": between(0.3, 1.5)}),
+    st.fixed_dictionaries(
+        {"natural_frequency": between(1.0, 10.0), "damping_ratio": between(0.3, 1.5)}
+    ),
 )
 PILOT = {"pilot": st.sampled_from(["up", "a", "b"]), "pilot_ratio": between(0.5, 5.0)}
 SENSES = st.sampled_from([["up", "a"], ["a", "down"], ["b", "down"], ["a", "b"], ["up", "down"]])
-OPENING = st.one_of(st.just(1.0), between(0.1, 1.0), st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE))
+OPENING = st.one_of(
+    st.just(1.0),
+    between(0.1, 1.0),
+    st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE),
+)
 HILL = [
-    {"opening": 0.3, "unit_speed": [30, 70, 110], "unit_flow": [0.32, 0.3, 0.2], "efficiency": [0.6, 0.8, 0.1]},
-    {"opening": 1.0, "unit_speed": [110, 70, 30], "unit_flow": [0.7, 1.0, 1.05], "efficiency": [0.2, 0.9, 0.6]},
+    {
+        "opening": 0.3,
+        "unit_speed": [30, 70, 110],
+        "unit_flow": [0.32, 0.3, 0.2],
+        "efficiency": [0.6, 0.8, 0.1],
+    },
+    {
+        "opening": 1.0,
+        "unit_speed": [110, 70, 30],
+        "unit_flow": [0.7, 1.0, 1.05],
+        "efficiency": [0.2, 0.9, 0.6],
+    },
 ]
-CONDUIT = {"length": between(5.0, 60.0), "diameter": between(0.05, 0.2), "friction": st.sampled_from(FRICTIONS[1:])}
-CONNECTION = {"connection": st.fixed_dictionaries(
-    {"diameter": between(0.03, 0.1), "loss_in": between(0.5, 5.0), "loss_out": between(0.5, 5.0)}
-)}  # fmt: skip
+CONDUIT = {
+    "length": between(5.0, 60.0),
+    "diameter": between(0.05, 0.2),
+    "friction": st.sampled_from(FRICTIONS[1:]),
+}
+CONNECTION = {
+    "connection": st.fixed_dictionaries(
+        {
+            "diameter": between(0.03, 0.1),
+            "loss_in": between(0.5, 5.0),
+            "loss_out": between(0.5, 5.0),
+        }
+    )
+}
 
 
 def of(
@@ -47,14 +77,18 @@ def of(
     """Strategy for tables of a kind of part, merged with the tables that `tables` draw."""
     plain = st.fixed_dictionaries({"type": st.just(kind), **(keys or {})}, optional=maybe or {})
     return st.builds(
-        lambda one, *more: one | {k: v for table in more for k, v in table.items()}, plain, *tables.values()
+        lambda one, *more: one | {k: v for table in more for k, v in table.items()},
+        plain,
+        *tables.values(),
     )
 
 
 def disc(one: dict) -> dict:
     """Table with an overpressure, if the valve has a disc with a lag or a mass, or is a relief valve."""
     moves = "time_constant" in one or "natural_frequency" in one
-    return one | ({"overpressure": 2e4} if moves or one["type"] in ("relief-valve", "counterbalance") else {})
+    return one | (
+        {"overpressure": 2e4} if moves or one["type"] in ("relief-valve", "counterbalance") else {}
+    )
 
 
 LINKS = {
@@ -128,15 +162,30 @@ NODES = {
     "inflow": of("inflow", {"flow": between(-2e-3, 5e-3)}),
     "reservoir": of("reservoir", {"head": between(10.0, 30.0)}),
     "tank": of(
-        "tank", {"area": between(0.2, 5.0), "level": between(10.0, 25.0)}, {"height": st.just(25.5)} | CONNECTION
+        "tank",
+        {"area": between(0.2, 5.0), "level": between(10.0, 25.0)},
+        {"height": st.just(25.5)} | CONNECTION,
     ),
     "chamber": of("chamber", {"volume": between(1e-3, 1.0)}),
     "accumulator": st.one_of(
-        of("accumulator", {"volume": between(0.1, 1.0), "gas_volume": between(0.02, 0.09)}, CONNECTION),
         of(
             "accumulator",
-            {"volume": between(0.1, 1.0), "diameter": between(0.3, 0.6), "level": between(0.05, 0.25)},
-            {"slope": between(0.0, 1.0), "bottom": between(-1.0, 2.0), "compressor": st.just(COMPRESSOR)} | CONNECTION,
+            {"volume": between(0.1, 1.0), "gas_volume": between(0.02, 0.09)},
+            CONNECTION,
+        ),
+        of(
+            "accumulator",
+            {
+                "volume": between(0.1, 1.0),
+                "diameter": between(0.3, 0.6),
+                "level": between(0.05, 0.25),
+            },
+            {
+                "slope": between(0.0, 1.0),
+                "bottom": between(-1.0, 2.0),
+                "compressor": st.just(COMPRESSOR),
+            }
+            | CONNECTION,
         ),
         of(
             "accumulator",
@@ -146,27 +195,70 @@ NODES = {
     ),
     "air-valve": of(
         "air-valve",
-        {"inlet": st.one_of(between(0.02, 0.08), st.just({"pressure": [2e3, 3e4], "flow": [0.05, 0.15]})),
-         "outlet": st.one_of(between(0.005, 0.05), st.just({"pressure": [5e3, 5e4], "flow": [0.04, 0.1]}))},
+        {
+            "inlet": st.one_of(
+                between(0.02, 0.08), st.just({"pressure": [2e3, 3e4], "flow": [0.05, 0.15]})
+            ),
+            "outlet": st.one_of(
+                between(0.005, 0.05), st.just({"pressure": [5e3, 5e4], "flow": [0.04, 0.1]})
+            ),
+        },
         {"automatic": between(1e-3, 3e-3)},
-        a=st.sampled_from([{}, *({key: value, "throttled_outlet": 4e-3} for key, value in SWITCHES.items())]),
+        a=st.sampled_from(
+            [{}, *({key: value, "throttled_outlet": 4e-3} for key, value in SWITCHES.items())]
+        ),
     ),
-}  # fmt: skip
+}
 
 
-EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # warning of numba while it compiles
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
+# warning of numba while it compiles
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"
+# other warnings fail, such as of NaN values
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 ELSEWHERE = {
-    "basin", "mass", "frame", "body", "cylinder", "damper", "end-stop", "force", "spring", "spool-valve", "torque",
-    "pin", "bushing", "shuttle", "altitude-valve",  # it needs a tank, see parts/test_altitude_valve.py
+    "basin",
+    "mass",
+    "frame",
+    "body",
+    "cylinder",
+    "damper",
+    "end-stop",
+    "force",
+    "spring",
+    "spool-valve",
+    "torque",
+    # it needs a tank, see parts/test_altitude_valve.py
+    "pin",
+    "bushing",
+    "shuttle",
+    "altitude-valve",
     "conduit",  # in parts/test_conduit.py
     "solenoid",  # in parts/test_solenoid.py
     # of networks of rotation, electricity and heat, in parts/test_networks.py
-    "shaft", "housing", "gear", "torsion-spring", "bearing", "clutch", "rack", "terminal", "ground", "voltage-source",
-    "current-source", "resistor", "inductor", "capacitor", "switch", "diode", "dc-motor", "heat-capacity", "ambient",
-    "thermal-conductor", "convection", "heat-source",
+    "shaft",
+    "housing",
+    "gear",
+    "torsion-spring",
+    "bearing",
+    "clutch",
+    "rack",
+    "terminal",
+    "ground",
+    "voltage-source",
+    "current-source",
+    "resistor",
+    "inductor",
+    "capacitor",
+    "switch",
+    "diode",
+    "dc-motor",
+    "heat-capacity",
+    "ambient",
+    "thermal-conductor",
+    "convection",
+    "heat-source",
     "heat-exchanger",  # in parts/test_heat_in_fluid.py
-}  # fmt: skip
+}
 HEAD = 20.0
 NEIGHBOURS = [
     junction(),
@@ -189,7 +281,9 @@ def neighbours(draw, stiff: bool) -> tuple[dict, dict]:
     places, links = {"up": lake(HEAD), "down": lake(HEAD)}, {}
     for side, end in (("up", "a"), ("down", "b")):
         places[end] = draw(st.sampled_from(NEIGHBOURS if stiff else NEIGHBOURS[:2]))
-        by_valve = stiff and end == "b" and places[end]["type"] != "junction" and draw(st.booleans())
+        by_valve = (
+            stiff and end == "b" and places[end]["type"] != "junction" and draw(st.booleans())
+        )
         links[f"to-{end}"] = valve(side, end, 2e-3) if by_valve else main(side, end)
     return places, links
 
@@ -258,10 +352,17 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     """
     part = data.draw((LINKS if table == "links" else NODES)[kind])
     still = {
-        "pump": {"speed": 0.0}, "turbine": {"speed": 0.0}, "displacement-pump": {"speed": 0.0},
-        "displacement-motor": {"speed": 0.0}, "leak": {"opening": 0.0}, "hydrant": {"opening": 0.0},
-        "junction": {"demand": 0.0}, "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
-    }.get(kind, {})  # fmt: skip
+        "pump": {"speed": 0.0},
+        "turbine": {"speed": 0.0},
+        "displacement-pump": {"speed": 0.0},
+        "displacement-motor": {"speed": 0.0},
+        "leak": {"opening": 0.0},
+        "hydrant": {"opening": 0.0},
+        "junction": {"demand": 0.0},
+        "inflow": {"flow": 0.0},
+        "tank": {"level": HEAD},
+        "reservoir": {"head": HEAD},
+    }.get(kind, {})
     part |= still
     shown = outcome_of(case_with_probes(*data.draw(joined(table, part, settings)), settings))
     if shown.ended == "refused":
@@ -270,5 +371,10 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     by_courant = "courant" in settings and METHODS[settings["method"]].explicit
     rtol = settings.get("rtol", 1e-6)
     swings, flows = (1e-3, 1e-9) if by_courant else (max(1.0, 3e5 * rtol), 0.1 * rtol**0.5)
-    assert max(np.ptp(values) for name, values in shown.rows.items() if ".pressure" in name) < swings
-    assert max(np.max(np.abs(values)) for name, values in shown.rows.items() if ".flow" in name) < flows
+    assert (
+        max(np.ptp(values) for name, values in shown.rows.items() if ".pressure" in name) < swings
+    )
+    assert (
+        max(np.max(np.abs(values)) for name, values in shown.rows.items() if ".flow" in name)
+        < flows
+    )

@@ -25,24 +25,44 @@ from fvsolve.units import convert
 from invariance.equivalent_networks import STRAIGHT, from_other_end, in_other_units, swapped
 from invariance.result_comparison import EXPERIMENTAL, Outcome, alike, broken_off_and_whole
 
-pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # other warnings fail, such as of NaN values
+# other warnings fail, such as of NaN values
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 NAMED = ("nodes", "links", "controls")  # tables of names
 TIGHT = {"numerics.rtol": 1e-9}
-UNITS = {"pressure": "bar", "flow": "l/s", "head": "mm", "level": "cm", "velocity": "cm/s", "position": "mm",
-         "force": "kN", "torque": "kN m", "time": "ms", "angular_velocity": "rpm", "angle": "deg"}  # fmt: skip
+UNITS = {
+    "pressure": "bar",
+    "flow": "l/s",
+    "head": "mm",
+    "level": "cm",
+    "velocity": "cm/s",
+    "position": "mm",
+    "force": "kN",
+    "torque": "kN m",
+    "time": "ms",
+    "angular_velocity": "rpm",
+    "angle": "deg",
+}
 
 
 def outcome_of(case: dict, settings: dict | None = None) -> Outcome:
     """Rows of a run that ends as planned."""
     result = fvsolve.run(case, settings or {})
     assert result.ok, result.reason
-    return Outcome("finished", np.array(result.t), {str(p): np.array(result[str(p)]) for p in result.probes}, result)
+    return Outcome(
+        "finished",
+        np.array(result.t),
+        {str(p): np.array(result[str(p)]) for p in result.probes},
+        result,
+    )
 
 
 def ends_of(case: dict, settings: dict) -> np.ndarray:
     """Scaled final state of a case with changed settings."""
     model = fvsolve.build(fvsolve.load(case, settings))
-    return fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"]).y / model.scale
+    return (
+        fvsolve.advance(model, fvsolve.initial_state(model), case["numerics"]["end"]).y
+        / model.scale
+    )
 
 
 def ledger(specimen: Specimen) -> None:
@@ -56,7 +76,11 @@ def restated(specimen: Specimen) -> None:
     case = specimen.case
     turned = {name for name, link in case["links"].items() if link["type"] in STRAIGHT}
     other = in_other_units(swapped(case, turned))
-    other |= {table: dict(reversed(other[table].items())) for table in ("nodes", "links", "controls") if table in other}
+    other |= {
+        table: dict(reversed(other[table].items()))
+        for table in ("nodes", "links", "controls")
+        if table in other
+    }
 
     def sign(probe: str, values: np.ndarray) -> np.ndarray:
         return -values if ".flow" in probe and probe.split(".")[1] in turned else values
@@ -89,7 +113,9 @@ def linearised(specimen: Specimen) -> None:
         direction = model.scale * rng.normal(size=model.y_size)
         ahead, behind = (model.evaluate(at.t, at.y + size * direction)[0] for size in (1e-6, -1e-6))
         expected = (ahead - behind) / 2e-6
-        assert a @ direction == pytest.approx(expected, rel=1e-5, abs=1e-5 * np.max(np.abs(expected)))
+        assert a @ direction == pytest.approx(
+            expected, rel=1e-5, abs=1e-5 * np.max(np.abs(expected))
+        )
 
 
 def pattern(specimen: Specimen) -> None:
@@ -103,7 +129,8 @@ def pattern(specimen: Specimen) -> None:
 def implicit(specimen: Specimen) -> None:
     """A run by an implicit method has the rows of an explicit run, within the tolerance of both."""
     explicit, other = (
-        outcome_of(specimen.case, TIGHT | {"numerics.method": method}) for method in ("dormand-prince", "radau-iia-5")
+        outcome_of(specimen.case, TIGHT | {"numerics.method": method})
+        for method in ("dormand-prince", "radau-iia-5")
     )
     alike(explicit, other, specimen.near["implicit"])
 
@@ -123,16 +150,20 @@ def units(specimen: Specimen) -> None:
 def order(specimen: Specimen) -> None:
     """Errors of a method of second order fall by four where the step is halved."""
     runs = [
-        ends_of(specimen.case, {"numerics.method": "ssp-rk2", "numerics.step": specimen.step / 2**k})
+        ends_of(
+            specimen.case, {"numerics.method": "ssp-rk2", "numerics.step": specimen.step / 2**k}
+        )
         for k in range(3)
-    ]  # fmt: skip
+    ]
     first, second = (np.linalg.norm(runs[k + 1] - runs[k]) for k in range(2))
     assert np.log2(first / second) == pytest.approx(2.0, abs=0.3)
 
 
 def names(specimen: Specimen) -> None:
     """Other names of all parts and blocks, in the opposite alphabetical order, do not change any bit."""
-    listed = sorted({name for table in NAMED for name in specimen.case.get(table, ())}, reverse=True)
+    listed = sorted(
+        {name for table in NAMED for name in specimen.case.get(table, ())}, reverse=True
+    )
     mapping = {name: f"part-{k:03d}" for k, name in enumerate(listed)}
     other = outcome_of(renamed(specimen.case, mapping))
     alike(outcome_of(specimen.case), other, name=lambda probe: text_of(probe, mapping))
@@ -142,14 +173,18 @@ def renamed(case: dict, mapping: dict[str, str]) -> dict:
     """Case with new names of its parts and blocks, also where other parts, blocks and probes refer to them."""
     other = referring(case, mapping)
     return other | {
-        table: {mapping[name]: one for name, one in other[table].items()} for table in NAMED if table in other
+        table: {mapping[name]: one for name, one in other[table].items()}
+        for table in NAMED
+        if table in other
     }
 
 
 def referring(value: Any, mapping: dict[str, str]) -> Any:
     """Value with the new names in all its texts, except those of kinds."""
     if isinstance(value, dict):
-        return {key: one if key == "type" else referring(one, mapping) for key, one in value.items()}
+        return {
+            key: one if key == "type" else referring(one, mapping) for key, one in value.items()
+        }
     if isinstance(value, list):
         return [referring(one, mapping) for one in value]
     return text_of(value, mapping) if isinstance(value, str) else value
@@ -160,8 +195,18 @@ def text_of(text: str, mapping: dict[str, str]) -> str:
     return ".".join(mapping.get(word, word) for word in text.split("."))
 
 
-HOLDS = {"ledger": ledger, "restated": restated, "bits": bits, "resumed": resumed, "linearised": linearised,
-         "pattern": pattern, "implicit": implicit, "units": units, "order": order, "names": names}  # fmt: skip
+HOLDS = {
+    "ledger": ledger,
+    "restated": restated,
+    "bits": bits,
+    "resumed": resumed,
+    "linearised": linearised,
+    "pattern": pattern,
+    "implicit": implicit,
+    "units": units,
+    "order": order,
+    "names": names,
+}
 
 
 @pytest.mark.quick_in_turn
@@ -190,4 +235,6 @@ def test_every_kind_of_part_block_feature_physics_and_law_has_a_specimen():
         present["feature"] |= {type(feature).__name__ for feature in features_of(case)}
         present["physics"] |= {node.physics for node in case.nodes.values() if node.kind == "basin"}
         present["law"].add(case.fluid.law)
-    assert {group: names - present[group] for group, names in declared.items() if names - present[group]} == {}
+    assert {
+        group: names - present[group] for group, names in declared.items() if names - present[group]
+    } == {}

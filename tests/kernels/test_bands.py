@@ -25,7 +25,8 @@ def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
         own = tables._replace(pipes=tables.pipes[first:last], layout=layout)
         written = slate.written._replace(scratch=slate.written.scratch.copy())
         made = (*own, *written, functions.calls, functions.hooks)
-        results.append((make_handle(made), made))  # the arrays of a handle must exist as long as it does
+        # the arrays of a handle must exist as long as it does
+        results.append((make_handle(made), made))
     return results
 
 
@@ -52,8 +53,11 @@ def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
         return rates, beside
 
     with ThreadPoolExecutor(len(bands)) as pool:
-        ways = (lambda do: [do(one) for one in bands], lambda do: [do(one) for one in bands[::-1]],
-                lambda do: list(pool.map(do, bands)))  # fmt: skip
+        ways = (
+            lambda do: [do(one) for one in bands],
+            lambda do: [do(one) for one in bands[::-1]],
+            lambda do: list(pool.map(do, bands)),
+        )
         for each in ways:
             rates, beside = rates_and_out(each)
             assert np.array_equal(rates, dydt) and np.array_equal(beside, out)

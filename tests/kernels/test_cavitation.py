@@ -62,7 +62,10 @@ def test_the_summary_states_the_place_of_a_cavity_without_doubts(adelaide):
     (found,) = said["cavities"]
     assert found["place"] == "links.main" and found["distance"] > 0.9 * 37.23
     assert found["time"] == approx(2 * 37.23 / 1319, rel=0.1)
-    assert found["volume"] == approx(0.1 * math.pi / 4 * 0.0221**2, rel=0.2) and 0.15 < found["t_volume"] < 0.3
+    assert (
+        found["volume"] == approx(0.1 * math.pi / 4 * 0.0221**2, rel=0.2)
+        and 0.15 < found["t_volume"] < 0.3
+    )
     assert "main: a cavity opened" in found["text"]
     assert abs(adelaide.ledger["mass"]["remainder"]) < 1e-13 * adelaide.ledger["mass"]["initial"]
 
@@ -92,8 +95,13 @@ def followed(model, state, times) -> tuple[np.ndarray, np.ndarray, float]:
         state = fvsolve.advance(model, state, float(t))
         out = model.evaluate(state.t, state.y)[1]
         pressures.append(model.tables.nodes[0]["pressure"] + out[model.layout["pressure"]])
-        m = profile[row["center"] : row["center"] + n] + (state.y[:n] + state.y[n : 2 * n]) / row["speed"]
-        volumes.append(np.sum(np.maximum(1.0 - m / (1000.0 * row["area"]), 0.0)) * row["dx"] * row["area"])
+        m = (
+            profile[row["center"] : row["center"] + n]
+            + (state.y[:n] + state.y[n : 2 * n]) / row["speed"]
+        )
+        volumes.append(
+            np.sum(np.maximum(1.0 - m / (1000.0 * row["area"]), 0.0)) * row["dx"] * row["area"]
+        )
     return np.array(pressures), np.array(volumes)
 
 
@@ -192,21 +200,35 @@ def test_a_node_with_a_kink_in_its_balance_is_closed_at_every_resolution(cell_ti
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["ssp-rk2", "dormand-prince"])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_a_demand_by_pressure_does_not(method, reverse):
+def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_a_demand_by_pressure_does_not(
+    method, reverse
+):
     """The valve before a summit shuts: the column beyond flows on, stops, and returns; the demand continues."""
     ends = ("hill", "far") if reverse else ("far", "hill")
-    nodes = {"lake": lake(30.0, elevation=0.0), "gate": junction(elevation=0.0), "far": lake(25.0, elevation=0.0)}
+    nodes = {
+        "lake": lake(30.0, elevation=0.0),
+        "gate": junction(elevation=0.0),
+        "far": lake(25.0, elevation=0.0),
+    }
     nodes["hill"] = junction(elevation=20.0) | {"demand": 1e-3}
     links = {
         "tap": valve("lake", "gate", 2e-3, scenes.ramp(0.1, 0.1, 1.0, 0.0)),
         "rise": pipe("gate", "hill", 60.0, 0.1, 1000.0, 12),
         "fall": pipe(*ends[::-1], 100.0, 0.1, 1000.0, 20),
     }
-    case = scene(nodes, links, 6.0, PLAIN | {"method": method}, ["hill.gauge_pressure"], 0.01, fluid=WATER)
+    case = scene(
+        nodes, links, 6.0, PLAIN | {"method": method}, ["hill.gauge_pressure"], 0.01, fluid=WATER
+    )
     if method != "ssp-rk2":
-        case["numerics"] = {"rtol": 1e-5} | {key: one for key, one in case["numerics"].items() if key != "courant"}
+        case["numerics"] = {"rtol": 1e-5} | {
+            key: one for key, one in case["numerics"].items() if key != "courant"
+        }
     result = fvsolve.run(case)
-    assert not result.ok and "a cavity at hill cannot supply" in result.reason and "required_pressure" in result.reason
+    assert (
+        not result.ok
+        and "a cavity at hill cannot supply" in result.reason
+        and "required_pressure" in result.reason
+    )
     assert result["hill.gauge_pressure"].max() < 1e6 and result.summary["invalid_from"] is None
     case["nodes"]["hill"]["required_pressure"] = 1.5e5
     result = fvsolve.run(case)
@@ -216,15 +238,23 @@ def test_a_demand_that_a_cavity_cannot_supply_ends_the_run_and_a_demand_by_press
 def test_a_pump_at_a_cavity_is_reported_by_the_place_of_the_cavity():
     curve = {"flow": [0.0, 0.03, 0.06], "head": [60.0, 50.0, 30.0]}
     nodes = {"low": lake(3.0, elevation=0.0), "high": lake(40.0, elevation=0.0)}
-    nodes |= {name: junction(elevation=z) for name, z in (("foot", 0.0), ("eye", 2.0), ("out", 2.0))}
+    nodes |= {
+        name: junction(elevation=z) for name, z in (("foot", 0.0), ("eye", 2.0), ("out", 2.0))
+    }
     links = {
         "gate": valve("low", "foot", 2e-2, scenes.ramp(0.5, 1.5, 1.0, 0.0)),
         "suction": pipe("foot", "eye", 100.0, 0.2, 1000.0, 20),
         "pump": {"type": "pump", "from": "eye", "to": "out", "curve": curve},
         "main": pipe("out", "high", 400.0, 0.2, 1000.0, 40),
     }
-    result = fvsolve.run(scene(nodes, links, 10.0, PLAIN, ["eye.gauge_pressure"], 0.01, fluid=WATER))
-    assert not result.ok and "a cavity at eye cannot supply" in result.reason and "suction" in result.reason
+    result = fvsolve.run(
+        scene(nodes, links, 10.0, PLAIN, ["eye.gauge_pressure"], 0.01, fluid=WATER)
+    )
+    assert (
+        not result.ok
+        and "a cavity at eye cannot supply" in result.reason
+        and "suction" in result.reason
+    )
 
 
 def test_a_chamber_that_empties_into_a_cavity_conserves_mass():
@@ -259,39 +289,79 @@ def test_the_pattern_of_the_jacobian_holds_while_cavities_are_open():
     assert not np.any(model.jacobian(state.t, state.y)[pattern == 0])
 
 
-THROAT = {"nodes": {"shaft": {"type": "tank", "elevation": 470.0, "area": 2.0, "level": 20.0}},
-          "links": {"neck": {"type": "valve", "from": "shaft", "to": "v", "diameter": 0.6, "loss_coefficient": 2.0},
-                    "gate": {"type": "valve", "from": "v", "to": "river", "area": 0.8}}}  # fmt: skip
-OPENINGS = [(1.0, [0.16, 0.3, 0.41], [-0.12, 0.1, 0.3]), (0.2, [0.04, 0.072, 0.1], [-0.04, 0.01, 0.055])]
-HILL = [{"opening": a, "unit_speed": [0.0, 60.0, 150.0], "unit_flow": flow, "unit_torque": torque}
-        for a, flow, torque in OPENINGS]  # fmt: skip
-UNIT = {"nodes": {}, "links": {"gate": {"type": "turbine", "from": "v", "to": "river", "diameter": 2.0,
-                                        "speed": 30.0, "hill_chart": HILL}}}  # fmt: skip
+THROAT = {
+    "nodes": {"shaft": {"type": "tank", "elevation": 470.0, "area": 2.0, "level": 20.0}},
+    "links": {
+        "neck": {
+            "type": "valve",
+            "from": "shaft",
+            "to": "v",
+            "diameter": 0.6,
+            "loss_coefficient": 2.0,
+        },
+        "gate": {"type": "valve", "from": "v", "to": "river", "area": 0.8},
+    },
+}
+OPENINGS = [
+    (1.0, [0.16, 0.3, 0.41], [-0.12, 0.1, 0.3]),
+    (0.2, [0.04, 0.072, 0.1], [-0.04, 0.01, 0.055]),
+]
+HILL = [
+    {"opening": a, "unit_speed": [0.0, 60.0, 150.0], "unit_flow": flow, "unit_torque": torque}
+    for a, flow, torque in OPENINGS
+]
+UNIT = {
+    "nodes": {},
+    "links": {
+        "gate": {
+            "type": "turbine",
+            "from": "v",
+            "to": "river",
+            "diameter": 2.0,
+            "speed": 30.0,
+            "hill_chart": HILL,
+        }
+    },
+}
 
 
 @pytest.mark.parametrize("beside", [THROAT, UNIT], ids=["throat", "turbine"])
 def test_where_no_cavity_is_near_following_cavities_changes_nothing(beside) -> None:
     """Results with and without cavitation agree for a throat with reversing flow and for a turbine that closes."""
     nodes = {
-        "lake": lake(500.0, elevation=480.0), "v": junction(elevation=392.0),
+        "lake": lake(500.0, elevation=480.0),
+        "v": junction(elevation=392.0),
         "river": lake(395.0, elevation=390.0),
-    }  # fmt: skip
-    links = {"pen": pipe("lake", "v", 400.0, 2.8, 1100.0, 20, friction={"model": "steady", "factor": 0.012})}
+    }
+    links = {
+        "pen": pipe(
+            "lake", "v", 400.0, 2.8, 1100.0, 20, friction={"model": "steady", "factor": 0.012}
+        )
+    }
     links |= {name: dict(one) for name, one in beside["links"].items()}
     times, openings = [0.5, 1.0, 7.0, 13.0, 13.5], [0.8, 0.8, 0.3, 0.2, 0.2]
     links["gate"]["opening"] = {"time": times, "value": openings, "kind": "smooth"}
     found = []
     for follows in (True, False):
         fluid = {"name": "Water", "law": "mixture", "air_fraction": 1e-7, "cavitation": follows}
-        case = scene(nodes | beside["nodes"], links, 14.0, PLAIN, ["v.head", "gate.flow"], 0.02, fluid=fluid)
+        case = scene(
+            nodes | beside["nodes"], links, 14.0, PLAIN, ["v.head", "gate.flow"], 0.02, fluid=fluid
+        )
         found.append(fvsolve.run(case))
     followed, plain = found
     assert followed.ok and plain.ok and not followed.summary["cavities"]
     for probe, most in (("v.head", 1e-3), ("gate.flow", 2e-4)):
         assert np.max(np.abs(followed[probe] - plain[probe])) < most * np.ptp(plain[probe])
     turned = links["pen"] | {"from": "v", "to": "lake"}
-    case = scene(nodes | beside["nodes"], links | {"pen": turned}, 14.0, PLAIN, ["v.head"], 0.02,
-                 fluid=fluid | {"cavitation": True})  # fmt: skip
+    case = scene(
+        nodes | beside["nodes"],
+        links | {"pen": turned},
+        14.0,
+        PLAIN,
+        ["v.head"],
+        0.02,
+        fluid=fluid | {"cavitation": True},
+    )
     assert fvsolve.run(case)["v.head"] == approx(followed["v.head"], rel=1e-9)
 
 
@@ -316,7 +386,9 @@ def test_a_run_can_be_stopped_where_a_cavity_opens():
 
 
 def test_schemes_that_reach_over_the_edge_of_a_cavity_are_refused():
-    with pytest.raises(CaseError, match='"weno5" cannot compute cavities in pipes; expected "upwind" or "muscl"'):
+    with pytest.raises(
+        CaseError, match='"weno5" cannot compute cavities in pipes; expected "upwind" or "muscl"'
+    ):
         fvsolve.load(network(scheme="weno5"))
 
 
@@ -328,7 +400,13 @@ def test_few_cells_for_a_cavity_are_a_note_with_the_error_they_make():
         assert len(said) == expected
     model = fvsolve.build(fvsolve.load(wall(1.3, 100, 3.0)))
     (said,) = [one for one in model.warnings if one.kind == "cells"]
-    assert (said.place, said.key, said.value, said.limit, said.ok) == ("links.main", "cells", 100.0, 200.0, True)
+    assert (said.place, said.key, said.value, said.limit, said.ok) == (
+        "links.main",
+        "cells",
+        100.0,
+        200.0,
+        True,
+    )
     assert "4.1 % too short" in said.text
     plain = wall(1.3, 100, 3.0) | {"fluid": scenes.WATER}
     assert not fvsolve.build(fvsolve.load(plain)).warnings
@@ -339,10 +417,15 @@ def test_the_error_stated_by_the_note_is_that_behind_a_stop(cells):
     """A stopped column returns and separates; its cavity is too short by 0.5 to 1.5 times the stated error."""
     v0, back = 1.3, 2.0 * LENGTH / SPEED
     nodes = {"lake": reservoir(START), "gate": junction()}
-    case = scene(nodes, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, cells)}, 3.0, PLAIN, fluid=WATER)
+    case = scene(
+        nodes, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, cells)}, 3.0, PLAIN, fluid=WATER
+    )
     model, state = parted(case, np.full(cells, v0))
     lasts = cavity(v0, DROP, 1000.0, SPEED, LENGTH)[0]
-    state, times = fvsolve.advance(model, state, back + 0.6 * lasts), back + np.arange(0.6, 1.1, 2e-3) * lasts
+    state, times = (
+        fvsolve.advance(model, state, back + 0.6 * lasts),
+        back + np.arange(0.6, 1.1, 2e-3) * lasts,
+    )
     pressures = []
     for t in times[1:]:
         state = fvsolve.advance(model, state, float(t))
@@ -371,14 +454,21 @@ def test_a_line_over_a_summit_separates_there_and_rejoins_as_by_characteristics(
 
 def test_cavitation_alone_sets_its_defaults_and_a_scene_that_contradicts_is_refused_at_once():
     """Cavitation sets law, air, scheme, method and Courant number, unless the case states them."""
-    gate = {"lake": lake(20.0), "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"})}
-    case = scene(gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"])
+    gate = {
+        "lake": lake(20.0),
+        "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"}),
+    }
+    case = scene(
+        gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"]
+    )
     case["fluid"] = scenes.WATER | {"cavitation": True}
     del case["fluid"]["law"]
     short = fvsolve.run(case)
     said = WATER | {"air_fraction": 1e-7}
     full = fvsolve.run(case | {"fluid": said, "numerics": {"end": 0.3, **PLAIN}})
-    assert np.array_equal(short["gate.pressure"], full["gate.pressure"]) and short.summary["cavities"]
+    assert (
+        np.array_equal(short["gate.pressure"], full["gate.pressure"]) and short.summary["cavities"]
+    )
     assert fvsolve.run(case, set={"fluid.air_fraction": 1e-6}).case.properties.air.fraction == 1e-6
     with pytest.raises(CaseError) as error:
         fvsolve.run(case, set={"fluid.law": "linear", "numerics.scheme": "weno5"})
@@ -388,11 +478,23 @@ def test_cavitation_alone_sets_its_defaults_and_a_scene_that_contradicts_is_refu
 
 def upstream_gate(cells: int, end: float) -> dict:
     """Case of a gate at the upstream end of a main with friction, which closes at once."""
-    nodes = {"lake": lake(30.0, elevation=0.0), "gate": junction(elevation=0.0), "far": lake(25.0, elevation=0.0)}
+    nodes = {
+        "lake": lake(30.0, elevation=0.0),
+        "gate": junction(elevation=0.0),
+        "far": lake(25.0, elevation=0.0),
+    }
     shut = {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"}
-    links = {"valve": {"type": "valve", "from": "lake", "to": "gate", "diameter": 0.2, "loss_coefficient": 0.5,
-                       "opening": shut},
-             "main": pipe("gate", "far", 600.0, 0.2, 1100.0, cells)}  # fmt: skip
+    links = {
+        "valve": {
+            "type": "valve",
+            "from": "lake",
+            "to": "gate",
+            "diameter": 0.2,
+            "loss_coefficient": 0.5,
+            "opening": shut,
+        },
+        "main": pipe("gate", "far", 600.0, 0.2, 1100.0, cells),
+    }
     links["main"]["friction"] = {"model": "quasi-steady", "factor": 0.02}
     return scene(nodes, links, end, PLAIN, ["gate.head"], fluid=WATER)
 
@@ -419,10 +521,19 @@ def test_no_cell_of_a_cavity_gives_more_than_it_holds():
 AIR, FLOOR = 1.2e-3, 2000.0
 DIAMETER, HIGH = 0.5, 3e5
 SOFT = {
-    "name": "user", "density": 1000.0, "bulk_modulus": 1e7, "viscosity": 1e-3, "vapor_pressure": FLOOR,
-    "pressure": AMBIENT, "law": "mixture", "air_fraction": AIR, "cavitation": True,
-}  # fmt: skip
-EXACT = Mixture(1000.0, 1e7, AMBIENT, FLOOR, AIR / (1 - AIR) * (AMBIENT - FLOOR), 0.0, scenes.area(DIAMETER))
+    "name": "user",
+    "density": 1000.0,
+    "bulk_modulus": 1e7,
+    "viscosity": 1e-3,
+    "vapor_pressure": FLOOR,
+    "pressure": AMBIENT,
+    "law": "mixture",
+    "air_fraction": AIR,
+    "cavitation": True,
+}
+EXACT = Mixture(
+    1000.0, 1e7, AMBIENT, FLOOR, AIR / (1 - AIR) * (AMBIENT - FLOOR), 0.0, scenes.area(DIAMETER)
+)
 FOAM = EXACT.floor + EXACT.gas  # about half gas
 STATES = {  # pressure [Pa] and velocity [m/s] on the left and on the right
     "two liquids part and a cavity opens": ((HIGH, -5.0), (HIGH, 5.0)),
@@ -433,7 +544,9 @@ STATES = {  # pressure [Pa] and velocity [m/s] on the left and on the right
 }
 
 
-def resting_pipe(cells: int, fluid: dict = SOFT, speed: float | None = None, **numerics) -> fvsolve.Model:
+def resting_pipe(
+    cells: int, fluid: dict = SOFT, speed: float | None = None, **numerics
+) -> fvsolve.Model:
     nodes = {"left": reservoir(HIGH), "right": junction()}
     main = stiff_pipe("left", "right", LENGTH, DIAMETER, cells)
     if speed is not None:
@@ -460,14 +573,24 @@ def random_states(rng, law: Mixture, n: int):
 AERATED = {**SOFT, "density": 998.2, "bulk_modulus": 2.18e9, "air_fraction": 1e-3}
 
 
-@pytest.mark.parametrize("fluid, speed, near", [(SOFT, None, 1e-9), (AERATED, None, 1e-9), (AERATED, 1319.0, 2e-5)])
+@pytest.mark.parametrize(
+    "fluid, speed, near", [(SOFT, None, 1e-9), (AERATED, None, 1e-9), (AERATED, 1319.0, 2e-5)]
+)
 def test_the_state_between_the_waves_is_exact(fluid, speed, near):
     """Velocities between 200 pairs of liquid and foam: to 1e-9, in an elastic wall (nearly closed form) to 2e-5."""
     tables = resting_pipe(4, fluid, speed, scheme="upwind", method="euler").tables
     st, floats, pipe = tables.settings[0], tables.floats, tables.pipes[0]
     gas = fluid["air_fraction"] / (1 - fluid["air_fraction"]) * (AMBIENT - FLOOR)
     assert (pipe["compliance"] > 1e-10) == (speed is not None)
-    law = Mixture(fluid["density"], fluid["bulk_modulus"], AMBIENT, FLOOR, gas, float(pipe["compliance"]), EXACT.area)
+    law = Mixture(
+        fluid["density"],
+        fluid["bulk_modulus"],
+        AMBIENT,
+        FLOOR,
+        gas,
+        float(pipe["compliance"]),
+        EXACT.area,
+    )
     for left, right in random_states(np.random.default_rng(5), law, 200):
         p, v = RiemannProblem(law, left, right).middle()
         sides = state_at(st, floats, pipe, left[0]), state_at(st, floats, pipe, right[0])
@@ -485,7 +608,9 @@ def test_the_flux_at_a_face_is_that_of_the_exact_solution_on_its_ray():
         scale = max(EXACT.m(q) * (abs(u) + EXACT.c(q)) for q, u in (left, right))
         found = face_flux(st, floats, pipe, left[0], left[1], right[0], right[1])
         assert found[0] == pytest.approx(m * v, abs=2e-5 * scale)
-        assert found[1] == pytest.approx(m * v * v + EXACT.force(p), abs=1e-4 * scale * (1.0 + abs(v)))
+        assert found[1] == pytest.approx(
+            m * v * v + EXACT.force(p), abs=1e-4 * scale * (1.0 + abs(v))
+        )
 
 
 @pytest.mark.parametrize("name", STATES)

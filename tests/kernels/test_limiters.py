@@ -39,7 +39,9 @@ def pipe_scalars(code: int) -> np.ndarray:
 
 def single_face(code: int) -> np.ndarray:
     b, c, d = waves(3)
-    return np.array([reconstruction.value_muscl(code, *three) for three in zip(b, c, d, strict=True)])
+    return np.array(
+        [reconstruction.value_muscl(code, *three) for three in zip(b, c, d, strict=True)]
+    )
 
 
 def carried(code: int) -> np.ndarray:
@@ -105,7 +107,11 @@ def test_a_code_that_is_no_limiter_gives_nan_and_never_another(kernel):
 def test_a_pair_of_half_slopes_is_two_slopes():
     """One division gives both half slopes."""
     a, b, c, d = (row - 2.0 for row in waves(4))
-    for limiter in (reconstruction.minmod, reconstruction.van_leer, reconstruction.monotonized_central):
+    for limiter in (
+        reconstruction.minmod,
+        reconstruction.van_leer,
+        reconstruction.monotonized_central,
+    ):
         for four in zip(a, b, c, d, strict=True):
             one, two = reconstruction.half_slopes(limiter, *four)
             assert one == pytest.approx(0.5 * reconstruction.slope(limiter, *four[:2]), rel=1e-15)

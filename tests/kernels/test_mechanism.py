@@ -18,7 +18,9 @@ SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
 
 
 def model_of(bodies: dict, **numerics):
-    return fvsolve.build(fvsolve.load(scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.01, **numerics})))
+    return fvsolve.build(
+        fvsolve.load(scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.01, **numerics}))
+    )
 
 
 def row(model, out, name: str) -> np.ndarray:
@@ -39,9 +41,13 @@ def test_forward_dynamics_of_random_trees_are_those_of_pinocchio(many, first, se
     for k, name in enumerate(bodies):
         placed, here = data.oMi[k + 1], row(model, out, name)
         moved = pin.getClassicalAcceleration(peer, data, k + 1, pin.LOCAL_WORLD_ALIGNED)
-        assert here[ATTITUDE : ATTITUDE + 9].reshape(3, 3) == pytest.approx(placed.rotation, abs=1e-13)
+        assert here[ATTITUDE : ATTITUDE + 9].reshape(3, 3) == pytest.approx(
+            placed.rotation, abs=1e-13
+        )
         assert here[POSITION : POSITION + 3] == pytest.approx(placed.translation, abs=1e-13 * many)
-        assert here[ACCELERATION : ACCELERATION + 3] == pytest.approx(moved.linear, abs=1e-12 * scale)
+        assert here[ACCELERATION : ACCELERATION + 3] == pytest.approx(
+            moved.linear, abs=1e-12 * scale
+        )
         assert here[SPIN_RATE : SPIN_RATE + 3] == pytest.approx(moved.angular, abs=1e-12 * scale)
 
 
@@ -77,7 +83,8 @@ def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     """M = L'L with L from the kernels; entries between freedoms on different branches are zero."""
-    bodies = branch(random_tree(np.random.default_rng([8, seed]), 8, "ball"))  # the matrix of pinocchio has this order
+    # the matrix of pinocchio has this order
+    bodies = branch(random_tree(np.random.default_rng([8, seed]), 8, "ball"))
     model = model_of(bodies)
     pin, peer, data, q, _, rows = pinocchio_of(bodies, GRAVITY)
     truth = pin.crba(peer, data, q)
@@ -89,16 +96,34 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
         factor[j, path] = entries[row["row"] : row["row"] + row["depth"] + 1]
     table = dict(zip(motion_of(model).body_names, motion_of(model).body_table, strict=True))
     own = [int(table[name]["freedom"]) + k for name in rows for k in range(table[name]["freedoms"])]
-    assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(truth, abs=1e-13 * np.abs(truth).max())
+    assert (factor.T @ factor)[np.ix_(own, own)] == pytest.approx(
+        truth, abs=1e-13 * np.abs(truth).max()
+    )
 
 
 def test_a_wall_at_a_tree_leaves_its_mass_matrix_at_the_given_state():
     """A slider that moves a wall, and a pendulum on it: M_12 = -m l cos(a)."""
-    slider = {"type": "body", "mass": 5.0, "inertia": [1, 1, 1], "joint": {"kind": "prismatic", "axis": [1, 0, 0]}}
+    slider = {
+        "type": "body",
+        "mass": 5.0,
+        "inertia": [1, 1, 1],
+        "joint": {"kind": "prismatic", "axis": [1, 0, 0]},
+    }
     hinge = {"kind": "revolute", "axis": [0, 1, 0], "on": "slider"}
-    bob = {"type": "body", "mass": 2.0, "inertia": [0, 0, 0], "centre_of_mass": [0, 0, -0.7], "joint": hinge}
-    flume = {"type": "basin", "size": [2.0, 1.0], "cells": [8, 1], "level": 0.5,
-             "patches": {"lid": {"side": "west", "body": "slider"}}}  # fmt: skip
+    bob = {
+        "type": "body",
+        "mass": 2.0,
+        "inertia": [0, 0, 0],
+        "centre_of_mass": [0, 0, -0.7],
+        "joint": hinge,
+    }
+    flume = {
+        "type": "basin",
+        "size": [2.0, 1.0],
+        "cells": [8, 1],
+        "level": 0.5,
+        "patches": {"lid": {"side": "west", "body": "slider"}},
+    }
     model = model_of({"flume": flume, "slider": slider, "bob": bob})
     y = model.start.copy()
     y[model.state_names.index("bob.angle")] = 1.1
@@ -111,7 +136,10 @@ def test_a_wall_at_a_tree_leaves_its_mass_matrix_at_the_given_state():
 @pytest.mark.parametrize("seed", range(3))
 def test_energies_and_momenta_of_random_trees_are_those_of_pinocchio(seed):
     bodies = random_tree(np.random.default_rng([6, seed]), 6, "free")
-    sums = ("kinetic_energy", *(f"{what}momentum_{axis}" for what in ("", "angular_") for axis in "xyz"))
+    sums = (
+        "kinetic_energy",
+        *(f"{what}momentum_{axis}" for what in ("", "angular_") for axis in "xyz"),
+    )
     probes = [f"{name}.{one}" for name in bodies for one in sums]
     case = scene(bodies, {}, 1.0, {"method": "rk4", "step": 0.01}, probes)
     model = fvsolve.build(fvsolve.load(case))

@@ -6,21 +6,40 @@ import numpy as np
 import pytest
 from invariance.result_comparison import with_frames
 from reference.folders import CASES
-from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    SHARP,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 
 import fvsolve
 from fvsolve.case import load
 from fvsolve.core.model import RunData, build
 from fvsolve.core.steppers.tableau import method_named
 
-LOOP, SOLVE = import_module("fvsolve.core.solve.run_loop"), import_module("fvsolve.core.solve.solve")
+LOOP, SOLVE = (
+    import_module("fvsolve.core.solve.run_loop"),
+    import_module("fvsolve.core.solve.solve"),
+)
 RUBBED = {"friction": {"model": "steady", "factor": 0.018}}
 CLOCK = ("ended", "seconds", "seconds_setup", "seconds_total", "cost")
 
 
 def fork(end=4.0, every=0.05, fields=3, **numerics) -> dict:
     """Case of three pipes, one of a single cell, and a valve that closes: low pressures, rows between steps."""
-    nodes = {"lake": lake(60.0), "fork": junction(), "dead": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction()}
+    nodes = {
+        "lake": lake(60.0),
+        "fork": junction(),
+        "dead": junction(ramp(0.3, 0.1, 0.0, 0.02)),
+        "gate": junction(),
+    }
     links = {
         "main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 1300, **RUBBED),
         "side": pipe("dead", "fork", 270.0, 0.3, 900.0, 1),
@@ -52,7 +71,10 @@ def assert_same(one, other) -> None:
 SCENES = {
     "courant": fork(),
     "below one": fork(courant=0.7),
-    "fixed step": {**fork(), "numerics": {"end": 4.0, "scheme": "upwind", "method": "euler", "step": 8.1e-4}},
+    "fixed step": {
+        **fork(),
+        "numerics": {"end": 4.0, "scheme": "upwind", "method": "euler", "step": 8.1e-4},
+    },
     "rows at every step": fork(every=0.0004, end=1.0),
     "stops below vapour pressure": fork(below_vapor="stop"),
     "unstable": fork(courant=2.3, end=8.0),
@@ -79,7 +101,9 @@ def test_a_run_in_memory_computes_no_frames(monkeypatch):
     assert fvsolve.run(fork(fields=5)).reason == "finished"
 
 
-def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_of_the_general_path(tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_of_the_general_path(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(SOLVE, "CHECKPOINT_SECONDS", 0.0)
     times = []
 
@@ -97,7 +121,9 @@ def test_a_run_interrupted_and_resumed_equals_the_uninterrupted_run_of_the_gener
     files = sorted(p.name for p in (tmp_path / "whole").glob("*.csv"))
     assert files
     for file in files:
-        assert (tmp_path / "run" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes(), file
+        assert (tmp_path / "run" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes(), (
+            file
+        )
     assert resumed.ledger == unbroken.ledger
 
 

@@ -26,18 +26,26 @@ def test_without_waves_the_velocity_is_that_of_the_steady_state_to_the_bit():
 def test_uniform_waves_change_the_velocity_to_flow_over_mass():
     mass = np.linspace(30.0, 32.0, CELLS)
     found = changes(mass, np.full(CELLS, 4.0), np.full(CELLS, -1.5))
-    assert found == pytest.approx(REFERENCE * ((FLOW + 5.5) / (mass + 2.5 / SPEED) - FLOW / mass), rel=1e-12)
+    assert found == pytest.approx(
+        REFERENCE * ((FLOW + 5.5) / (mass + 2.5 / SPEED) - FLOW / mass), rel=1e-12
+    )
 
 
 def test_in_a_cell_the_mean_of_flow_over_mass_counts():
     place, mass = np.arange(CELLS) - 2.0, np.full(CELLS, 30.0)
     found = changes(mass, 105.0 * place, 5.0 * place)  # linear along the pipe
     for i in range(1, CELLS - 1):
-        mean = quad(lambda x: (FLOW + 100.0 * x) / (30.0 + 0.1 * x), place[i] - 0.5, place[i] + 0.5)[0]
+        mean = quad(
+            lambda x: (FLOW + 100.0 * x) / (30.0 + 0.1 * x), place[i] - 0.5, place[i] + 0.5
+        )[0]
         assert found[i] == pytest.approx(REFERENCE * (mean - FLOW / 30.0), rel=1e-6)
 
 
-WALL = {"youngs_modulus": 1.4e9, "thickness": 0.01, "creep": {"compliance": [4e-10, 2e-10], "time": [0.05, 0.5]}}
+WALL = {
+    "youngs_modulus": 1.4e9,
+    "thickness": 0.01,
+    "creep": {"compliance": [4e-10, 2e-10], "time": [0.05, 0.5]},
+}
 
 
 def test_the_rate_of_stored_energy_is_the_derivative_of_the_stored_energy():
@@ -49,7 +57,11 @@ def test_the_rate_of_stored_energy_is_the_derivative_of_the_stored_energy():
     profile = model.tables.profile
     y, rates = np.random.default_rng(6).standard_normal((2, model.y_size))
     per, lag = 1e-3, np.zeros(row["cells"])
-    low, high = (creep_energy.py_func(settings, floats, profile, row, y + sign * per * rates) for sign in (-1.0, 1.0))
+    low, high = (
+        creep_energy.py_func(settings, floats, profile, row, y + sign * per * rates)
+        for sign in (-1.0, 1.0)
+    )
     taken, rate = creep_power.py_func(settings, floats, profile, row, lag, y, rates)
-    assert rate == pytest.approx((high - low) / (2.0 * per), rel=1e-9)  # a quadratic form: the difference is exact
+    # a quadratic form: the difference is exact
+    assert rate == pytest.approx((high - low) / (2.0 * per), rel=1e-9)
     assert taken > 0.0

@@ -21,7 +21,9 @@ def shutting(ways: list[tuple[str, str]], ends=None, law: str = "linear") -> fvs
         f"v{k}": valve(*way, 1e-3, ramp(1.0, end - 1.0, 1.0, 0.0))
         for k, (way, end) in enumerate(zip(ways, ends, strict=True))
     }
-    probes = [f"{name}.head" for name in sorted(used & {"X", "Y"})] + [f"{name}.flow" for name in links]
+    probes = [f"{name}.head" for name in sorted(used & {"X", "Y"})] + [
+        f"{name}.flow" for name in links
+    ]
     nodes = {name: node for name, node in nodes.items() if name in used}
     case = scene(nodes, links, 2.0, {"rtol": 1e-7, "method": "dormand-prince"}, probes, 0.05)
     case["fluid"]["law"] = law
@@ -37,7 +39,9 @@ def leaks(x: float, *around: float) -> float:
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
-@pytest.mark.parametrize("ends", [None, [1.1, 1.2, 1.3], [1.0, 1.0, 1.0]], ids=["together", "in turn", "at once"])
+@pytest.mark.parametrize(
+    "ends", [None, [1.1, 1.2, 1.3], [1.0, 1.0, 1.0]], ids=["together", "in turn", "at once"]
+)
 def test_a_junction_between_shut_valves_floats_where_equal_leaks_balance(ends, law):
     result = shutting([("A", "X"), ("X", "B"), ("X", "C")], ends, law)
     wanted = brentq(lambda x: leaks(x, 50.0, 40.0, 30.0), 30.0, 50.0)
@@ -58,7 +62,9 @@ def test_a_valve_that_almost_shuts_leaves_its_junction_between_its_neighbours():
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     opening = ramp(1.0, 0.1, 1.0, 1e-12)
     links = {"v0": valve("A", "X", 1e-3, opening), "v1": valve("X", "B", 1e-3, opening)}
-    result = fvsolve.run(scene(nodes, links, 2.0, {"rtol": 1e-7, "method": "dormand-prince"}, ["X.head"], 0.05))
+    result = fvsolve.run(
+        scene(nodes, links, 2.0, {"rtol": 1e-7, "method": "dormand-prince"}, ["X.head"], 0.05)
+    )
     assert result.ok
     assert result["X.head"] == pytest.approx(45.0, rel=1e-8)
 
@@ -75,7 +81,10 @@ def with_given_flow_at_x(demand: float, law: str = "linear") -> fvsolve.Result:
 
 @pytest.mark.parametrize(
     ("demand", "law", "words"),
-    [(-1e-3, "linear", "the inflow at X finds no way out"), (1e-3, "log", "the demand at X cannot be supplied")],
+    [
+        (-1e-3, "linear", "the inflow at X finds no way out"),
+        (1e-3, "log", "the demand at X cannot be supplied"),
+    ],
 )
 def test_a_given_flow_behind_shut_valves_stops_the_run_by_name(demand, law, words):
     result = with_given_flow_at_x(demand, law)
@@ -104,7 +113,9 @@ def column_and_valve(opening: dict, **numerics) -> fvsolve.Result:
     return fvsolve.run(scene(nodes, links, 3.0, settings, ["X.head", "main.flow"], 0.05))
 
 
-@pytest.mark.parametrize("numerics", [{}, {"step": 1e-3, "method": "rk4"}], ids=["default", "fixed step"])
+@pytest.mark.parametrize(
+    "numerics", [{}, {"step": 1e-3, "method": "rk4"}], ids=["default", "fixed step"]
+)
 def test_a_valve_shuts_on_a_rigid_column_at_the_head_that_stops_it(numerics):
     """Near the end q = F s with s^2 = dP - (L / A) F' s in kg/s and Pa: 52.478 m in X, then 50 m as in the lake."""
     result = column_and_valve(ramp(0.5, 0.5, 1.0, 0.0), **numerics)
@@ -128,7 +139,13 @@ def test_a_valve_does_so_next_to_an_ideal_check_valve_that_is_shut(method, law, 
     nodes = {"A": lake(50.0), "B": lake(40.0), "X": junction()}
     column = {"type": "rigid-column", "from": "A", "to": "X", "length": 10.0, "diameter": 0.1}
     links = {"main": column, "tap": valve("X", "B", 0.61e-3, ramp(0.5, 0.5, 1.0, 0.0))}
-    links["check"] = {"type": "check-valve", "area": 0.61e-3, "discharge_coefficient": 1.0, "from": "B", "to": "X"}
+    links["check"] = {
+        "type": "check-valve",
+        "area": 0.61e-3,
+        "discharge_coefficient": 1.0,
+        "from": "B",
+        "to": "X",
+    }
     case = scene(nodes, links, 1.5, {"rtol": 1e-6, "method": method}, ["X.head", "main.flow"], 0.05)
     case["fluid"]["law"] = law
     if turned:
@@ -146,7 +163,9 @@ def test_a_valve_does_so_next_to_an_ideal_check_valve_that_is_shut(method, law, 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
-@pytest.mark.parametrize("ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 1e-6)], ids=["shuts", "opens", "all but shuts"])
+@pytest.mark.parametrize(
+    "ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 1e-6)], ids=["shuts", "opens", "all but shuts"]
+)
 def test_no_ramp_of_a_valve_on_a_rigid_column_stalls_the_run(ends, exponent):
     result = column_and_valve(ramp(0.5, 0.5, *ends, exponent))
     assert result.ok, result.reason
@@ -160,7 +179,10 @@ def test_a_rigid_column_starts_from_rest_when_its_valve_opens_again():
     opening = {"time": [0.4, 0.5, 1.0], "value": [1.0, 0.0, 1.0], "kind": "step"}
     result = column_and_valve(opening)
     assert result.ok, result.reason
-    rate, most = 9.80665 * math.pi / 4 * 0.1**2 / 10.0 * 10.0, 0.61e-3 * math.sqrt(2 * 9.80665 * 10.0)
+    rate, most = (
+        9.80665 * math.pi / 4 * 0.1**2 / 10.0 * 10.0,
+        0.61e-3 * math.sqrt(2 * 9.80665 * 10.0),
+    )
     late = result.t > 1.0
     wanted = most * np.tanh(rate / most * (result.t[late] - 1.0))
     assert result["main.flow"][late] == pytest.approx(wanted, abs=1e-6 * most)
@@ -169,12 +191,24 @@ def test_a_rigid_column_starts_from_rest_when_its_valve_opens_again():
 def test_rows_between_steps_do_not_overshoot_a_front():
     nodes = {"lake": lake(60.0), "gate": junction(), "sea": lake(30.0)}
     links = {
-        "main": {"type": "pipe", "from": "lake", "to": "gate", "length": 100.0, "diameter": 0.3, "wave_speed": 1000.0,
-                 "cells": 10, "friction": {"model": "none"}},
-        "tap": valve("gate", "sea", 0.01, {"time": [0.0, 0.1], "value": [1.0, 0.0], "kind": "step"}),
-    }  # fmt: skip
+        "main": {
+            "type": "pipe",
+            "from": "lake",
+            "to": "gate",
+            "length": 100.0,
+            "diameter": 0.3,
+            "wave_speed": 1000.0,
+            "cells": 10,
+            "friction": {"model": "none"},
+        },
+        "tap": valve(
+            "gate", "sea", 0.01, {"time": [0.0, 0.1], "value": [1.0, 0.0], "kind": "step"}
+        ),
+    }
     numerics = {"scheme": "upwind", "method": "euler", "courant": 1.0}
-    result = fvsolve.run(scene(nodes, links, 1.0, numerics, ["gate.pressure", "main.pressure@0.55"], 0.001))
+    result = fvsolve.run(
+        scene(nodes, links, 1.0, numerics, ["gate.pressure", "main.pressure@0.55"], 0.001)
+    )
     for name in ("gate.pressure", "main.pressure@0.55"):
         least, _, greatest, _ = result.extremes[name]
         assert np.max(result[name]) <= greatest + 1e-6
@@ -241,4 +275,6 @@ def test_more_pumps_than_places_all_pump(law):
     for k, flow in enumerate(rated):
         for row, speed in ((0, 1.0), (-1, 0.6)):
             wanted = flow * np.sqrt((40.0 * speed**2 - 5.0) / 10.0)
-            assert result[f"p{k}.flow"][row] == pytest.approx(wanted, rel=1e-9 if law == "linear" else 1e-3)
+            assert result[f"p{k}.flow"][row] == pytest.approx(
+                wanted, rel=1e-9 if law == "linear" else 1e-3
+            )

@@ -40,11 +40,14 @@ def test_all_forms_of_a_file_give_the_same_patches(kind, form):
     mesh = read(GMSH / f"{kind}-{form}.msh")
     assert mesh.patches == ("west", "east", "wall")
     assert lengths(mesh) == approx({"west": 4.0, "east": 4.0, "wall": 20.0}, rel=1e-12)
-    assert mesh.middle[mesh.patch("west")][:, 0] == approx(0.0, abs=1e-12) and mesh.area.sum() == approx(40.0)
+    assert mesh.middle[mesh.patch("west")][:, 0] == approx(
+        0.0, abs=1e-12
+    ) and mesh.area.sum() == approx(40.0)
     assert not any("number instead of a name" in note for note in mesh.notes)
 
 
-CURVE = re.compile(r"^(\d) (\S+ \S+ \S+ \S+ \S+ \S+) 1 -?([12]) ", re.MULTILINE)  # a curve of a group, of 4.0 and 4.1
+# a curve of a group, of 4.0 and 4.1
+CURVE = re.compile(r"^(\d) (\S+ \S+ \S+ \S+ \S+ \S+) 1 -?([12]) ", re.MULTILINE)
 
 
 @pytest.mark.parametrize("form", ["4.0-a", "4.1-a"])
@@ -52,9 +55,13 @@ CURVE = re.compile(r"^(\d) (\S+ \S+ \S+ \S+ \S+ \S+) 1 -?([12]) ", re.MULTILINE)
 def test_reversed_curves_belong_to_their_group(form, signs, tmp_path):
     turn = dict(zip("2356", signs, strict=True))
     text = (GMSH / f"plain-{form}.msh").read_text()
-    text, count = CURVE.subn(lambda match: f"{match[1]} {match[2]} 1 {turn[match[1]]}{match[3]} ", text)
+    text, count = CURVE.subn(
+        lambda match: f"{match[1]} {match[2]} 1 {turn[match[1]]}{match[3]} ", text
+    )
     (tmp_path / "turned.msh").write_text(text)
-    assert count == 4 and lengths(read(tmp_path / "turned.msh")) == approx({"west": 4.0, "east": 4.0, "wall": 20.0})
+    assert count == 4 and lengths(read(tmp_path / "turned.msh")) == approx(
+        {"west": 4.0, "east": 4.0, "wall": 20.0}
+    )
 
 
 def test_the_flow_through_a_patch_with_a_reversed_curve_is_that_of_msh_2():
@@ -62,15 +69,24 @@ def test_the_flow_through_a_patch_with_a_reversed_curve_is_that_of_msh_2():
 
     def flow(form):
         patches = {"west": {"stage": 0.6}, "east": {"stage": 0.5}}
-        pool = {"type": "basin", "mesh": {"file": str(GMSH / f"plain-{form}.msh")}, "level": 0.5, "bed": 0.0,
-                "patches": patches}  # fmt: skip
-        return fvsolve.run(scene({"b": pool}, {}, 3.0, {"scheme": "upwind"}, ["b.west.flow"]))["b.west.flow"]
+        pool = {
+            "type": "basin",
+            "mesh": {"file": str(GMSH / f"plain-{form}.msh")},
+            "level": 0.5,
+            "bed": 0.0,
+            "patches": patches,
+        }
+        return fvsolve.run(scene({"b": pool}, {}, 3.0, {"scheme": "upwind"}, ["b.west.flow"]))[
+            "b.west.flow"
+        ]
 
     one, other = flow("2.2-a"), flow("4.1-b")
     assert other == approx(one, rel=1e-9) and one[-1] > 0.5
 
 
-@pytest.mark.parametrize("name", ["all-4.1-a", "para-4.1-b", "z-4.1-b", "points-4.1-a", "surf2-4.1-a"])
+@pytest.mark.parametrize(
+    "name", ["all-4.1-a", "para-4.1-b", "z-4.1-b", "points-4.1-a", "surf2-4.1-a"]
+)
 def test_other_content_of_a_file_changes_nothing(name):
     """All curves saved, parameters of points, another plane, a group of points, a surface in two groups."""
     assert lengths(read(GMSH / f"{name}.msh")) == approx({"west": 4.0, "east": 4.0, "wall": 20.0})
@@ -79,7 +95,9 @@ def test_other_content_of_a_file_changes_nothing(name):
 @pytest.mark.parametrize("form", ["2.2-a", "4.0-a", "4.1-a", "4.1-b"])
 def test_a_curve_in_two_groups_is_a_fault_in_each_version(form):
     """MSH 2.2 contains its lines twice."""
-    assert 'groups.again: faces shared with "west": 1, first the face from (0, 4) m' in fault(GMSH / f"two-{form}.msh")
+    assert 'groups.again: faces shared with "west": 1, first the face from (0, 4) m' in fault(
+        GMSH / f"two-{form}.msh"
+    )
 
 
 @pytest.mark.parametrize("form", ["2.2-a", "4.1-a"])
@@ -92,7 +110,9 @@ def test_a_curve_and_a_surface_may_have_groups_of_the_same_name(form):
 def test_a_group_between_cells_is_ignored_with_a_note(tmp_path):
     mesh = read(GMSH / "break-4.1-a.msh")
     assert lengths(mesh) == approx({"west": 4.0, "east": 4.0, "wall": 20.0})
-    assert mesh.notes[0].startswith('the lines of the group "breakline" lie between cells: ignored; `walls` of')
+    assert mesh.notes[0].startswith(
+        'the lines of the group "breakline" lie between cells: ignored; `walls` of'
+    )
     wall = read(GMSH / "break-4.1-a.msh", walls=["breakline"])
     assert wall.length[wall.groups["breakline"]].sum() == approx(4.0)
     mixed = write(tmp_path / "mixed.msh", SQUARE, TWO, {"in": [[1, 4], [0, 3]]})
@@ -140,7 +160,8 @@ def test_damaged_files_are_faults_in_bounded_time(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name, sign", [("a.node", " "), ("a.su2", "7"), ("a.su2", "a\n"), ("a.msh", " "), ("a.vtk", "#")]
+    "name, sign",
+    [("a.node", " "), ("a.su2", "7"), ("a.su2", "a\n"), ("a.msh", " "), ("a.vtk", "#")],
 )
 def test_texts_that_are_no_meshes_are_refused_in_bounded_time(name, sign, tmp_path):
     (tmp_path / name).write_text(sign * 10**6)

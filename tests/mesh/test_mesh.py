@@ -20,7 +20,8 @@ EPS = np.finfo(float).eps
 def meshes(tmp_path):
     """Meshes by name : (mesh, area of the domain [m2], number of holes)."""
     triangles, mixed = (
-        read(write(tmp_path / f"{name}.msh", *made)) for name, made in (("t", delaunay()), ("m", shaken()))
+        read(write(tmp_path / f"{name}.msh", *made))
+        for name, made in (("t", delaunay()), ("m", shaken()))
     )
     return {
         "rectangle": (rectangle((2.0, 1.0), (7, 4), origin=(1e3, -1e3)), 2.0, 0),
@@ -60,7 +61,10 @@ def test_greens_theorem_gives_areas_and_centroids(meshes, kind):
     reach = np.abs(mesh.points).max()
     assert around(mesh, flux) == approx(mesh.area, abs=16 * EPS * reach**2)
     origin = mesh.points.mean(0)
-    a, b, m = (p - origin for p in (mesh.points[mesh.ends[:, 0]], mesh.points[mesh.ends[:, 1]], mesh.middle))
+    a, b, m = (
+        p - origin
+        for p in (mesh.points[mesh.ends[:, 0]], mesh.points[mesh.ends[:, 1]], mesh.middle)
+    )
     square = (a**2 + 4 * m**2 + b**2) / 6
     moment = around(mesh, 0.5 * square * mesh.normal * mesh.length[:, None])
     assert moment == approx(mesh.area[:, None] * (mesh.centre - origin), abs=16 * EPS * reach**2)
@@ -70,7 +74,9 @@ def test_greens_theorem_gives_areas_and_centroids(meshes, kind):
 def test_faces_stand_in_order_and_look_from_left_to_right(meshes, kind):
     mesh, _, _ = meshes[kind]
     inner = slice(0, mesh.inner)
-    assert (mesh.right[: mesh.inner] > mesh.left[: mesh.inner]).all() and (mesh.right[mesh.inner :] < 0).all()
+    assert (mesh.right[: mesh.inner] > mesh.left[: mesh.inner]).all() and (
+        mesh.right[mesh.inner :] < 0
+    ).all()
     across = mesh.centre[mesh.right[inner]] - mesh.centre[mesh.left[inner]]
     assert ((across * mesh.normal[inner]).sum(1) > 0).all()
     assert (((mesh.middle - mesh.centre[mesh.left]) * mesh.normal).sum(1) > 0).all()
@@ -98,7 +104,9 @@ def test_spacings_grow_geometrically():
 
 
 def test_the_same_rectangle_from_a_file(tmp_path):
-    made = rectangle((2.0, 1.0), (6, 4), grading=(3.0, 1.0), patches={"in": ("west", 0.25, 0.75), "out": "east"})
+    made = rectangle(
+        (2.0, 1.0), (6, 4), grading=(3.0, 1.0), patches={"in": ("west", 0.25, 0.75), "out": "east"}
+    )
     groups = {name: made.ends[made.patch(name)] for name in ("in", "out")}
     back = read(write(tmp_path / "r.msh", made.points, corner_lists(made), groups))
     assert back.grid is None and back.patches == made.patches == ("in", "out", "wall")
@@ -117,7 +125,10 @@ def test_order_of_points_cells_and_corners_does_not_matter(tmp_path):
     place = rng.permutation(len(points))
     moved = np.empty_like(points)
     moved[place] = points
-    turned = [np.roll(place[cells[c]], rng.integers(4))[:: rng.choice([1, -1])] for c in rng.permutation(len(cells))]
+    turned = [
+        np.roll(place[cells[c]], rng.integers(4))[:: rng.choice([1, -1])]
+        for c in rng.permutation(len(cells))
+    ]
     other = read(write(tmp_path / "c.msh", moved, turned, {"west": place[west][::-1, ::-1]}))
     assert sets(one) == sets(other) and one.patches == other.patches
     assert any("were clockwise: reversed" in note for note in other.notes) and len(west) == 5
@@ -127,10 +138,16 @@ def test_quality_of_known_shapes(tmp_path):
     points = [(0, 0), (1, 0), (0.5, math.sqrt(0.75)), (2, 0)]
     mesh = read(write(tmp_path / "t.msh", points, [[0, 1, 2], [1, 3, 2]]))
     found = quality(mesh)
-    assert found.angle == approx(math.pi / 6) and mesh.centre[found.sharpest, 0] > 1.0 and found.ratio == approx(1.0)
+    assert (
+        found.angle == approx(math.pi / 6)
+        and mesh.centre[found.sharpest, 0] > 1.0
+        and found.ratio == approx(1.0)
+    )
     assert found.smallest == approx(math.sqrt(3) / 4) and found.largest == approx(math.sqrt(3) / 4)
     alone = quality(rectangle((2.0, 3.0), (1, 1)))
-    assert (alone.ratio, alone.steepest, alone.largest) == (1.0, -1, 6.0) and alone.angle == approx(math.pi / 2)
+    assert (alone.ratio, alone.steepest, alone.largest) == (1.0, -1, 6.0) and alone.angle == approx(
+        math.pi / 2
+    )
 
 
 def test_patches_and_holes_of_a_rectangle():
@@ -139,13 +156,20 @@ def test_patches_and_holes_of_a_rectangle():
         (6, 4),
         origin=(1.0, 0.0),
         holes=[(2.5, 1.0, 4.0, 2.0)],
-        patches={"in": ("west", 0.5, 1.5), "top": "north", "wall": ("south", 1.0, 2.0), "out": "east"},
+        patches={
+            "in": ("west", 0.5, 1.5),
+            "top": "north",
+            "wall": ("south", 1.0, 2.0),
+            "out": "east",
+        },
     )
     assert mesh.patches == ("in", "top", "out", "wall") and mesh.grid.index[3, 3] == -1
     assert mesh.middle[mesh.patch("in")].tolist() == [[1.0, 0.75], [1.0, 1.25]]
-    assert mesh.middle[mesh.patch("top")][:, 0].tolist() == [1.25, 1.75, 2.25]  # the part of the side without the hole
+    # the part of the side without the hole
+    assert mesh.middle[mesh.patch("top")][:, 0].tolist() == [1.25, 1.75, 2.25]
     assert mesh.middle[mesh.patch("out")].tolist() == [[4.0, 0.25], [4.0, 0.75]]
-    assert mesh.length[mesh.inner :].sum() == 10.0  # the perimeter does not change with a corner cut out
+    # the perimeter does not change with a corner cut out
+    assert mesh.length[mesh.inner :].sum() == 10.0
     with pytest.raises(ValueError):
         mesh.patch("outlet")
 
@@ -183,7 +207,9 @@ def test_the_unit_of_a_file(tmp_path):
     path = write(tmp_path / "mm.msh", 1e3 * np.array(SQUARE), TWO)
     mesh = read(path, unit="mm")
     assert mesh.points.tolist() == [list(p) for p in SQUARE] and mesh.area.tolist() == [1.0, 1.0]
-    with pytest.raises(MeshError, match='mm.msh: 1 fault\n  unit: "bar" is a pressure; expected a length'):
+    with pytest.raises(
+        MeshError, match='mm.msh: 1 fault\n  unit: "bar" is a pressure; expected a length'
+    ):
         read(path, unit="bar")
     bad = write(tmp_path / "bad.msh", 1e3 * np.array(SQUARE), [TWO[0], [1, 2, 4, 5]])
     with pytest.raises(MeshError, match=r"cell 1 at \(1500, 500\) mm"):
@@ -191,7 +217,8 @@ def test_the_unit_of_a_file(tmp_path):
 
 
 def test_formats_give_the_same_mesh(tmp_path):
-    (tmp_path / "four.msh").write_text(MSH4)  # format of Gmsh's manual, with gaps between the numbers of points
+    # format of Gmsh's manual, with gaps between the numbers of points
+    (tmp_path / "four.msh").write_text(MSH4)
     four = read(tmp_path / "four.msh")
     groups = {"in": [0, 3], "out": [2, 5]}
     two = read(write(tmp_path / "two.msh", SQUARE, TWO, groups))
@@ -214,7 +241,10 @@ def test_numbered_groups_are_patches_by_number(tmp_path):
     lines.write(tmp_path / "ref.mesh")
     mesh = read(tmp_path / "ref.mesh")
     assert mesh.patches == ("4", "wall") and mesh.middle[mesh.patch("4")].tolist() == [[0.0, 0.5]]
-    assert "groups of lines with a number instead of a name in the file: their patches are named 4" in mesh.notes
+    assert (
+        "groups of lines with a number instead of a name in the file: their patches are named 4"
+        in mesh.notes
+    )
 
 
 @pytest.mark.parametrize("x", [1e300, -1e300, 1e155, math.inf, math.nan, 1.0 + 1e-6])
@@ -230,10 +260,14 @@ BAD_RECTANGLES = {
     "cells: [4, 2.5]; expected two whole numbers": dict(cells=(4, 2.5)),
     "origin: [nan, 0]; expected the two coordinates": dict(origin=(math.nan, 0)),
     "grading: [0, 1]; expected two positive ratios": dict(grading=(0, 1)),
-    "grading: [2, 1] with cells [1, 4]; expected 1 along an axis": dict(cells=(1, 4), grading=(2, 1)),
+    "grading: [2, 1] with cells [1, 4]; expected 1 along an axis": dict(
+        cells=(1, 4), grading=(2, 1)
+    ),
     "grading: [1e+40, 1]: the smallest cells vanish": dict(origin=(1.0, 0.0), grading=(1e40, 1)),
     "holes[0]: [0, 0, 0, 1]; expected [x0, y0, x1, y1]": dict(holes=[(0, 0, 0, 1)]),
-    "holes[0]: x1 = 0.3 m is on no grid line; nearest x: 0.25 and 0.5 m": dict(holes=[(0, 0, 0.3, 1)]),
+    "holes[0]: x1 = 0.3 m is on no grid line; nearest x: 0.25 and 0.5 m": dict(
+        holes=[(0, 0, 0.3, 1)]
+    ),
     "holes[0]: y1 = 2 m is on no grid line; nearest y: 1 m": dict(holes=[(0, 0, 0.5, 2)]),
     "holes: the holes leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
     "holes: the holes leave no cell": dict(holes=[(0, 0, 1, 1)]),
@@ -243,7 +277,9 @@ BAD_RECTANGLES = {
     "patches.a: 0.2 to 0.5 m does not consist of whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.2, 0.5)}
     ),
-    "holes[0]: [0, 0, 1e-12, 1] contains no cells; expected x0 and x1": dict(holes=[(0, 0, 1e-12, 1)]),
+    "holes[0]: [0, 0, 1e-12, 1] contains no cells; expected x0 and x1": dict(
+        holes=[(0, 0, 1e-12, 1)]
+    ),
     "patches.a: 0 to 1e-12 m does not consist of whole faces of the west side; nearest is 0 to 0.25 m": dict(
         patches={"a": ("west", 0.0, 1e-12)}
     ),
@@ -259,7 +295,9 @@ BAD_RECTANGLES = {
     "patches.a: 0 to 1 m on the west side runs along a hole; expected a span within 0 to 0.5 m": dict(
         holes=[(0, 0.5, 0.25, 1)], patches={"a": ("west", 0.0, 1.0)}
     ),
-    "patches.a: the holes remove the whole west side": dict(holes=[(0, 0, 0.5, 1)], patches={"a": "west"}),
+    "patches.a: the holes remove the whole west side": dict(
+        holes=[(0, 0, 0.5, 1)], patches={"a": "west"}
+    ),
 }
 
 
@@ -283,15 +321,21 @@ BAD_FILES = {
     "cells: 1 of 2 cells: cell 1 at (1.55, 0.3) m have coincident corners": dict(
         points=[*SQUARE[:2], (2, 0), (0, 1), (1, 1), (1.6, 0.6)], cells=[TWO[0], [1, 2, 5, 5]]
     ),
-    "cells: 1 of 2 cells: cell 1 at (1.5, 0.5) m cross themselves": dict(points=SQUARE, cells=[TWO[0], [1, 2, 4, 5]]),
+    "cells: 1 of 2 cells: cell 1 at (1.5, 0.5) m cross themselves": dict(
+        points=SQUARE, cells=[TWO[0], [1, 2, 4, 5]]
+    ),
     "cells: 1 of 2 cells: cell 1 at (1.3, 0.375) m are not convex": dict(
         points=[*SQUARE[:5], (1.2, 0.5)], cells=[TWO[0], [1, 2, 5, 4]]
     ),
-    "cells: 1 of 3 cells: cell 0 at (1, 0) m have no area": dict(points=SQUARE, cells=[[0, 1, 2], *TWO]),
+    "cells: 1 of 3 cells: cell 0 at (1, 0) m have no area": dict(
+        points=SQUARE, cells=[[0, 1, 2], *TWO]
+    ),
     "cells: some cells overlap at the face from (1, 1) m to (1, 0) m: cell 0 at (1.16667, 0.5) m and cell 1": dict(
         points=[*SQUARE, (1.5, 0.5)], cells=[[1, 6, 4], *TWO]
     ),
-    "both lie on one side of the face": dict(points=[*SQUARE[:5], (0.5, 0.5)], cells=[[0, 1, 4, 3], [0, 1, 5]]),
+    "both lie on one side of the face": dict(
+        points=[*SQUARE[:5], (0.5, 0.5)], cells=[[0, 1, 4, 3], [0, 1, 5]]
+    ),
     "(4 such faces): cell 0 at (0.5, 0.5) m and cell 1 at (0.5, 0.5) m and cell 2 at": dict(
         points=SQUARE, cells=[TWO[0]] * 3
     ),
@@ -308,14 +352,18 @@ BAD_FILES = {
     "groups.in: lines that are not boundary faces: 1 of 2; the line from (0, 0) m to (1, 1) m is not a side": dict(
         **GRID, groups={"in": [[0, 3], [0, 4]]}
     ),
-    "a line ends at a point that belongs to no cell": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
+    "a line ends at a point that belongs to no cell": dict(
+        points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}
+    ),
     'groups.out: faces shared with "in": 1, first the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
     "points: z runs from 0 to 0.2 m; cell 1 has a point in the upper half of this range; expected a mesh": dict(
         points=[(x, y, 0.2 * (x > 1)) for x, y in SQUARE], cells=TWO
     ),
-    "z = constant; y is constant: turn the mesh": dict(points=[(x, 0, y) for x, y in SQUARE], cells=TWO),
+    "z = constant; y is constant: turn the mesh": dict(
+        points=[(x, 0, y) for x, y in SQUARE], cells=TWO
+    ),
     "cells: there are no two-dimensional cells (2 line); expected triangle and quad": dict(
         points=SQUARE, cells=[], groups={"in": [[0, 1], [1, 2]]}
     ),
@@ -338,17 +386,25 @@ def test_a_boundary_that_crosses_itself(tmp_path):
     """A strip of quads turns round and crosses its own beginning."""
     ring = [(r * math.cos(w), r * math.sin(w)) for w in np.arange(9) * 0.9 for r in (1.0, 2.0)]
     cells = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(8)]
-    with pytest.raises(MeshError, match=r"places faces cross each other: cell \d at .* and cell \d at"):
+    with pytest.raises(
+        MeshError, match=r"places faces cross each other: cell \d at .* and cell \d at"
+    ):
         read(write(tmp_path / "ring.msh", ring, cells))
-    assert read(write(tmp_path / "ring.msh", ring, cells[:6])).area.sum() == approx(6 * 1.5 * math.sin(0.9))
+    assert read(write(tmp_path / "ring.msh", ring, cells[:6])).area.sum() == approx(
+        6 * 1.5 * math.sin(0.9)
+    )
 
 
 def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
-    points = [*SQUARE, (0, 2), (1, 2), (2, 2), (1, 0)]  # two cells above two, the lower two separate
+    # two cells above two, the lower two separate
+    points = [*SQUARE, (0, 2), (1, 2), (2, 2), (1, 0)]
     cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
     mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="at 1 place faces coincide .* a group of lines that marks the face as a thin"):
+    with pytest.raises(
+        MeshError,
+        match="at 1 place faces coincide .* a group of lines that marks the face as a thin",
+    ):
         read(write(tmp_path / "none.msh", points, cells))
     monkeypatch.setattr(read_mesh, "BLOCK", 1)  # as for a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
@@ -362,7 +418,9 @@ def test_faults_of_several_kinds_come_together(tmp_path):
     with pytest.raises(MeshError) as caught:
         read(write(tmp_path / "bad.msh", points, cells))
     found = [fault.message for fault in caught.value.faults]
-    assert [word in text for word, text in zip(["coincident", "cross", "overlap"], found, strict=True)] == [True] * 3
+    assert [
+        word in text for word, text in zip(["coincident", "cross", "overlap"], found, strict=True)
+    ] == [True] * 3
 
 
 def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
@@ -372,14 +430,19 @@ def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
         return str(caught.value)
 
     (tmp_path / "pool.msh").write_text(MSH4[: len(MSH4) // 2])
-    assert 'pool.msh: 1 fault\n  the file cannot be read (the section "$Entities" has no end; ' in fault("pool.msh")
+    assert (
+        'pool.msh: 1 fault\n  the file cannot be read (the section "$Entities" has no end; '
+        in fault("pool.msh")
+    )
     assert 'there is no such file; did you mean "pool.msh"?' in fault("pol.msh")
     (tmp_path / "pool.dxf").write_text("0\n")
     assert "expected a name that ends in " in fault("pool.dxf") and ".msh" in fault("pool.dxf")
     (tmp_path / "empty.vtk").write_text("")
     assert "empty.vtk: 1 fault\n  meshio cannot read the file (" in fault("empty.vtk")
     cube = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-    meshio.Mesh(cube, [("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])]).write(tmp_path / "solid.vtk")
+    meshio.Mesh(cube, [("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])]).write(
+        tmp_path / "solid.vtk"
+    )
     assert "cells: the file has three-dimensional cells (1 tetra, 1 triangle)" in fault("solid.vtk")
     six = np.array([(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     meshio.Mesh(six, [("triangle6", [[0, 1, 2, 3, 4, 5]])]).write(tmp_path / "six.vtk")
@@ -396,7 +459,9 @@ def test_a_group_without_lines_is_reported(tmp_path):
     (tmp_path / "four.msh").write_text(
         MSH4.replace('1 7 "in"', '1 7 "in"\n1 9 "rim"').replace("Names\n3\n", "Names\n4\n")
     )
-    with pytest.raises(MeshError, match="groups.rim: the group contains no line of the file; .*Mesh.SaveAll"):
+    with pytest.raises(
+        MeshError, match="groups.rim: the group contains no line of the file; .*Mesh.SaveAll"
+    ):
         read(tmp_path / "four.msh")
 
 
@@ -406,6 +471,7 @@ def test_a_cell_that_names_no_point(tmp_path):
         "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
     )
     with pytest.raises(
-        MeshError, match="cells: number 0 refers to a point that is not in the file; the file has 3 points"
+        MeshError,
+        match="cells: number 0 refers to a point that is not in the file; the file has 3 points",
     ):
         read(tmp_path / "lost.vtk")

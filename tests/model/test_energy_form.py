@@ -19,8 +19,10 @@ MASS, DAMPING = 10.0, 1000.0
 def pair(stiffness, hold=0.0):
     """Case of two masses with a spring and a damper between them, and an optional spring from a frame to the first."""
     nodes = {name: {"type": "mass", "mass": MASS} for name in "ab"}
-    links = {"spring": {"type": "spring", "from": "a", "to": "b", "stiffness": stiffness},
-             "damper": {"type": "damper", "from": "a", "to": "b", "damping": DAMPING}}  # fmt: skip
+    links = {
+        "spring": {"type": "spring", "from": "a", "to": "b", "stiffness": stiffness},
+        "damper": {"type": "damper", "from": "a", "to": "b", "damping": DAMPING},
+    }
     if hold:
         nodes["wall"] = {"type": "frame"}
         links["hold"] = {"type": "spring", "from": "wall", "to": "a", "stiffness": hold}
@@ -30,8 +32,11 @@ def pair(stiffness, hold=0.0):
 def greatest_stable_step(stiffness, method, steps=1000):
     """Greatest step of the relative motion at which no power of the step matrix exceeds 1000 in the energy norm [s]."""
     omega, rate = math.sqrt(2 * stiffness / MASS), 2 * DAMPING / MASS
-    j = np.array([[0.0, omega], [-omega, -rate]])  # states sqrt(k / 2) (x_b - x_a), sqrt(m / 4) (v_b - v_a)
-    coefficients = [float(x) for x in stability_function(method_named(method)).numerator.coefficients]
+    # states sqrt(k / 2) (x_b - x_a), sqrt(m / 4) (v_b - v_a)
+    j = np.array([[0.0, omega], [-omega, -rate]])
+    coefficients = [
+        float(x) for x in stability_function(method_named(method)).numerator.coefficients
+    ]
     low, high = 0.0, 10.0 / omega
     while high - low > 1e-6 * high:
         middle, power, fails = (low + high) / 2, np.eye(2), False
@@ -48,7 +53,9 @@ def greatest_stable_step(stiffness, method, steps=1000):
 def system_of(case, method, at=None, steps=1000):
     """Growth of the linearised system of a case in its energy norm."""
     state = operating_point(case, at=at)
-    return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearise_at(state).a), steps)
+    return DenseGrowth(
+        method_named(method), energy_form(state.model, state.y).seen(linearise_at(state).a), steps
+    )
 
 
 @pytest.mark.in_turn
@@ -62,7 +69,9 @@ def test_two_masses_on_a_spring_fail_where_their_relative_motion_does(stiffness,
 def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_theirs_fails():
     (row,) = stability(pair(1e6), methods=["rk4"], steps=300).rows
     assert abs(row.difference) < 0.005 and row.field_of_values <= row.predicted * (1 + 1e-4)
-    assert row.field_of_values > 0.0 and row.predicted == pytest.approx(greatest_stable_step(1e6, "rk4", 300), rel=2e-4)
+    assert row.field_of_values > 0.0 and row.predicted == pytest.approx(
+        greatest_stable_step(1e6, "rk4", 300), rel=2e-4
+    )
     for name in ("implicit-euler", "gauss-4"):
         assert math.isinf(predicted_limit(system_of(pair(1e6), name)).step)
         assert math.isinf(predicted_limit(system_of(pair(1e7, 0.1), name)).step)
@@ -99,7 +108,10 @@ def test_free_masses_are_idle_together_and_a_supported_mass_is_not():
 @pytest.mark.parametrize("at", [None, 1e-3])
 def test_a_closed_cylinder_neither_gains_nor_loses_energy_at_rest_or_moving(at):
     e = system_of("cases/closed-cylinder.toml", "rk4", at).e
-    assert np.max(np.abs(e + e.T)) < 1e-6 * np.max(np.abs(e)) and np.linalg.eigvalsh(0.5 * (e + e.T))[-1] < 1e-4
+    assert (
+        np.max(np.abs(e + e.T)) < 1e-6 * np.max(np.abs(e))
+        and np.linalg.eigvalsh(0.5 * (e + e.T))[-1] < 1e-4
+    )
 
 
 def test_an_idle_state_that_moves_an_energy_gets_the_least_weight():
@@ -111,7 +123,9 @@ def test_an_idle_state_that_moves_an_energy_gets_the_least_weight():
     assert not form.closed(driven)
     whole = form.suited_to(driven)
     assert np.sum((whole.forward @ [0.1, 0.0]) ** 2) == pytest.approx((2.0 * 0.5) ** 2)
-    assert np.sort(np.linalg.eigvals(whole.seen(driven))) == pytest.approx(np.sort(np.linalg.eigvals(driven)))
+    assert np.sort(np.linalg.eigvals(whole.seen(driven))) == pytest.approx(
+        np.sort(np.linalg.eigvals(driven))
+    )
 
 
 def test_the_greatest_growth_is_located_at_every_power_of_a_small_system():

@@ -34,18 +34,41 @@ def every_kind(law: str = "linear", scheme: str = "muscl", **numerics) -> dict:
             "sea": {"type": "reservoir", "pressure": 101325.0},
         },
         "links": {
-            "main": {"type": "pipe", "from": "lake", "to": "gate", "length": 200.0, "diameter": 0.2, "cells": 9,
-                     "friction": {"model": "quasi-steady", "roughness": 1e-4}},
-            "v1": {"type": "valve", "from": "gate", "to": "pot", "area": 2e-3,
-                   "opening": {"time": [0.1, 0.3], "value": [1.0, 0.2]}},
+            "main": {
+                "type": "pipe",
+                "from": "lake",
+                "to": "gate",
+                "length": 200.0,
+                "diameter": 0.2,
+                "cells": 9,
+                "friction": {"model": "quasi-steady", "roughness": 1e-4},
+            },
+            "v1": {
+                "type": "valve",
+                "from": "gate",
+                "to": "pot",
+                "area": 2e-3,
+                "opening": {"time": [0.1, 0.3], "value": [1.0, 0.2]},
+            },
             "v2": {"type": "valve", "from": "pot", "to": "mid", "area": 2e-3},
             "v3": {"type": "orifice", "from": "mid", "to": "pond", "area": 2e-3},
-            "drain": {"type": "rigid-column", "from": "pond", "to": "sea", "length": 20.0, "diameter": 0.1,
-                      "friction": {"model": "steady", "factor": 0.02}},
+            "drain": {
+                "type": "rigid-column",
+                "from": "pond",
+                "to": "sea",
+                "length": 20.0,
+                "diameter": 0.1,
+                "friction": {"model": "steady", "factor": 0.02},
+            },
         },
-        "numerics": {"end": 0.6, "scheme": scheme, "method": "ssp-rk3", **(numerics or {"courant": 0.8})},
+        "numerics": {
+            "end": 0.6,
+            "scheme": scheme,
+            "method": "ssp-rk3",
+            **(numerics or {"courant": 0.8}),
+        },
         "output": {"every": 0.05, "fields": 0},
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -60,13 +83,18 @@ def test_the_rhs_is_pure(law):
 
 
 def test_states_have_names_and_the_jacobian_is_the_slope_of_the_rhs():
-    model = fvsolve.build(fvsolve.load(every_kind(scheme="upwind5")))  # a limiter is not differentiable at rest
+    # a limiter is not differentiable at rest
+    model = fvsolve.build(fvsolve.load(every_kind(scheme="upwind5")))
     assert len(model.state_names) == model.y_size == 2 * 9 + 3
-    assert {"main.forward[0]", "main.backward[8]", "pot.mass", "pond.mass", "drain.flow"} <= set(model.state_names)
+    assert {"main.forward[0]", "main.backward[8]", "pot.mass", "pond.mass", "drain.flow"} <= set(
+        model.state_names
+    )
     y = np.zeros(model.y_size)
     direction = model.scale * np.random.default_rng(1).normal(size=model.y_size)
     slope = (model.rhs(0.0, y + 1e-5 * direction) - model.rhs(0.0, y - 1e-5 * direction)) / 2e-5
-    assert model.jacobian(0.0, y) @ direction == pytest.approx(slope, rel=1e-4, abs=1e-6 * np.max(np.abs(slope)))
+    assert model.jacobian(0.0, y) @ direction == pytest.approx(
+        slope, rel=1e-4, abs=1e-6 * np.max(np.abs(slope))
+    )
 
 
 def test_check_shows_the_computed_balance():
@@ -97,7 +125,9 @@ def test_a_loop_of_advances_is_the_run_with_the_schedule():
 def test_advance_refuses_inputs_that_name_nothing_and_times_gone_by():
     model = fvsolve.build(fvsolve.load(every_kind()))
     state = fvsolve.initial_state(model)
-    with pytest.raises(FvsolveError, match='no input named "v1.openning"; did you mean "v1.opening"'):
+    with pytest.raises(
+        FvsolveError, match='no input named "v1.openning"; did you mean "v1.opening"'
+    ):
         fvsolve.advance(model, state, 0.1, {"v1.openning": 0.3})
     with pytest.raises(FvsolveError, match="is before the time of the state"):
         fvsolve.advance(model, state, -1.0)
@@ -119,11 +149,19 @@ def test_advance_stops_for_the_same_reason_as_a_run():
 @pytest.mark.parametrize(
     "name, value, said",
     [
-        ("v1.opening", 2, "v1.opening = 2 is out of range; expected a number from 0, shut, to 1, open"),
+        (
+            "v1.opening",
+            2,
+            "v1.opening = 2 is out of range; expected a number from 0, shut, to 1, open",
+        ),
         ("v1.opening", -1, "v1.opening = -1 is out of range"),
         ("v1.opening", np.nan, "v1.opening = nan is not finite; expected a number from 0"),
         ("v1.opening", "50 %", 'v1.opening = "50 %" is not a number; expected a number from 0'),
-        ("sea.pressure", -5e5, "sea.pressure = -500000 is a vacuum; expected an absolute pressure above 0"),
+        (
+            "sea.pressure",
+            -5e5,
+            "sea.pressure = -500000 is a vacuum; expected an absolute pressure above 0",
+        ),
         ("lake.head", -20.0, "lake.head = -20 is -9.481e+04 Pa absolute; expected a head"),
         ("gate.demand", np.inf, "gate.demand = inf is not finite; expected a finite number"),
         ("gate.demand", None, "gate.demand = None is not a number"),
@@ -168,26 +206,42 @@ print(json.dumps({"reason": result.reason, "t": list(result.t),
 """
 
 
-@pytest.mark.parametrize("law, scheme", [("linear", "muscl"), ("linear", "upwind5"), ("log", "weno5")])
+@pytest.mark.parametrize(
+    "law, scheme", [("linear", "muscl"), ("linear", "upwind5"), ("log", "weno5")]
+)
 def test_compiled_and_plain_python_agree(law, scheme):
     case = every_kind(law, scheme)
     case["numerics"]["end"] = 0.35  # the valve is constant from 0.3 s on
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run([sys.executable, "-c", PLAIN], input=json.dumps(case), env=environment, capture_output=True,
-                          text=True, check=True)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", PLAIN],
+        input=json.dumps(case),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     plain, compiled = json.loads(done.stdout), fvsolve.run(case)
     assert plain["reason"] == compiled.reason == "finished"
     assert plain["t"] == pytest.approx(list(compiled.t), abs=1e-12)
     for name, values in plain["values"].items():
         here = compiled[name]
-        assert np.asarray(values) == pytest.approx(here, rel=1e-9, abs=1e-9 * np.max(np.abs(here))), name
+        assert np.asarray(values) == pytest.approx(
+            here, rel=1e-9, abs=1e-9 * np.max(np.abs(here))
+        ), name
 
 
 def test_a_restriction_is_laminar_below_the_mass_flow_of_its_reynolds_number():
     """Re = 4 M / (pi d mu), with the stated diameter, or that of the flow area Cd A."""
     case = every_kind()
     case["links"]["v1"] |= {"laminar_reynolds": 40.0, "discharge_coefficient": 0.6}
-    case["links"]["v2"] = {"type": "valve", "from": "pot", "to": "mid", "diameter": 0.05, "laminar_reynolds": 30.0}
+    case["links"]["v2"] = {
+        "type": "valve",
+        "from": "pot",
+        "to": "mid",
+        "diameter": 0.05,
+        "laminar_reynolds": 30.0,
+    }
     model = fvsolve.build(fvsolve.load(case))
     flows = dict(zip(model.valve_names, model.tables.valves["transition"], strict=True))
     for name, reynolds, diameter in (("v1", 40.0, np.sqrt(4 * 2e-3 / np.pi)), ("v2", 30.0, 0.05)):
@@ -206,7 +260,10 @@ def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
     They do not depend on rounding of n times the fraction at a face or a centre.
     """
     for k in range(1, 4 * n):
-        there, back = (cells_around(k / (4 * n) * n, degree, n), cells_around((1.0 - k / (4 * n)) * n, degree, n))
+        there, back = (
+            cells_around(k / (4 * n) * n, degree, n),
+            cells_around((1.0 - k / (4 * n)) * n, degree, n),
+        )
         assert there[0] == n - back[0] - back[1].size
         assert there[1] == pytest.approx(back[1][::-1], abs=1e-11)
         cells = there[0] + np.arange(there[1].size)
@@ -226,13 +283,19 @@ def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
     numerics = {"scheme": scheme, "method": "rk4", "step": 1e-3, "start": 0.0}
     found = []
     for start, end, side in (("lake", "gate", 1), ("gate", "lake", -1)):
-        links = {"line": pipe(start, end, 100.0, 0.1, 1000.0, CELLS, friction=friction),
-                 "valve": valve("gate", "sink", 1e-3, opening=shuts)}  # fmt: skip
+        links = {
+            "line": pipe(start, end, 100.0, 0.1, 1000.0, CELLS, friction=friction),
+            "valve": valve("gate", "sink", 1e-3, opening=shuts),
+        }
         at = PLACES if side > 0 else [1.0 - x for x in PLACES]
         probes = [f"line.{what}@{x!r}" for what in ("pressure", "flow") for x in at]
-        result = fvsolve.run(scene(nodes, links, 0.15, numerics, probes, fluid=WATER | {"law": law}))
+        result = fvsolve.run(
+            scene(nodes, links, 0.15, numerics, probes, fluid=WATER | {"law": law})
+        )
         flow = ["flow" in probe for probe in probes]
-        found.append(np.array([result[probe] for probe in probes]) * np.where(flow, side, 1)[:, None])
+        found.append(
+            np.array([result[probe] for probe in probes]) * np.where(flow, side, 1)[:, None]
+        )
     one, other = found
     for rows in (slice(0, len(PLACES)), slice(len(PLACES), None)):
         assert np.abs(one[rows] - other[rows]).max() < 1e-9 * np.abs(one[rows]).max()
@@ -241,10 +304,22 @@ def test_a_pipe_drawn_the_other_way_reads_the_same(scheme, law):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_where_nothing_weighs_there_is_no_head_and_all_else(law):
-    nodes = {"lake": reservoir(1.5e5), "end": {"type": "chamber", "volume": 1.0, "initial_pressure": 1e5}}
-    case = scene(nodes, {"gate": valve("lake", "end", 1e-3)}, 0.1, {"rtol": 1e-6}, ["end.head", "end.pressure"], 0.01)
+    nodes = {
+        "lake": reservoir(1.5e5),
+        "end": {"type": "chamber", "volume": 1.0, "initial_pressure": 1e5},
+    }
+    case = scene(
+        nodes,
+        {"gate": valve("lake", "end", 1e-3)},
+        0.1,
+        {"rtol": 1e-6},
+        ["end.head", "end.pressure"],
+        0.01,
+    )
     result = fvsolve.run({**case, "gravity": 0.0, "fluid": {**WATER, "law": law}})
-    assert result.ok and np.all(np.isnan(result["end.head"])) and np.ptp(result["end.pressure"]) > 1e3
+    assert (
+        result.ok and np.all(np.isnan(result["end.head"])) and np.ptp(result["end.pressure"]) > 1e3
+    )
 
 
 PACKAGE = str(Path(fvsolve.__file__).parent)

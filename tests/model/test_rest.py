@@ -32,7 +32,9 @@ SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "central", "fromm", "linear-up
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize(
-    "friction", [ROUGH, {"model": "quasi-steady", "roughness": 2.6e-4}], ids=["steady", "quasi-steady"]
+    "friction",
+    [ROUGH, {"model": "quasi-steady", "roughness": 2.6e-4}],
+    ids=["steady", "quasi-steady"],
 )
 def test_a_looped_network_without_an_event_does_not_change_any_bit(scheme, friction):
     result = fvsolve.run(town(friction, {"scheme": scheme}))
@@ -49,7 +51,8 @@ def test_a_looped_network_without_an_event_does_not_change_any_bit(scheme, frict
 @pytest.mark.in_turn
 @pytest.mark.parametrize("scheme", ["muscl", "upwind5"])
 @pytest.mark.parametrize(
-    "friction", [{"model": "hazen-williams", "coefficient": 110.0}, {"model": "steady", "factor": 0.02}]
+    "friction",
+    [{"model": "hazen-williams", "coefficient": 110.0}, {"model": "steady", "factor": 0.02}],
 )
 def test_other_friction_laws_do_not_move_it_either(scheme, friction):
     result = fvsolve.run(town(friction, {"scheme": scheme}))
@@ -68,7 +71,9 @@ def test_nor_does_the_log_law_move_the_pipes(scheme):
     assert moved(result, "middle.level") < 1e-4
 
 
-@pytest.mark.parametrize("air", [{"air_fraction": 0.01}, {"air_fraction": 0.02, "gas_exponent": 1.4}])
+@pytest.mark.parametrize(
+    "air", [{"air_fraction": 0.01}, {"air_fraction": 0.02, "gas_exponent": 1.4}]
+)
 def test_nor_does_air_in_the_water(air):
     case = town(ROUGH, {"scheme": "muscl"}, 20.0)
     result = fvsolve.run({**case, "fluid": {**scenes.WATER, "law": "mixture", **air}})
@@ -87,9 +92,12 @@ def test_no_method_moves_it(method):
 def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
     """Case of equal heads that are exact in binary, with various elevations, wave speeds and loops."""
     nodes = {
-        "lake": lake(47.25), "pool": tank(50.0, 6.25, elevation=41.0), "a": junction(elevation=12.7),
-        "b": junction(elevation=-31.9), "c": junction(elevation=30.3),
-    }  # fmt: skip
+        "lake": lake(47.25),
+        "pool": tank(50.0, 6.25, elevation=41.0),
+        "a": junction(elevation=12.7),
+        "b": junction(elevation=-31.9),
+        "c": junction(elevation=30.3),
+    }
     rows = {
         "la": ("lake", "a", 311.0, 0.31, 1234.5, 9),
         "ab": ("a", "b", 173.2, 0.22, 987.6, 6),
@@ -100,18 +108,39 @@ def pond(law: str, friction: dict, scheme: str = "muscl") -> dict:
     links = {n: pipe(*row, friction=friction) for n, row in rows.items()}
     links["tap"] = valve("c", "pool", 0.01)
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.9}
-    probes = [f"{n}.flow@{x}" for n in rows for x in (0.0, 0.4, 1.0)] + ["tap.flow", "a.head", "b.head", "c.head"]
-    return scene(nodes, links, 20.0, numerics, [*probes, "pool.level"], 1.0, fluid={**scenes.WATER, "law": law})
+    probes = [f"{n}.flow@{x}" for n in rows for x in (0.0, 0.4, 1.0)] + [
+        "tap.flow",
+        "a.head",
+        "b.head",
+        "c.head",
+    ]
+    return scene(
+        nodes,
+        links,
+        20.0,
+        numerics,
+        [*probes, "pool.level"],
+        1.0,
+        fluid={**scenes.WATER, "law": law},
+    )
 
 
-FRICTIONS = [NO_FRICTION, ROUGH, {"model": "quasi-steady", "factor": 0.02},
-             {"model": "hazen-williams", "coefficient": 120.0}]  # fmt: skip
+FRICTIONS = [
+    NO_FRICTION,
+    ROUGH,
+    {"model": "quasi-steady", "factor": 0.02},
+    {"model": "hazen-williams", "coefficient": 120.0},
+]
 
 
-@pytest.mark.parametrize("friction", FRICTIONS, ids=["none", "steady", "quasi-steady", "hazen-williams"])
+@pytest.mark.parametrize(
+    "friction", FRICTIONS, ids=["none", "steady", "quasi-steady", "hazen-williams"]
+)
 def test_equal_heads_and_no_flow(friction):
     result = fvsolve.run(pond("linear", friction))
-    flows = {str(p): float(np.max(np.abs(result[str(p)]))) for p in result.probes if ".flow" in str(p)}
+    flows = {
+        str(p): float(np.max(np.abs(result[str(p)]))) for p in result.probes if ".flow" in str(p)
+    }
     assert max(flows.values()) <= 1e-12, flows
     for place in "abc":
         assert result[f"{place}.head"] == pytest.approx(47.25, abs=1e-11)
@@ -141,7 +170,13 @@ def test_the_mass_ledger_of_a_busy_network_closes(law, scheme):
     mass = result.ledger["mass"]
     assert moved(result, "b.pressure") > 1e4
     assert abs(mass["relative"]) < 1e-12
-    balance = mass["initial"] + mass["inflow"] - mass["outflow"] - mass.get("spilled", 0.0) - mass["final"]
+    balance = (
+        mass["initial"]
+        + mass["inflow"]
+        - mass["outflow"]
+        - mass.get("spilled", 0.0)
+        - mass["final"]
+    )
     assert abs(balance) < 1e-12 * mass["initial"]
 
 
@@ -172,9 +207,11 @@ def test_a_symmetric_network_stays_symmetric():
     """Two equal branches of opposite direction have equal pressures."""
     nodes = {"lake": reservoir(1e6), "fork": junction()}
     nodes |= {n: junction(step(0.2, 0.03, 0.0)) for n in ("left", "right")}
-    links = {"main": pipe("lake", "fork", 200.0, 0.3, 1000.0, 20, friction=ROUGH),
-             "to": pipe("fork", "left", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
-             "fro": pipe("right", "fork", 150.0, 0.2, 1000.0, 15, friction=ROUGH)}  # fmt: skip
+    links = {
+        "main": pipe("lake", "fork", 200.0, 0.3, 1000.0, 20, friction=ROUGH),
+        "to": pipe("fork", "left", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
+        "fro": pipe("right", "fork", 150.0, 0.2, 1000.0, 15, friction=ROUGH),
+    }
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["left.pressure", "right.pressure"]))
     assert result["left.pressure"] == pytest.approx(result["right.pressure"], rel=1e-10)
@@ -194,8 +231,10 @@ def test_a_long_run_rounds_its_ledger_once():
 
 def test_rows_stay_finite_up_to_the_last_good_time_when_a_step_is_too_long():
     nodes = {"lake": lake(50.0), "gate": junction(), "sea": lake(0.0)}
-    links = {"main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 40, friction=ROUGH),
-             "tap": valve("gate", "sea", 0.002, step(0.02, 1.0, 0.3))}  # fmt: skip
+    links = {
+        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 40, friction=ROUGH),
+        "tap": valve("gate", "sea", 0.002, step(0.02, 1.0, 0.3)),
+    }
     numerics = {"scheme": "upwind5", "method": "euler", "courant": 3.0}
     result = fvsolve.run(scene(nodes, links, 2.0, numerics, ["gate.pressure"], 0.001))
     assert "has grown to" in result.reason
@@ -205,8 +244,10 @@ def test_rows_stay_finite_up_to_the_last_good_time_when_a_step_is_too_long():
 
 def test_a_jump_at_the_very_end_has_two_rows():
     nodes = {"lake": lake(50.0), "gate": junction(), "sea": lake(0.0)}
-    links = {"main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 10, friction=ROUGH),
-             "tap": valve("gate", "sea", 0.002, step(1.0, 1.0, 0.3))}  # fmt: skip
+    links = {
+        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 10, friction=ROUGH),
+        "tap": valve("gate", "sea", 0.002, step(1.0, 1.0, 0.3)),
+    }
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
     result = fvsolve.run(scene(nodes, links, 1.0, numerics, ["tap.flow"], 0.1))
     assert result.t[-1] == result.t[-2] == 1.0
@@ -216,7 +257,9 @@ def test_a_jump_at_the_very_end_has_two_rows():
 @pytest.mark.in_turn
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5"])
-def test_from_rest_a_pipe_between_two_lakes_accelerates_as_a_rigid_body_in_either_direction(law, scheme):
+def test_from_rest_a_pipe_between_two_lakes_accelerates_as_a_rigid_body_in_either_direction(
+    law, scheme
+):
     """A frictionless pipe starts with dq/dt = g A dH / L at all places."""
     area = np.pi / 4 * 0.3**2
     for ways in (("high", "low"), ("low", "high")):
@@ -235,21 +278,39 @@ def test_from_rest_a_pipe_between_two_lakes_accelerates_as_a_rigid_body_in_eithe
 
 A, B = 12e-4, 8e-4
 MASS = {"type": "mass", "mass": 1000.0, "initial_position": 0.1}
-POOL = {"type": "basin", "size": [2.0, 1.0], "cells": [10, 5], "level": 1.0,
-        "patches": {"east": {"side": "east", "body": "load"}}}  # fmt: skip
+POOL = {
+    "type": "basin",
+    "size": [2.0, 1.0],
+    "cells": [10, 5],
+    "level": 1.0,
+    "patches": {"east": {"side": "east", "body": "load"}},
+}
 WATER_FORCE = 0.5 * RHO * GRAVITY  # thrust of water 1 m deep on a wall 1 m wide [N]
 
 
 def jack(rod: str = "load", case: str = "ground", **more) -> dict:
     ports = {"rod": rod, "case": case}
     dead = {"dead_volume_A": 2e-5, "dead_volume_B": 2e-5}
-    return {"type": "cylinder", "ports": ports, "stroke": 0.2, "area_A": A, "area_B": B, **dead, **more}
+    return {
+        "type": "cylinder",
+        "ports": ports,
+        "stroke": 0.2,
+        "area_A": A,
+        "area_B": B,
+        **dead,
+        **more,
+    }
 
 
 def standing(load: float, initial: str = "steady", law: str = "linear", nodes=(), **more) -> dict:
     places = {"ground": {"type": "frame"}, "load": MASS, **dict(nodes)}
     links = {"lift": jack(**more), "weight": {"type": "force", "to": "load", "force": load}}
-    case = scene(places, links, 0.02, {"method": "dormand-prince", "rtol": 1e-9, "initial": initial, "scheme": "muscl"})
+    case = scene(
+        places,
+        links,
+        0.02,
+        {"method": "dormand-prince", "rtol": 1e-9, "initial": initial, "scheme": "muscl"},
+    )
     case["fluid"]["law"] = law
     return case
 
@@ -258,7 +319,9 @@ def held(case: dict) -> tuple[dict[str, float], float]:
     """Initial pressures of both chambers [Pa], and displacement of the mass [m]."""
     case["output"] |= {"probes": ["lift.A.pressure", "lift.B.pressure", "load.position"]}
     run = fvsolve.run(case)
-    return {side: run[f"lift.{side}.pressure"][0] for side in "AB"}, float(np.ptp(run["load.position"]))
+    return {side: run[f"lift.{side}.pressure"][0] for side in "AB"}, float(
+        np.ptp(run["load.position"])
+    )
 
 
 @pytest.mark.in_turn
@@ -285,8 +348,13 @@ def test_a_mass_and_a_wall_of_water_stand_on_shut_chambers(load, more, pressures
 def test_masses_stacked_on_cylinders_are_each_supported_by_their_own(initial):
     case = standing(-3000.0, initial)
     case["nodes"]["top"] = {**MASS, "initial_position": 0.2}
-    case["links"] |= {"upper": jack("top", "load"), "more": {"type": "force", "to": "top", "force": -5000.0}}
-    case["output"] |= {"probes": ["lift.A.pressure", "upper.A.pressure", "top.position", "load.position"]}
+    case["links"] |= {
+        "upper": jack("top", "load"),
+        "more": {"type": "force", "to": "top", "force": -5000.0},
+    }
+    case["output"] |= {
+        "probes": ["lift.A.pressure", "upper.A.pressure", "top.position", "load.position"]
+    }
     run = fvsolve.run(case)
     assert run["lift.A.pressure"][0] == approx(AMBIENT + 8000.0 / A, rel=1e-9)
     assert run["upper.A.pressure"][0] == approx(AMBIENT + 5000.0 / A, rel=1e-9)
@@ -296,10 +364,19 @@ def test_masses_stacked_on_cylinders_are_each_supported_by_their_own(initial):
 def test_a_mass_next_to_a_body_is_supported_by_its_own_cylinder():
     case = standing(-9810.0)
     case["nodes"]["post"] = {"type": "frame", "points": {"foot": [0, 0, 0]}}
-    case["nodes"]["box"] = {"type": "body", "mass": 50.0, "inertia": [1.0, 1.0, 1.0],
-                            "joint": {"kind": "prismatic", "axis": [0, 0, 1], "travel": 0.1}}  # fmt: skip
-    case["links"] |= {"post_lift": jack("box", "post.foot"), "gate": valve("lift.A", "post_lift.A", 1e-5, 0.0)}
-    case["output"] |= {"probes": ["lift.A.pressure", "post_lift.A.pressure", "load.position", "box.travel"]}
+    case["nodes"]["box"] = {
+        "type": "body",
+        "mass": 50.0,
+        "inertia": [1.0, 1.0, 1.0],
+        "joint": {"kind": "prismatic", "axis": [0, 0, 1], "travel": 0.1},
+    }
+    case["links"] |= {
+        "post_lift": jack("box", "post.foot"),
+        "gate": valve("lift.A", "post_lift.A", 1e-5, 0.0),
+    }
+    case["output"] |= {
+        "probes": ["lift.A.pressure", "post_lift.A.pressure", "load.position", "box.travel"]
+    }
     run = fvsolve.run(case)
     assert run["lift.A.pressure"][0] == approx(AMBIENT + 9810.0 / A, rel=1e-9)
     assert run["post_lift.A.pressure"][0] == approx(AMBIENT + 50.0 * GRAVITY / A, rel=1e-9)
@@ -307,11 +384,17 @@ def test_a_mass_next_to_a_body_is_supported_by_its_own_cylinder():
 
 
 @pytest.mark.parametrize("load", [-9810.0, 9810.0, 0.0])
-def test_behind_a_servo_valve_at_rest_a_chamber_is_at_half_the_supply_and_the_opposite_chamber_balances(load):
+def test_behind_a_servo_valve_at_rest_a_chamber_is_at_half_the_supply_and_the_opposite_chamber_balances(
+    load,
+):
     high, low = AMBIENT + 140e5, AMBIENT
     case = standing(load, "equilibrium", nodes={"high": reservoir(high), "low": reservoir(low)})
-    case["links"]["spool"] = {"type": "spool-valve", "ports": {"P": "high", "T": "low", "A": "lift.A", "B": "lift.B"},
-                              "area": 1e-5, "position": 0.0}  # fmt: skip
+    case["links"]["spool"] = {
+        "type": "spool-valve",
+        "ports": {"P": "high", "T": "low", "A": "lift.A", "B": "lift.B"},
+        "area": 1e-5,
+        "position": 0.0,
+    }
     found, moved = held(case)
     half = 0.5 * (high + low)
     assert found["B" if load < 0.0 else "A"] == approx(half, rel=1e-9)

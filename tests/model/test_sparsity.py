@@ -22,7 +22,8 @@ from fvsolve.jit import njit
 
 CASES = sorted(folders.CASES.glob("*.toml"))
 SCHEMES = ["upwind", "linear-upwind", "fromm", "central", "upwind3", "upwind5", "muscl", "weno5"]
-TIMES = (0.0, 0.7, 2.3, 3.5)  # [s]; valves of random networks are open, half shut, nearly shut, shut
+# [s]; valves of random networks are open, half shut, nearly shut, shut
+TIMES = (0.0, 0.7, 2.3, 3.5)
 
 
 def random_model(seed: int, scheme: str, law: str):
@@ -48,7 +49,10 @@ def test_shipped_cases_keep_to_their_pattern(path):
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
 def test_advected_scalars_stay_within_their_pattern_at_sides_and_corners_too(scheme):
     settings = {"nodes.sheet.cells": [14, 12], "numerics.scheme": scheme}
-    model, rng = fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)), np.random.default_rng(0)
+    model, rng = (
+        fvsolve.build(fvsolve.load(CASES[0].parent / "swirl.toml", settings)),
+        np.random.default_rng(0),
+    )
     assert stray(model, 0.2, model.scale * rng.normal(size=model.y_size)) < 1e-7
 
 
@@ -56,14 +60,20 @@ def test_advected_scalars_stay_within_their_pattern_at_sides_and_corners_too(sch
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "weno5"])
 @pytest.mark.parametrize("physics", ["free-surface", "transport"])
 def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(physics, scheme):
-    patches = {"out": {"side": "east", "boundary": "open"}, "in": {"side": "west", "span": [0.5, 1.5]}}
+    patches = {
+        "out": {"side": "east", "boundary": "open"},
+        "in": {"side": "west", "span": [0.5, 1.5]},
+    }
     pool = {"type": "basin", "size": [10, 2], "cells": [10, 8], "patches": patches}
     nodes, links = {"pool": pool}, {}
     if physics == "transport":
         pool |= {"physics": physics, "velocity": {"u": "where(abs(y - 1) < 0.5, 0.1*y, 0)"}}
     else:
         pool |= {"level": 0.6, "bed": "0.005*x", "manning": 0.01}
-        nodes["works"], links["feed"] = {"type": "inflow", "flow": 0.02}, pipe("works", "pool.in", 5.0, 0.3, 50.0, 4)
+        nodes["works"], links["feed"] = (
+            {"type": "inflow", "flow": 0.02},
+            pipe("works", "pool.in", 5.0, 0.3, 50.0, 4),
+        )
     dyes = {"dye": {"decay": 0.01, "diffusivity": 1e-3}, "heat": {"decay": 0.1}}
     implicit = {"scheme": scheme, "method": "radau-iia-5", "step": 0.1}
     given = scene(nodes, links, 1.0, implicit, scalars=dyes)
@@ -76,7 +86,9 @@ def test_scalars_that_decay_spread_and_pass_the_boundary_keep_to_their_pattern(p
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("mesh", ["grid", "holes", "triangles"])
-def test_an_isolated_basin_stays_within_its_pattern_with_and_without_scalars(tmp_path, mesh, scheme):
+def test_an_isolated_basin_stays_within_its_pattern_with_and_without_scalars(
+    tmp_path, mesh, scheme
+):
     shape = {"size": [9.0, 6.0], "cells": [18, 12]}
     if mesh == "holes":
         shape["holes"] = [[3.0, 2.0, 4.5, 4.0]]
@@ -89,7 +101,14 @@ def test_an_isolated_basin_stays_within_its_pattern_with_and_without_scalars(tmp
         made = scene({"pool": pool}, {}, 1.0, numerics) | ({"scalars": scalars} if scalars else {})
         model, rng = fvsolve.build(fvsolve.load(made)), np.random.default_rng(0)
         for size in (0.02, 0.2):
-            assert stray(model, 0.2, model.start + model.scale * rng.normal(scale=size, size=model.y_size)) < 1e-7
+            assert (
+                stray(
+                    model,
+                    0.2,
+                    model.start + model.scale * rng.normal(scale=size, size=model.y_size),
+                )
+                < 1e-7
+            )
 
 
 def test_a_pipe_couples_no_more_than_its_scheme_reads():
@@ -101,7 +120,9 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
     for friction in (NO_FRICTION, {"model": "steady", "factor": 0.02}):
         links = {"p": pipe("a", "b", 90.0, 0.2, 1000.0, 9, friction=friction)}
         found = jacobian_pattern(
-            fvsolve.build(fvsolve.load(scene({"a": lake(30.0), "b": lake(30.0)}, links, 1.0, SHARP)))
+            fvsolve.build(
+                fvsolve.load(scene({"a": lake(30.0), "b": lake(30.0)}, links, 1.0, SHARP))
+            )
         )
         counts.append(found[:18].nnz)
         assert found[18:].toarray().sum() == 2  # supply of each lake: its edge cell
@@ -129,10 +150,14 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     slate = RunData(model)
     f, out = slate.evaluate(t, y, np.inf)
     supply = out[at : at + m].copy()
-    stepper = Integrator(METHODS["implicit-euler"], n, structure.m, lambda: structure, model.scale.copy())
+    stepper = Integrator(
+        METHODS["implicit-euler"], n, structure.m, lambda: structure, model.scale.copy()
+    )
     stepper.calls, stepper.out = addresses((model.functions.rhs,) * (RHS_CALL + 1)), model.new_out()
     stepper.control["ledger_offset"], stepper.jacobian[:] = at, np.nan
-    calls = compiled_differences()(slate.handle, stepper.handle(False), t, y, f, supply, np.zeros(n))
+    calls = compiled_differences()(
+        slate.handle, stepper.handle(False), t, y, f, supply, np.zeros(n)
+    )
     jacobian = stepper.jacobian
     assert calls == structure.color_count
     x, product = np.random.default_rng(0).normal(size=n), np.zeros(n + m)
@@ -143,15 +168,22 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     return found.toarray()
 
 
-@pytest.mark.parametrize("law, scheme", [("linear", "upwind"), ("linear", "upwind5"), ("log", "muscl")])
+@pytest.mark.parametrize(
+    "law, scheme", [("linear", "upwind"), ("linear", "upwind5"), ("log", "muscl")]
+)
 def test_differences_by_color_are_those_state_by_state(law, scheme):
     model, rng = random_model(4, scheme, law), np.random.default_rng(4)
-    colored, full = Structure(jacobian_pattern(model)), Structure.full(model.y_size, len(model.node_names))
+    colored, full = (
+        Structure(jacobian_pattern(model)),
+        Structure.full(model.y_size, len(model.node_names)),
+    )
     assert colored.color_count < model.y_size / 2
     for t in TIMES:
         y = random_state(model, rng)
         one, other = slopes(model, t, y, colored), slopes(model, t, y, full)
-        assert np.all(np.abs(one - other) <= 1e-5 * np.max(np.abs(other), axis=1, keepdims=True) + 1e-9)
+        assert np.all(
+            np.abs(one - other) <= 1e-5 * np.max(np.abs(other), axis=1, keepdims=True) + 1e-9
+        )
 
 
 @pytest.mark.in_turn
@@ -171,7 +203,9 @@ def test_storage_in_slopes_is_their_supply(law, scheme):
             assert np.all(np.abs(weight @ found[:n] - np.sum(found[n:], axis=0)) <= rounding)
 
 
-@pytest.mark.parametrize("law, scheme", [("linear", "upwind"), ("linear", "central"), ("log", "upwind5")])
+@pytest.mark.parametrize(
+    "law, scheme", [("linear", "upwind"), ("linear", "central"), ("log", "upwind5")]
+)
 def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
     """All kinds of linear algebra solve with the error 1e-7 from Courant numbers far below 1 to about 1e5.
 
@@ -219,7 +253,11 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
     links = {}
     for k in range(size):
         kind = rng.choice(["junction", "junction", "junction", "chamber", "tank"])
-        made = {"junction": junction, "chamber": lambda: chamber(0.2), "tank": lambda: tank(2.0, 30.0)}[kind]()
+        made = {
+            "junction": junction,
+            "chamber": lambda: chamber(0.2),
+            "tank": lambda: tank(2.0, 30.0),
+        }[kind]()
         other = f"L{k}" if k < 2 else str(rng.choice(list(nodes)))
         nodes[f"N{k}"] = made
         links[f"p{k}"] = random_pipe(rng, other, f"N{k}", smooth)
@@ -230,7 +268,8 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
             links[f"q{k}"] = random_pipe(rng, a, b, smooth)
         else:
             links[f"v{k}"] = valve(a, b, 1e-3, CLOSING if rng.random() < 0.7 else 1.0)
-    nodes["X"], nodes["Y"] = junction(), junction()  # at X valves can control a column, at Y they cannot
+    # at X valves can control a column, at Y they cannot
+    nodes["X"], nodes["Y"] = junction(), junction()
     a, d = (str(name) for name in rng.choice(names, 2, replace=False))
     b, c = (str(name) for name in rng.choice(names, 2))
     column = {"type": "rigid-column", "length": 20.0, "diameter": 0.1, "friction": FACTOR}
@@ -238,7 +277,12 @@ def random_network(seed: int, scheme: str = "upwind", law: str = "linear", size:
     links["w0"], links["w1"] = valve("X", b, 1e-3, CLOSING), valve(c, "X", 1e-3, CLOSING)
     links["c1"] = column | {"from": "Y", "to": d}
     links["y"] = random_pipe(rng, a, "Y", smooth)
-    numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8, "initial": "rest" if smooth else "steady"}
+    numerics = {
+        "scheme": scheme,
+        "method": "ssp-rk3",
+        "courant": 0.8,
+        "initial": "rest" if smooth else "steady",
+    }
     made = scene(nodes, links, 4.0, numerics)
     return made | {"fluid": {**made["fluid"], "law": law}}
 
@@ -250,15 +294,24 @@ def random_pipe(rng, start: str, end: str, smooth: bool) -> dict:
 
 
 SOILS = {
-    "constant": {"rate": 1e-5}, "horton": {"initial": 6e-5, "final": 1e-5, "decay": 1e-2},
+    "constant": {"rate": 1e-5},
+    "horton": {"initial": 6e-5, "final": 1e-5, "decay": 1e-2},
     "green-ampt": {"conductivity": 2e-6, "suction": 0.17, "deficit": 0.3},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("soil", SOILS)
 def test_infiltration_depends_on_the_states_of_the_pattern_only(soil):
-    basin = {"type": "basin", "size": [6.0, 4.0], "cells": [6, 4], "level": 0.3, "elevation": 0.0, "rain": 1e-5,
-             "bed": "0.2*sin(x)*cos(y)", "infiltration": {"model": soil} | SOILS[soil]}  # fmt: skip
+    basin = {
+        "type": "basin",
+        "size": [6.0, 4.0],
+        "cells": [6, 4],
+        "level": 0.3,
+        "elevation": 0.0,
+        "rain": 1e-5,
+        "bed": "0.2*sin(x)*cos(y)",
+        "infiltration": {"model": soil} | SOILS[soil],
+    }
     numerics = {"scheme": "muscl", "method": "tr-bdf2", "step": 1.0}
     model = fvsolve.build(fvsolve.load(scene({"field": basin}, {}, 1.0, numerics)))
     y = np.abs(model.scale * np.random.default_rng(1).normal(size=model.y_size))

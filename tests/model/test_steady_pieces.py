@@ -12,12 +12,17 @@ NAN = float("nan")
 
 def friction(loss: float) -> np.ndarray:
     """Law of a pipe with the drop loss |M| M."""
-    return law_of(FRICTION, 1.0, float(rec.FRICTION_FACTOR), loss, 0.0, 0.0, 1.0, 1e-6 * (loss > 0.0))
+    return law_of(
+        FRICTION, 1.0, float(rec.FRICTION_FACTOR), loss, 0.0, 0.0, 1.0, 1e-6 * (loss > 0.0)
+    )
 
 
 def line(head: float):
     """Pipe and restriction between two potentials, with a demand between them."""
-    edges = [Edge(0, 1, friction(300.0), flow=70.0), Edge(1, 2, law_of(RESTRICTION, 0.02, 0.5, 1e-3, 2e-3), flow=44.0)]
+    edges = [
+        Edge(0, 1, friction(300.0), flow=70.0),
+        Edge(1, 2, law_of(RESTRICTION, 0.02, 0.5, 1e-3, 2e-3), flow=44.0),
+    ]
     return np.array([head, NAN, 1e5]), np.array([0.0, 3.0, 0.0]), edges, np.array([70.0, 44.0])
 
 
@@ -29,13 +34,23 @@ def loop(flow: float):
         Edge(1, 2, friction(0.0)),
         Edge(1, 2, friction(0.0)),
     ]
-    return np.array([4e5, NAN, NAN]), np.array([0.0, 0.0, flow]), edges, np.array([50.0, 20.0, 20.0])
+    return (
+        np.array([4e5, NAN, NAN]),
+        np.array([0.0, 0.0, flow]),
+        edges,
+        np.array([50.0, 20.0, 20.0]),
+    )
 
 
 def shut(leak: float):
     """Node behind shut links, a leak, and a node whose flow follows its own potential."""
     follows = Edge(2, 3, lambda m, drop, p: (1.0, 0.0, 1e-5 * p - m, 1e-5), sensed_nodes=(2,))
-    edges = [Edge(0, 1, None, shut=True), Edge(1, 2, None, shut=True), Edge(0, 2, law_of(LEAK, leak)), follows]
+    edges = [
+        Edge(0, 1, None, shut=True),
+        Edge(1, 2, None, shut=True),
+        Edge(0, 2, law_of(LEAK, leak)),
+        follows,
+    ]
     return np.array([3e5, NAN, NAN, 1e5]), np.zeros(4), edges, np.array([0.0, 0.0, 5.0, 5.0])
 
 
@@ -47,12 +62,20 @@ def together(pieces):
     nodes = [(k, i) for i in range(9) for k, piece in enumerate(pieces) if i < len(piece[0])]
     number = {node: n for n, node in enumerate(nodes)}
     links = [(k, e) for e in range(9) for k, piece in enumerate(pieces) if e < len(piece[2])]
-    edges = [pieces[k][2][e].numbered({i: number[k, i] for i in range(len(pieces[k][0]))}) for k, e in links]
+    edges = [
+        pieces[k][2][e].numbered({i: number[k, i] for i in range(len(pieces[k][0]))})
+        for k, e in links
+    ]
     held, demand = (np.array([pieces[k][which][i] for k, i in nodes]) for which in (0, 1))
     sizes = np.array([pieces[k][3][e] for k, e in links])
     found = solve_steady(held, demand, edges, (1e5, sizes))
-    owns = [([number[k, i] for i in range(len(piece[0]))], [n for n, link in enumerate(links) if link[0] == k])
-            for k, piece in enumerate(pieces)]  # fmt: skip
+    owns = [
+        (
+            [number[k, i] for i in range(len(piece[0]))],
+            [n for n, link in enumerate(links) if link[0] == k],
+        )
+        for k, piece in enumerate(pieces)
+    ]
     return found, owns
 
 
@@ -63,14 +86,18 @@ def test_each_piece_has_the_bits_of_its_own_problem(order):
     for (held, demand, edges, sizes), (nodes, links) in zip(pieces, owns, strict=True):
         own = solve_steady(held, demand, edges, (1e5, sizes))
         assert own.converged and len(own.pieces) == 1
-        assert np.array_equal(own.potential, found.potential[nodes]) and np.array_equal(own.flow, found.flow[links])
+        assert np.array_equal(own.potential, found.potential[nodes]) and np.array_equal(
+            own.flow, found.flow[links]
+        )
     assert found.converged and found.split and len(found.pieces) == len(pieces)
 
 
 def test_balances_hold_and_loops_have_the_least_norm():
     found, owns = together(PIECES)
     flows = [found.flow[links] for _, links in owns]
-    assert flows[0][0] == pytest.approx(flows[0][1] + 3.0) and flows[1] == pytest.approx([11.0, 5.5, 5.5])
+    assert flows[0][0] == pytest.approx(flows[0][1] + 3.0) and flows[1] == pytest.approx(
+        [11.0, 5.5, 5.5]
+    )
     drop = found.potential[owns[0][0][0]] - found.potential[owns[0][0][1]]
     assert drop == pytest.approx(300.0 * flows[0][0] * abs(flows[0][0]))
 

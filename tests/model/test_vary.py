@@ -35,14 +35,34 @@ def in_folder_of_cases(monkeypatch):
 
 def model_bytes(model) -> dict[str, bytes]:
     """Contents of a model as bytes."""
-    tables = {name: table.tobytes() for name, table in zip(model.tables._fields, model.tables, strict=True)}
+    tables = {
+        name: table.tobytes()
+        for name, table in zip(model.tables._fields, model.tables, strict=True)
+    }
     for own in model.features:
         found = {name: value for name, value in vars(own).items() if isinstance(value, np.ndarray)}
         tables |= {f"{own.slot}.{name}": value.tobytes() for name, value in found.items()}
-    arrays = {"scale": model.scale, "start": model.start, "profiles": np.concatenate([[0.0], *model.profiles.values()])}
-    words = (model.breaks, model.step_max, model.shapes, model.state_names, model.node_names, model.link_names,
-             model.events, model.laws, model.elevation, [probe.text for probe in model.probes], model.steady,
-             [one.plain() for one in model.warnings], model.case.table(), model.case.copies)  # fmt: skip
+    arrays = {
+        "scale": model.scale,
+        "start": model.start,
+        "profiles": np.concatenate([[0.0], *model.profiles.values()]),
+    }
+    words = (
+        model.breaks,
+        model.step_max,
+        model.shapes,
+        model.state_names,
+        model.node_names,
+        model.link_names,
+        model.events,
+        model.laws,
+        model.elevation,
+        [probe.text for probe in model.probes],
+        model.steady,
+        [one.plain() for one in model.warnings],
+        model.case.table(),
+        model.case.copies,
+    )
     numbers = {name: array.tobytes() for name, array in arrays.items()}
     return tables | numbers | {"words": pickle.dumps(repr(words))}
 
@@ -103,7 +123,9 @@ def test_each_kind_of_key_of_the_shipped_cases_gives_the_model_of_a_fresh_readin
     tables = {name: raw_case(name) for name in NAMES}
     tables["load-sensing"]["numerics"]["initial"] = "rest"
     assert [line for name in NAMES for line in compare(name, tables[name], done, every=False)] == []
-    assert [line for table in (OTHERS, DYED) for line in compare("others", table, done, every=False)] == []
+    assert [
+        line for table in (OTHERS, DYED) for line in compare("others", table, done, every=False)
+    ] == []
     assert len(done) > 150
 
 
@@ -115,11 +137,16 @@ def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(turn
 
 SMALL = {"links.main.cells": 12, "numerics.end": 2.0, "output.fields": 0, "expect": {}}
 MOVES = [
-    {"links.valve.area": 0.001}, {"links.valve.opening.duration": 0.3}, {"nodes.lake.head": "30 m"},
-    {"links.main.cells": 7}, {"numerics.method": "rk4", "numerics.courant": 0.5}, {"ambient_pressure": "0.9 atm"},
-    {"links.main.friction": {"model": "none"}, "links.main.initial_flow": 0.02}, {"fluid.temperature": 300.0},
+    {"links.valve.area": 0.001},
+    {"links.valve.opening.duration": 0.3},
+    {"nodes.lake.head": "30 m"},
+    {"links.main.cells": 7},
+    {"numerics.method": "rk4", "numerics.courant": 0.5},
+    {"ambient_pressure": "0.9 atm"},
+    {"links.main.friction": {"model": "none"}, "links.main.initial_flow": 0.02},
+    {"fluid.temperature": 300.0},
     {"output.probes": ["gate.pressure"]},
-]  # fmt: skip
+]
 
 
 def test_consecutive_runs_leave_nothing_to_each_other():
@@ -127,7 +154,10 @@ def test_consecutive_runs_leave_nothing_to_each_other():
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
     before = model_bytes(model)
     for move in (*MOVES, *reversed(MOVES)):
-        ours, fresh = fvsolve.run(fvsolve.vary(model, move)), fvsolve.run("valve-closure", SMALL | move)
+        ours, fresh = (
+            fvsolve.run(fvsolve.vary(model, move)),
+            fvsolve.run("valve-closure", SMALL | move),
+        )
         assert ours._table.tobytes() == fresh._table.tobytes(), move
         for key, value in fresh.summary.items():
             if key not in ("ended", "seconds", "seconds_setup", "cost"):
@@ -137,8 +167,12 @@ def test_consecutive_runs_leave_nothing_to_each_other():
 
 def test_a_model_follows_from_a_model_that_was_varied_itself():
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
-    twice = fvsolve.vary(fvsolve.vary(model, {"links.valve.area": 0.001}), {"nodes.lake.head": 30.0})
-    once = fvsolve.build(fvsolve.load("valve-closure", SMALL | {"links.valve.area": 0.001, "nodes.lake.head": 30.0}))
+    twice = fvsolve.vary(
+        fvsolve.vary(model, {"links.valve.area": 0.001}), {"nodes.lake.head": 30.0}
+    )
+    once = fvsolve.build(
+        fvsolve.load("valve-closure", SMALL | {"links.valve.area": 0.001, "nodes.lake.head": 30.0})
+    )
     assert model_bytes(twice) == model_bytes(once)
 
 
@@ -162,17 +196,28 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
     model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.core.model.build"]
     before, found = model_bytes(model), []
     taken = room.with_new_sizes
-    monkeypatch.setattr(room, "with_new_sizes", lambda *given: found.append(taken(*given)) or found[-1])
+    monkeypatch.setattr(
+        room, "with_new_sizes", lambda *given: found.append(taken(*given)) or found[-1]
+    )
     for move, in_place in (
         ({"links.valve.area": 0.001}, True),
         ({"links.hole.diameter": "3 mm", "links.bleed.discharge_coefficient": 0.7}, True),
-        ({"links.bleed.diameter": 1e-3, "links.valve.area": 2e-3, "links.valve.discharge_coefficient": 0.5}, True),
+        (
+            {
+                "links.bleed.diameter": 1e-3,
+                "links.valve.area": 2e-3,
+                "links.valve.discharge_coefficient": 0.5,
+            },
+            True,
+        ),
         ({"links.valve.laminar_reynolds": 100.0}, False),
         ({"links.valve.opening.duration": 0.3}, False),
         ({"links.hole.diameter": "3 mm", "nodes.lake.head": 30.0}, False),
     ):
         ours = fvsolve.vary(model, move)
-        assert model_bytes(ours) == model_bytes(fvsolve.build(fvsolve.load(table, SMALL | move))), move
+        assert model_bytes(ours) == model_bytes(fvsolve.build(fvsolve.load(table, SMALL | move))), (
+            move
+        )
         assert (found[-1] is not None) == in_place, move
         assert model_bytes(model) == before, move
 
@@ -199,13 +244,23 @@ def test_contents_of_files_and_signals_are_read_again(tmp_path):
 def test_faults_are_those_of_a_fresh_run():
     model = fvsolve.build(fvsolve.load("valve-closure", SMALL))
     for move in (
-        {"links.valve.area": -1.0}, {"links.valve.aera": 1.0}, {"links.valv.area": 1.0}, {"links.main.cells": 2.5},
-        {"links.main.cells": True}, {"numerics.end": -1.0, "links.main.length": "3 kg"}, {"output.probes": ["x.y"]},
-        {"links.main.friction": {"model": "rough"}}, {"links.main.initial_flow": "1 m"},
+        {"links.valve.area": -1.0},
+        {"links.valve.aera": 1.0},
+        {"links.valv.area": 1.0},
+        {"links.main.cells": 2.5},
+        {"links.main.cells": True},
+        {"numerics.end": -1.0, "links.main.length": "3 kg"},
+        {"output.probes": ["x.y"]},
+        {"links.main.friction": {"model": "rough"}},
+        {"links.main.initial_flow": "1 m"},
         {"expect": {"max(x.y)": {"value": 1}}},
-    ):  # fmt: skip
-        fresh = outcome_of(lambda move=move: fvsolve.build(fvsolve.load("valve-closure", SMALL | move)))
-        assert fresh[0] != "made" and outcome_of(lambda move=move: fvsolve.vary(model, move)) == fresh
+    ):
+        fresh = outcome_of(
+            lambda move=move: fvsolve.build(fvsolve.load("valve-closure", SMALL | move))
+        )
+        assert (
+            fresh[0] != "made" and outcome_of(lambda move=move: fvsolve.vary(model, move)) == fresh
+        )
 
 
 def test_arguments_that_are_no_model_and_no_table_are_named():
@@ -215,7 +270,8 @@ def test_arguments_that_are_no_model_and_no_table_are_named():
         fvsolve.vary(fvsolve.build(fvsolve.load("valve-closure", SMALL)), ["links.valve.area"])
 
 
-SCENES = {  # pipes; flags and marks of devices; cells and work arrays of a basin; scalars; Newton's method
+# pipes; flags and marks of devices; cells and work arrays of a basin; scalars; Newton's method
+SCENES = {
     "nine pipes": ("streeter-nine-pipes", {"numerics.end": 5.0}),
     "nine pipes, log": ("streeter-nine-pipes", {"numerics.end": 0.5, "fluid.law": "log"}),
     "check valve": ("check-valve-slam", {}),
@@ -236,7 +292,13 @@ def built(scene: str) -> Model:
 
 def bits(model: Model) -> str:
     """Hash of the bytes of all arrays of a model, including the structure of its Jacobian."""
-    arrays = (*model.tables, model.scale, model.start, *model.profiles.values(), model.structure.shape)
+    arrays = (
+        *model.tables,
+        model.scale,
+        model.start,
+        *model.profiles.values(),
+        model.structure.shape,
+    )
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
@@ -296,7 +358,11 @@ def test_interleaved_runs_of_a_model_are_the_separate_runs(scene):
     """Two runs of one model with alternating steps give the states of single runs."""
     model, states = built(scene), []
     moved = model.start + 1e-3 * model.scale
-    for loops in ([begun(model, model.start)], [begun(model, moved)], [begun(model, y) for y in (model.start, moved)]):
+    for loops in (
+        [begun(model, model.start)],
+        [begun(model, moved)],
+        [begun(model, y) for y in (model.start, moved)],
+    ):
         for _ in range(60):
             for loop in loops:
                 assert loop.run(1.0) == loop_records.BUDGET_SPENT

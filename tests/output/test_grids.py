@@ -23,9 +23,23 @@ FIELDS = ["max_depth", "arrival_time"]
 
 def dam(grids, **more) -> dict:
     """Case of a dam that breaks on a slope of which a part stays dry."""
-    own = {"type": "basin", "size": [12.0, 8.0], "cells": [12, 8], "level": -1.0, "elevation": 0.0, "bed": "0.1*x",
-           "start": {"level": "where(x < 3, 1, -1)"}, "origin": [EAST, NORTH], "crs": UTM} | more  # fmt: skip
-    case = scene({"pool": {key: item for key, item in own.items() if item is not None}}, {}, 1.0, {"scheme": "muscl"})
+    own = {
+        "type": "basin",
+        "size": [12.0, 8.0],
+        "cells": [12, 8],
+        "level": -1.0,
+        "elevation": 0.0,
+        "bed": "0.1*x",
+        "start": {"level": "where(x < 3, 1, -1)"},
+        "origin": [EAST, NORTH],
+        "crs": UTM,
+    } | more
+    case = scene(
+        {"pool": {key: item for key, item in own.items() if item is not None}},
+        {},
+        1.0,
+        {"scheme": "muscl"},
+    )
     case["output"] |= {"fields": 2, "grids": grids}
     return case
 
@@ -39,27 +53,50 @@ def test_a_netcdf_grid_of_the_cells_is_the_field(tmp_path):
     assert result.ok and "grids/flood.nc" in result.summary["files"]
     frame = meshio.read(tmp_path / "run/fields/pool-000002.vtu")
     with netcdf_file(tmp_path / "run/grids/flood.nc", mmap=False) as file:
-        assert file.Conventions == b"CF-1.8" and file.variables["depth"].dimensions == ("time", "y", "x")
+        assert file.Conventions == b"CF-1.8" and file.variables["depth"].dimensions == (
+            "time",
+            "y",
+            "x",
+        )
         assert file.variables["time"][:] == approx([0.0, 0.5, 1.0])
         assert file.variables["x"][:2] == approx([EAST + 0.5, EAST + 1.5], rel=1e-15)
         for name in FIELDS:
             own = result.maxima["pool"][name]
             assert np.isnan(own).any() and np.isfinite(own).any()
             assert np.array_equal(file.variables[name][-1].ravel(), own, equal_nan=True)
-        assert (file.variables["depth"][-1].ravel() == np.concatenate(frame.cell_data["depth"])).all()
-        assert (file.variables["u"][-1].ravel() == np.concatenate(frame.cell_data["velocity"])[:, 0]).all()
-    assert frame.field_data["origin"].tolist() == [EAST, NORTH] and frame.field_data["epsg"].tolist() == [32633]
+        assert (
+            file.variables["depth"][-1].ravel() == np.concatenate(frame.cell_data["depth"])
+        ).all()
+        assert (
+            file.variables["u"][-1].ravel() == np.concatenate(frame.cell_data["velocity"])[:, 0]
+        ).all()
+    assert frame.field_data["origin"].tolist() == [EAST, NORTH] and frame.field_data[
+        "epsg"
+    ].tolist() == [32633]
 
 
-KEYS = ("latitude_of_projection_origin", "longitude_of_central_meridian", "scale_factor_at_central_meridian",
-        "false_easting", "false_northing", "semi_major_axis", "inverse_flattening")  # fmt: skip
+KEYS = (
+    "latitude_of_projection_origin",
+    "longitude_of_central_meridian",
+    "scale_factor_at_central_meridian",
+    "false_easting",
+    "false_northing",
+    "semi_major_axis",
+    "inverse_flattening",
+)
 MERCATOR = {  # UTM on WGS 84; the National Grid of the Ordnance Survey on the ellipsoid of Airy
-    "EPSG:32633": dict(zip(KEYS, (0.0, 15.0, 0.9996, 5e5, 0.0, 6378137.0, 298.257223563), strict=True)),
-    "EPSG:27700": dict(zip(KEYS, (49.0, -2.0, 0.9996012717, 4e5, -1e5, 6377563.396, 299.3249646), strict=True)),
+    "EPSG:32633": dict(
+        zip(KEYS, (0.0, 15.0, 0.9996, 5e5, 0.0, 6378137.0, 298.257223563), strict=True)
+    ),
+    "EPSG:27700": dict(
+        zip(KEYS, (49.0, -2.0, 0.9996012717, 4e5, -1e5, 6377563.396, 299.3249646), strict=True)
+    ),
 }
 
 
-@pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:27700", "EPSG:3035", "EPSG:2154", "EPSG:31370"])
+@pytest.mark.parametrize(
+    "crs", ["EPSG:32633", "EPSG:27700", "EPSG:3035", "EPSG:2154", "EPSG:31370"]
+)
 def test_gdal_reads_the_crs_of_a_netcdf_grid(tmp_path, crs):
     """Rasterio opens the file through GDAL, as QGIS does; numbers of the mapping as published."""
     rasterio = pytest.importorskip("rasterio")
@@ -71,7 +108,9 @@ def test_gdal_reads_the_crs_of_a_netcdf_grid(tmp_path, crs):
     assert read_pixels(path, variable="max_depth", series=True).crs == crs
     with netcdf_file(path, mmap=False) as file:
         stated = file.variables["crs"]._attributes
-        assert stated["epsg_code"] == crs.encode() and ("grid_mapping_name" in stated) == (crs in MERCATOR)
+        assert stated["epsg_code"] == crs.encode() and ("grid_mapping_name" in stated) == (
+            crs in MERCATOR
+        )
     for key, value in MERCATOR.get(crs, {}).items():
         assert float(stated[key]) == approx(value, rel=1e-9)
 
@@ -86,7 +125,10 @@ def test_without_rasterio_a_netcdf_grid_has_the_code_of_its_crs(tmp_path, monkey
 
 def test_a_geotiff_of_half_cells_is_read_back_as_the_field(tmp_path):
     rasterio = pytest.importorskip("rasterio")
-    result = fvsolve.run(dam({"flood": grid(format="geotiff", cell="50 cm", fields=[*FIELDS, "depth"])}), out=tmp_path)
+    result = fvsolve.run(
+        dam({"flood": grid(format="geotiff", cell="50 cm", fields=[*FIELDS, "depth"])}),
+        out=tmp_path,
+    )
     for name in FIELDS:
         pixels = read_pixels(tmp_path / f"grids/flood-{name}.tif")
         assert (pixels.x, pixels.y, pixels.dx, pixels.crs) == (EAST, NORTH, 0.5, UTM)
@@ -117,7 +159,8 @@ def test_a_pixel_has_the_cell_that_contains_its_centre(tmp_path, kind):
     low, high = mesh.points.min(axis=0) - 0.1, mesh.points.max(axis=0) + 0.1
     x, y = (np.linspace(*ends) for ends in ((low[0], high[0], 42), (low[1], high[1], 30)))
     found, points = cells_of_pixels(mesh, x, y), MeshPoints(mesh)
-    assert (found == [[points.cell(a, b) for a in x] for b in y]).mean() > 0.995  # centres on sides have two cells
+    # centres on sides have two cells
+    assert (found == [[points.cell(a, b) for a in x] for b in y]).mean() > 0.995
     assert ((found < 0) == [[points.cell(a, b) < 0 for a in x] for b in y]).all()
 
 
@@ -134,18 +177,27 @@ def test_grids_of_a_resumed_run_are_the_same(tmp_path):
 
 def test_faults_of_grids_are_named_all_at_once():
     wall = {"walls": {"side": "east", "travel": {"time": [0, 1], "value": [0, 0.1]}}}
-    case = dam({"a": grid(fields=["max_dept", "depth"], cell=1e-4), "b": grid(basin="pol"), "c d": grid(fields=[]),
-                "e": grid(format="tif")})  # fmt: skip
+    case = dam(
+        {
+            "a": grid(fields=["max_dept", "depth"], cell=1e-4),
+            "b": grid(basin="pol"),
+            "c d": grid(fields=[]),
+            "e": grid(format="tif"),
+        }
+    )
     case["output"]["fields"] = 0
     text = str(refused(case))
     assert 'output.grids.e.format: no format named "tif"; did you mean "geotiff"?' in text
     del case["output"]["grids"]["e"]
     text = str(refused(case))
     for part in (
-        'output.grids.a.fields[0]: no field "max_dept"; did you mean "max_depth"?', "but `output.fields` is 0",
-        "output.grids.a.cell: the grid has 120000 x 80000 cells, more than 1e+08", 'no basin named "pol"',
-        ".fields: names no field; expected some of arrival_time", "is not a valid name",
-    ):  # fmt: skip
+        'output.grids.a.fields[0]: no field "max_dept"; did you mean "max_depth"?',
+        "but `output.fields` is 0",
+        "output.grids.a.cell: the grid has 120000 x 80000 cells, more than 1e+08",
+        'no basin named "pol"',
+        ".fields: names no field; expected some of arrival_time",
+        "is not a valid name",
+    ):
         assert part in text
     text = str(refused(dam({"a": grid()}, bed=0.0, level=1.0, start=None, patches=wall)))
     assert 'output.grids.a.basin: "pool" has cells that move' in text

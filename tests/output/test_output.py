@@ -40,8 +40,10 @@ def folder(tmp_path_factory):
 
 def test_the_directory_contains_the_documented_files(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {*("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
-                     *("fields.pvd", "fields", "case.toml", "restart.npz")}  # fmt: skip
+    assert names == {
+        *("summary.json", "history.csv", "history.png", "envelope.csv", "envelope.png"),
+        *("fields.pvd", "fields", "case.toml", "restart.npz"),
+    }
     listed = set(json.loads((folder / "summary.json").read_text())["files"])
     assert listed == names - {"fields", "history.png", "envelope.png"}
 
@@ -56,7 +58,9 @@ def test_history_reads_back_to_the_last_bit(folder):
 
 def test_headers_carry_units(folder):
     first = (folder / "history.csv").read_text().splitlines()[0]
-    assert first == "t [s],gate.pressure [Pa],gate.head [m],valve.flow [m3/s],main.velocity@0.5 [m/s]"
+    assert (
+        first == "t [s],gate.pressure [Pa],gate.head [m],valve.flow [m3/s],main.velocity@0.5 [m/s]"
+    )
 
 
 def test_output_units_are_those_of_the_table_the_extremes_and_the_envelope(folder, tmp_path):
@@ -64,7 +68,10 @@ def test_output_units_are_those_of_the_table_the_extremes_and_the_envelope(folde
     case["output"]["units"] = UNITS
     fvsolve.run(case, out=tmp_path / "units")
     result = fvsolve.open_run(tmp_path / "units")
-    assert read_headers(tmp_path / "units" / "history.csv")[:2] == [("t", "ms"), ("gate.pressure", "barg")]
+    assert read_headers(tmp_path / "units" / "history.csv")[:2] == [
+        ("t", "ms"),
+        ("gate.pressure", "barg"),
+    ]
     assert result.t == pytest.approx(1e3 * si.t) and result.seconds == pytest.approx(si.seconds)
     assert result["gate.pressure"] == pytest.approx((si["gate.pressure"] - AMBIENT) / 1e5)
     assert result["valve.flow"] == pytest.approx(1e3 * si["valve.flow"])
@@ -86,7 +93,8 @@ def test_frames_read_back_through_meshio(folder):
     assert [t for t, _ in frames] == pytest.approx(np.linspace(0.0, 1.0, len(frames)))
     assert len(frames) >= 5
     mesh = meshio.read(frames[-1][1])
-    assert mesh.cells_dict["line"].shape == (55, 2) and len(mesh.points) == 56  # a tree of connected pipes
+    # a tree of connected pipes
+    assert mesh.cells_dict["line"].shape == (55, 2) and len(mesh.points) == 56
     data = mesh.cell_data_dict
     assert {"pressure", "head", "velocity", "flow", "min_pressure", "max_pressure"} <= data.keys()
     pressure = data["pressure"]["line"]
@@ -107,8 +115,12 @@ def test_the_series_is_whole_after_every_frame(tmp_path):
     model = fvsolve.build(fvsolve.load(branched()))
     series = FieldSeries(tmp_path, model)
     series.start()
-    zero = dict.fromkeys(("pressure", "head", "velocity", "flow", "min_pressure", "max_pressure"), np.zeros(30))
-    frame = {pipe.name: {name: one[: pipe.cells] for name, one in zero.items()} for pipe in model.pipes}
+    zero = dict.fromkeys(
+        ("pressure", "head", "velocity", "flow", "min_pressure", "max_pressure"), np.zeros(30)
+    )
+    frame = {
+        pipe.name: {name: one[: pipe.cells] for name, one in zero.items()} for pipe in model.pipes
+    }
     assert read_series(tmp_path / "fields.pvd") == []
     for count in range(1, 4):
         series.write(0.1 * count, frame)
@@ -168,10 +180,16 @@ def test_an_unended_directory_is_no_result(tmp_path):
 def test_expectations_are_those_of_the_table(folder):
     result = fvsolve.open_run(folder)
     pressure = result["gate.pressure"]
-    mean = np.sum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(result.t)) / (result.t[-1] - result.t[0])
-    claims = {"max(gate.pressure)": result.extremes["gate.pressure"].maximum,
-              "min(gate.pressure)": result.extremes["gate.pressure"].minimum, "final(gate.pressure)": pressure[-1],
-              "mean(gate.pressure)": mean, "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure)}  # fmt: skip
+    mean = np.sum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(result.t)) / (
+        result.t[-1] - result.t[0]
+    )
+    claims = {
+        "max(gate.pressure)": result.extremes["gate.pressure"].maximum,
+        "min(gate.pressure)": result.extremes["gate.pressure"].minimum,
+        "final(gate.pressure)": pressure[-1],
+        "mean(gate.pressure)": mean,
+        "at(gate.pressure, 0.5)": np.interp(0.5, result.t, pressure),
+    }
     expect = {text: {"value": float(value), "rtol": 1e-12} for text, value in claims.items()}
     found = fvsolve.run(branched(expect=expect))
     assert [one.text for one in found.expectations if one.ok] == list(claims)
@@ -181,13 +199,22 @@ def test_expectations_are_those_of_the_table(folder):
 
 def test_a_comparison_finds_a_shifted_copy_of_the_run(folder, tmp_path):
     result = fvsolve.open_run(folder)
-    rows = [f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
-            for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)]  # fmt: skip
+    rows = [
+        f"{1e3 * (t - 0.05)!r},{(p - AMBIENT) / 1e5 + 0.5!r}"
+        for t, p in zip(result.t.tolist(), result["gate.pressure"].tolist(), strict=True)
+    ]
     (tmp_path / "rig.csv").write_text("clock [ms],p [barg]\n" + "\n".join(rows))
-    measured = {"file": str(tmp_path / "rig.csv"), "time": "clock [ms]", "value": "p [barg]", "shift": 0.05}
+    measured = {
+        "file": str(tmp_path / "rig.csv"),
+        "time": "clock [ms]",
+        "value": "p [barg]",
+        "shift": 0.05,
+    }
     found = fvsolve.run(branched(compare={"gate.pressure": measured}), out=tmp_path / "run")
     (one,) = found.comparisons
-    assert one.rms == pytest.approx(0.5e5, rel=1e-3) and one.greatest_difference == pytest.approx(-0.5e5, rel=1e-3)
+    assert one.rms == pytest.approx(0.5e5, rel=1e-3) and one.greatest_difference == pytest.approx(
+        -0.5e5, rel=1e-3
+    )
     assert one.computed_peak == pytest.approx(one.measured_peak - 0.5e5)
     assert one.t_computed_peak == pytest.approx(one.t_measured_peak)
     assert (tmp_path / "run" / "rig.csv").is_file()
@@ -222,27 +249,45 @@ def test_a_probe_that_is_not_there_is_named(folder):
 
 def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
     names = dict.fromkeys(name for ends in links.values() for name in ends)
-    return SimpleNamespace(places=dict.fromkeys(names),
-                           nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
-                           links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
-                           routes={})  # fmt: skip
+    return SimpleNamespace(
+        places=dict.fromkeys(names),
+        nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
+        links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
+        routes={},
+    )
 
 
 def test_stated_positions_are_used():
-    places = network_layout.plan_positions(network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0})
+    places = network_layout.plan_positions(
+        network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0}
+    )
     assert places["a"].tolist() == [1.0, 2.0] and places["b"].tolist() == [3.0, 4.0]
 
 
 def test_where_a_pipe_is_cut_its_place_is_that_along_the_pipe():
     """A junction at a chainage does not change a plan with stated positions."""
     case = {
-        "schema": 1, "fluid": {"name": "Water"}, "numerics": {"end": 1.0},
-        "nodes": {"a": {"type": "reservoir", "head": 20.0, "elevation": 0.0, "position": [100.0, 0.0]},
-                  "b": {"type": "junction", "elevation": 0.0, "position": [100.0, 400.0]},
-                  "tap": {"type": "junction", "on": "main", "at": 100.0}},
-        "links": {"main": {"type": "pipe", "from": "a", "to": "b", "length": 400.0, "diameter": 0.1,
-                           "wave_speed": 1000.0, "friction": {"model": "none"}, "cells": 40}},
-    }  # fmt: skip
+        "schema": 1,
+        "fluid": {"name": "Water"},
+        "numerics": {"end": 1.0},
+        "nodes": {
+            "a": {"type": "reservoir", "head": 20.0, "elevation": 0.0, "position": [100.0, 0.0]},
+            "b": {"type": "junction", "elevation": 0.0, "position": [100.0, 400.0]},
+            "tap": {"type": "junction", "on": "main", "at": 100.0},
+        },
+        "links": {
+            "main": {
+                "type": "pipe",
+                "from": "a",
+                "to": "b",
+                "length": 400.0,
+                "diameter": 0.1,
+                "wave_speed": 1000.0,
+                "friction": {"model": "none"},
+                "cells": 40,
+            }
+        },
+    }
     places = network_layout.plan_positions(fvsolve.load(case), {"main-1": 100.0, "main-2": 300.0})
     assert places["tap"].tolist() == [100.0, 100.0] and places["b"].tolist() == [100.0, 400.0]
 
@@ -266,22 +311,40 @@ def test_a_network_has_the_same_layout_every_time_with_no_two_nodes_in_the_same_
 
 
 def test_parallel_links_bend_apart():
-    bends = network_layout.link_bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
+    bends = network_layout.link_bends(
+        network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links
+    )
     assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # x and y start at opposite ends
 
 
 def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):
     rate = 0.4
     boom = {
-        "type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0], "centre_of_mass": [1.0, 0, 0],
+        "type": "body",
+        "mass": 10.0,
+        "inertia": [1.0, 1.0, 1.0],
+        "centre_of_mass": [1.0, 0, 0],
         "points": {"tip": [2.0, 0, 0]},
-        "joint": {"kind": "revolute", "axis": [0, 0, 1], "at": [5.0, 0, 1.0],
-                  "angle": {"time": [0, 9], "value": [0, 9 * rate]}},
-    }  # fmt: skip
-    tank = {"type": "basin", "on": "boom", "at": [2.0, 0, 0.5], "size": [1.0, 1.0], "cells": [2, 2], "level": 0.2}
+        "joint": {
+            "kind": "revolute",
+            "axis": [0, 0, 1],
+            "at": [5.0, 0, 1.0],
+            "angle": {"time": [0, 9], "value": [0, 9 * rate]},
+        },
+    }
+    tank = {
+        "type": "basin",
+        "on": "boom",
+        "at": [2.0, 0, 0.5],
+        "size": [1.0, 1.0],
+        "cells": [2, 2],
+        "level": 0.2,
+    }
     world = {"type": "frame", "points": {"post": [5.0, 3.0, 1.0]}}
     stay = {"type": "spring", "from": "world.post", "to": "boom.tip", "stiffness": 1.0}
-    case = scene({"boom": boom, "b": tank, "world": world}, {"stay": stay}, 2.0, {"scheme": "upwind"})
+    case = scene(
+        {"boom": boom, "b": tank, "world": world}, {"stay": stay}, 2.0, {"scheme": "upwind"}
+    )
     case["output"]["fields"] = 4
     run(case, out=tmp_path / "r")
     frames = read_series(tmp_path / "r" / "fields.pvd")
@@ -304,7 +367,11 @@ def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):
     ("physics", "attitude", "along"),
     [
         ({"level": 0.2}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
-        ({"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
+        (
+            {"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"},
+            {"yaw": "90 deg"},
+            [0.0, 1.0, 0.0],
+        ),
         (
             {"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"},
             {"pitch": "-30 deg"},
@@ -315,15 +382,35 @@ def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):
 def test_velocities_in_frames_are_along_axes_of_the_world_and_on_lines_along_those_of_the_basin(
     physics, attitude, along, tmp_path
 ):
-    hull = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": "fixed", "attitude": attitude}}
-    tank = {"type": "basin", "on": "hull", "size": [1.0, 1.0], "cells": [4, 4], "start": {"u": 0.3}, **physics}
+    hull = {
+        "type": "body",
+        "mass": 10.0,
+        "inertia": [1.0, 1.0, 1.0],
+        "joint": {"kind": "fixed", "attitude": attitude},
+    }
+    tank = {
+        "type": "basin",
+        "on": "hull",
+        "size": [1.0, 1.0],
+        "cells": [4, 4],
+        "start": {"u": 0.3},
+        **physics,
+    }
     case = scene({"hull": hull, "tank": tank}, {}, 1e-6, {"scheme": "upwind"})
-    case["output"] |= {"fields": 1, "lines": {"cut": {"basin": "tank", "from": [0.2, 0.5], "to": [0.8, 0.5]}}}
+    case["output"] |= {
+        "fields": 1,
+        "lines": {"cut": {"basin": "tank", "from": [0.2, 0.5], "to": [0.8, 0.5]}},
+    }
     run(case, out=tmp_path / "r")
     frame = meshio.read(tmp_path / "r" / "fields" / "tank-000000.vtu")
-    assert frame.cell_data["velocity"][0] == pytest.approx(np.tile(0.3 * np.array(along), (16, 1)), abs=1e-12)
+    assert frame.cell_data["velocity"][0] == pytest.approx(
+        np.tile(0.3 * np.array(along), (16, 1)), abs=1e-12
+    )
     line = np.genfromtxt(tmp_path / "r" / "lines" / "cut-000000.csv", delimiter=",", names=True)
-    assert line["u_ms"] == pytest.approx(np.full(line.size, 0.3)) and np.abs(line["v_ms"]).max() < 1e-12
+    assert (
+        line["u_ms"] == pytest.approx(np.full(line.size, 0.3))
+        and np.abs(line["v_ms"]).max() < 1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -336,12 +423,23 @@ def test_a_run_without_frames_states_the_single_reason(fields, out, reason, tmp_
     coil = {"type": "spring", "from": "wall", "to": "weight", "stiffness": 1.0}
     lone = out is None
     nodes = {"weight": weight, "wall": {"type": "frame"}} if lone else {"stone": stone}
-    case = scene(nodes, {"coil": coil} if lone else {}, 0.1, {"method": "rk4", "step": 0.01, "scheme": "upwind"})
+    case = scene(
+        nodes,
+        {"coil": coil} if lone else {},
+        0.1,
+        {"method": "rk4", "step": 0.01, "scheme": "upwind"},
+    )
     case["output"]["fields"] = fields
     found = run(case, out=None if out is False else tmp_path / "r")
     with pytest.raises(RunError, match=reason) as told:
         found.view(field="speed")
-    assert sum(one in str(told.value) for one in ("fields is 0", "nothing was written", "the case has no ")) == 1
+    assert (
+        sum(
+            one in str(told.value)
+            for one in ("fields is 0", "nothing was written", "the case has no ")
+        )
+        == 1
+    )
 
 
 WAITING = """
@@ -360,22 +458,31 @@ fvsolve.run(sys.argv[1], out=sys.argv[2], progress=wait)
 def running(tmp_path):
     """Folder and process of a run that waits in its first call of `progress`."""
     case = tmp_path / "case.toml"
-    case.write_text(fvsolve.load(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}).resolved())
+    case.write_text(
+        fvsolve.load(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}).resolved()
+    )
     (tmp_path / "wait.py").write_text(WAITING)
     command = [sys.executable, str(tmp_path / "wait.py"), str(case), str(tmp_path / "out")]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout.readline() == "going\n"
         yield tmp_path / "out", process
         process.kill()
 
 
-@pytest.mark.parametrize("how", [{}, {"force": True}, {"resume": True}], ids=["anew", "force", "resume"])
+@pytest.mark.parametrize(
+    "how", [{}, {"force": True}, {"resume": True}], ids=["anew", "force", "resume"]
+)
 def test_a_run_that_is_going_is_let_alone(running, how):
     folder, process = running
     before = (folder / "restart.npz").read_bytes(), (folder / "history.csv").stat().st_size
     with pytest.raises(RunError, match=r"out is in use: a run still writes there\. .*--out"):
         fvsolve.run(folder.parent / "case.toml", out=folder, **how)
-    assert before == ((folder / "restart.npz").read_bytes(), (folder / "history.csv").stat().st_size)
+    assert before == (
+        (folder / "restart.npz").read_bytes(),
+        (folder / "history.csv").stat().st_size,
+    )
     assert process.poll() is None
 
 
@@ -392,8 +499,13 @@ def test_the_lock_goes_with_its_process(running):
 def test_a_run_that_fails_lets_go(tmp_path):
     for _ in range(2):
         with pytest.raises(ZeroDivisionError):
-            fvsolve.run(still(), {"numerics.step": "1 us", "numerics.method": "rk4"}, tmp_path, force=True,
-                        progress=lambda *_: 1 / 0)  # fmt: skip
+            fvsolve.run(
+                still(),
+                {"numerics.step": "1 us", "numerics.method": "rk4"},
+                tmp_path,
+                force=True,
+                progress=lambda *_: 1 / 0,
+            )
     assert fvsolve.run(still(), out=tmp_path, force=True).ok
     with pytest.raises(RunError, match="holds a run; replace it"):
         fvsolve.run(still(), out=tmp_path)
@@ -403,8 +515,12 @@ def test_a_run_that_fails_lets_go(tmp_path):
 
 def test_studies_share_no_folder(tmp_path):
     vary = {"nodes.pond.level": [1.0, 2.0]}
-    with ResultCache(tmp_path), pytest.raises(RunError, match="is in use: a study still writes there"):
+    with (
+        ResultCache(tmp_path),
+        pytest.raises(RunError, match="is in use: a study still writes there"),
+    ):
         sweep(still(), vary, out=tmp_path)
     assert len(sweep(still(), vary, out=tmp_path).rows) == 2
     written = {path.name for path in tmp_path.iterdir()}
-    assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}  # sweep.parquet needs pyarrow
+    # sweep.parquet needs pyarrow
+    assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}

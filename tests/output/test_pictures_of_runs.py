@@ -23,7 +23,9 @@ alone = pytest.mark.skipif(processor_count() < 2, reason="one processor draws in
 
 
 def python(code: str, folder: Path) -> str:
-    done = subprocess.run([sys.executable, "-c", BEGIN + code], cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", BEGIN + code], cwd=folder, capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
     return done.stdout
 
@@ -35,7 +37,11 @@ def fork(tmp_path, monkeypatch):
 
 
 def command(*words: str):
-    done = subprocess.run([sys.executable, "-m", "fvsolve", "run", "fork.toml", *words], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "fvsolve", "run", "fork.toml", *words],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     return done
 
@@ -53,7 +59,9 @@ def test_pictures_of_a_command_are_those_of_its_result(fork):
 def test_pictures_are_drawn_only_on_request(fork):
     assert ".png" not in command("--no-pictures").stdout
     assert not list(Path("runs/fork").glob("*.png"))
-    assert fvsolve.run("fork.toml", out="other", pictures=False).ok and not list(Path("other").glob("*.png"))
+    assert fvsolve.run("fork.toml", out="other", pictures=False).ok and not list(
+        Path("other").glob("*.png")
+    )
     before = Path("runs/fork/history.csv").stat().st_mtime_ns
     assert "history.png" in command("--resume").stdout.splitlines()[-1]
     assert Path("runs/fork/history.csv").stat().st_mtime_ns == before

@@ -77,7 +77,10 @@ class Half:
 '''
 TANK = {
     "fluid": {"name": "water", "temperature": 288.15},
-    "nodes": {"tank": {"type": "tank", "area": 1.0, "level": 2.0}, "low": {"type": "reservoir", "head": 0.0}},
+    "nodes": {
+        "tank": {"type": "tank", "area": 1.0, "level": 2.0},
+        "low": {"type": "reservoir", "head": 0.0},
+    },
     "links": {"hole": {"type": "orifice", "from": "tank", "to": "low", "area": 1e-3}},
     "numerics": {"end": 10.0, "method": "rk4", "step": 1.0},
     "output": {"probes": ["tank.level"], "every": 1.0},
@@ -96,13 +99,18 @@ PLACES = {
 @pytest.fixture
 def home(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(install(tmp_path, "store", {"store/__init__.py": SINKS}, {GROUP: PLACES}))
+    monkeypatch.syspath_prepend(
+        install(tmp_path, "store", {"store/__init__.py": SINKS}, {GROUP: PLACES})
+    )
     yield tmp_path
     sys.modules.pop("store", None)
 
 
 def tank(*sinks: str, **numerics) -> dict:
-    return TANK | {"output": TANK["output"] | {"sinks": [*sinks]}, "numerics": TANK["numerics"] | numerics}
+    return TANK | {
+        "output": TANK["output"] | {"sinks": [*sinks]},
+        "numerics": TANK["numerics"] | numerics,
+    }
 
 
 def calls() -> list:
@@ -111,7 +119,15 @@ def calls() -> list:
 
 def test_a_run_of_the_command_line_writes_to_the_sink_of_its_case(tmp_path):
     home = install(tmp_path, "store", {"store/__init__.py": SINKS}, {GROUP: PLACES})
-    words = "run", str(CASES / "two-tanks.toml"), "--out", "out", "--no-pictures", "--set", "numerics.end=20"
+    words = (
+        "run",
+        str(CASES / "two-tanks.toml"),
+        "--out",
+        "out",
+        "--no-pictures",
+        "--set",
+        "numerics.end=20",
+    )
     words += "--set", "expect={}", "--set", 'output.sinks=["json-lines"]'
     python(home, "-m", "fvsolve", *words)
     rows = [json.loads(line) for line in (home / "out" / "history.jsonl").read_text().splitlines()]
@@ -123,14 +139,23 @@ def test_a_run_of_the_command_line_writes_to_the_sink_of_its_case(tmp_path):
 def test_a_sink_receives_all_output_of_a_run_directory(home):
     result = fvsolve.run(tank("recorder"), out="run", pictures=False)
     names = [name for name, *_ in calls()]
-    assert names[0] == "open" and names[-2:] == ["end", "close"] and {*names[1:-2]} == {"rows", "field"}
-    assert calls()[0][1:] == (Path("run"), result.case.name) and calls()[-2] == ("end", result.reason)
+    assert (
+        names[0] == "open"
+        and names[-2:] == ["end", "close"]
+        and {*names[1:-2]} == {"rows", "field"}
+    )
+    assert calls()[0][1:] == (Path("run"), result.case.name) and calls()[-2] == (
+        "end",
+        result.reason,
+    )
     values = np.concatenate([rest[1][:, 0] for name, *rest in calls() if name == "rows"])
     assert np.array_equal(values, result["tank.level"])
 
 
 def test_a_run_in_memory_uses_no_sink(home):
-    assert np.array_equal(fvsolve.run(tank("recorder"))["tank.level"], fvsolve.run(tank())["tank.level"])
+    assert np.array_equal(
+        fvsolve.run(tank("recorder"))["tank.level"], fvsolve.run(tank())["tank.level"]
+    )
     assert "store" not in sys.modules
 
 
@@ -145,7 +170,9 @@ def test_a_run_directory_is_read_where_the_sink_is_not_installed(home, monkeypat
 def test_two_sinks_receive_the_same_and_a_run_directory_is_as_without_sinks(home):
     for name, sinks in (("bare", ()), ("both", ("recorder", "json-lines"))):
         fvsolve.run(tank(*sinks), out=name, pictures=False)
-    assert (home / "bare" / "history.csv").read_bytes() == (home / "both" / "history.csv").read_bytes()
+    assert (home / "bare" / "history.csv").read_bytes() == (
+        home / "both" / "history.csv"
+    ).read_bytes()
     rows = [json.loads(line) for line in (home / "both" / "history.jsonl").read_text().splitlines()]
     assert [t for t, _ in rows] == [float(t) for t in range(11)]  # that of the recorder is a copy
     texts = [(home / name / "case.toml").read_text() for name in ("bare", "both")]
@@ -162,7 +189,8 @@ def test_a_run_continues_with_other_sinks_than_it_began_with(home):
 
 def test_a_sink_that_fails_ends_the_run_and_all_sinks_are_closed(home):
     with pytest.raises(
-        RunError, match=r'sink "full" \(store:Full\): rows\(\) failed: ValueError: memory is full; corr'
+        RunError,
+        match=r'sink "full" \(store:Full\): rows\(\) failed: ValueError: memory is full; corr',
     ):
         fvsolve.run(tank("full", "recorder"), out="run", pictures=False)
     assert [name for name, *_ in calls()].count("close") == 2
@@ -186,8 +214,16 @@ def test_a_sink_that_does_not_open_leaves_an_earlier_run_as_it_is(home):
     [
         ("recordr", CaseError, 'output.sinks: no sink named "recordr"; did you mean "recorder"?'),
         ("zz", CaseError, 'no sink named "zz"; expected full, half, json-lines, leaky, lost'),
-        ("lost", FvsolveError, "lost of the entry points fvsolve.sinks of store: .* No module named 'store.lost'; cor"),
-        ("half", FvsolveError, "half of .* store:Half cannot be read: its object has no method rows, close; expected"),
+        (
+            "lost",
+            FvsolveError,
+            "lost of the entry points fvsolve.sinks of store: .* No module named 'store.lost'; cor",
+        ),
+        (
+            "half",
+            FvsolveError,
+            "half of .* store:Half cannot be read: its object has no method rows, close; expected",
+        ),
     ],
 )
 def test_a_name_that_cannot_be_used_is_explained_before_the_run(name, error, message, home):

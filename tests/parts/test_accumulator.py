@@ -25,10 +25,25 @@ def vessel(**more) -> dict:
     return {"type": "accumulator", "volume": 0.1, "gas_volume": GAS, "exponent": N, **more}
 
 
-def swing(flow: float, end: float, numerics=TIGHT, law="linear", probes=("a.gas_pressure", "c.flow"), **more) -> dict:
+def swing(
+    flow: float,
+    end: float,
+    numerics=TIGHT,
+    law="linear",
+    probes=("a.gas_pressure", "c.flow"),
+    **more,
+) -> dict:
     """Return a case of a rigid column between a reservoir and an accumulator, with the initial flow `flow` [m3/s]."""
-    links = {"c": {"type": "rigid-column", "from": "lake", "to": "a", "length": LENGTH, "diameter": DIAMETER,
-                   "initial_flow": flow}}  # fmt: skip
+    links = {
+        "c": {
+            "type": "rigid-column",
+            "from": "lake",
+            "to": "a",
+            "length": LENGTH,
+            "diameter": DIAMETER,
+            "initial_flow": flow,
+        }
+    }
     nodes = {"lake": reservoir(P0), "a": vessel(**more)}
     return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
 
@@ -49,10 +64,14 @@ def test_a_small_oscillation_has_its_closed_period(law, near):
 def test_a_large_oscillation_turns_where_its_energy_is_gas_energy(n):
     """At both extremes INERTIA q0^2 / 2 equals the work on the gas minus the work of the reservoir."""
     q0 = 0.05
-    result = fvsolve.run(swing(q0, 5.0, exponent=n) | {"output": {"every": 0.001, "probes": ["a.gas_pressure"]}})
+    result = fvsolve.run(
+        swing(q0, 5.0, exponent=n) | {"output": {"every": 0.001, "probes": ["a.gas_pressure"]}}
+    )
 
     def left(volume):
-        gas = math.log(GAS / volume) if n == 1.0 else ((GAS / volume) ** (n - 1.0) - 1.0) / (n - 1.0)
+        gas = (
+            math.log(GAS / volume) if n == 1.0 else ((GAS / volume) ** (n - 1.0) - 1.0) / (n - 1.0)
+        )
         return P0 * GAS * gas + P0 * (volume - GAS) - 0.5 * INERTIA * q0**2
 
     turns = [brentq(left, 1e-3, GAS, xtol=1e-15), brentq(left, GAS, 1.0, xtol=1e-15)]
@@ -82,13 +101,17 @@ def filled(law: str, q: float = 1e-3, end: float = 40.0, **more) -> dict:
     """Return a case of a constant inflow `q` [m3/s] into an accumulator."""
     nodes = {"in": {"type": "inflow", "flow": q}, "a": vessel(initial_pressure=P0, **more)}
     links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 1e-3}}
-    return scene(nodes, links, end, TIGHT, ("a.pressure", "a.gas_volume"), 1.0, fluid=WATER | {"law": law})
+    return scene(
+        nodes, links, end, TIGHT, ("a.pressure", "a.gas_volume"), 1.0, fluid=WATER | {"law": law}
+    )
 
 
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_filling_squeezes_the_gas_by_its_law(n):
     result = fvsolve.run(filled("linear", exponent=n))
-    assert result["a.pressure"] == pytest.approx(P0 * (GAS / (GAS - 1e-3 * result.t)) ** n, rel=1e-9)
+    assert result["a.pressure"] == pytest.approx(
+        P0 * (GAS / (GAS - 1e-3 * result.t)) ** n, rel=1e-9
+    )
     assert abs(result.ledger["mass"]["relative"]) < 1e-14
 
 
@@ -111,7 +134,14 @@ def test_under_log_the_fluid_in_the_vessel_is_squeezed_too():
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_bladder_empties_and_fills_again_at_its_precharge(law):
     """Below the precharge the neck takes up the pressure; both switches are events, and the flow follows SciPy."""
-    case = swing(-0.04, 2.5, law=law, gas_volume=None, precharge=5e5, probes=["a.pressure", "c.flow", "a.gas_volume"])
+    case = swing(
+        -0.04,
+        2.5,
+        law=law,
+        gas_volume=None,
+        precharge=5e5,
+        probes=["a.pressure", "c.flow", "a.gas_volume"],
+    )
     del case["nodes"]["a"]["gas_volume"]
     result = fvsolve.run(case)
     stiff, whole = WATER["bulk_modulus"] / (0.01 * 0.1), 0.1
@@ -123,12 +153,17 @@ def test_a_bladder_empties_and_fills_again_at_its_precharge(law):
     def rates(t, y):
         return (P0 - pressure(y[1])) / INERTIA, -y[0]
 
-    exact = solve_ivp(rates, (0, 2.5), [-0.04, gas], t_eval=result.t, rtol=1e-10, atol=1e-14, max_step=1e-4)
+    exact = solve_ivp(
+        rates, (0, 2.5), [-0.04, gas], t_eval=result.t, rtol=1e-10, atol=1e-14, max_step=1e-4
+    )
     texts = [event["what"] for event in result.summary["events"]]
     assert texts[:2] == ["is empty", "holds fluid again"] and len(texts) in (2, 3)
     first, last = (event["time"] for event in result.summary["events"][:2])
-    away = (law == "linear") | (result.t < first) | (result.t > last)  # the bounce of 5 ms depends on the law
-    assert result["c.flow"][away] == pytest.approx(exact.y[0][away], abs=0.04 * (1e-6 if law == "linear" else 3e-3))
+    # the bounce of 5 ms depends on the law
+    away = (law == "linear") | (result.t < first) | (result.t > last)
+    assert result["c.flow"][away] == pytest.approx(
+        exact.y[0][away], abs=0.04 * (1e-6 if law == "linear" else 3e-3)
+    )
 
 
 def test_nothing_moves_while_nothing_changes():
@@ -144,9 +179,13 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
     """The energy balance closes, dissipation never decreases, and the network is passive at its port."""
     connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
     for more in ({"exponent": 1.0}, {"connection": connection}):
-        one = energy(swing(0.04, 1.6, {"method": "gauss-6", "step": 1e-3}, law, **more), port="lake")
+        one = energy(
+            swing(0.04, 1.6, {"method": "gauss-6", "step": 1e-3}, law, **more), port="lake"
+        )
         column = sum(loss[-1] for loss in one.law.values())  # law loss of the rigid column
-        assert abs(one.numerical_remainder[-1] - column) < 1e-9 * one.throughput and one.port.passive
+        assert (
+            abs(one.numerical_remainder[-1] - column) < 1e-9 * one.throughput and one.port.passive
+        )
         at_start = one.at_start.get("a", one.at_start.get("a.inside"))
         assert at_start > 0.0
         assert all((np.diff(loss) >= -1e-9).all() for loss in one.dissipated.values())
@@ -178,7 +217,9 @@ def test_an_empty_start_is_reported():
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_precharge_above_the_line_stays_until_the_line_exceeds_it(law):
     """A full bladder leaves the neck, as stiff as its fluid, until the line exceeds the precharge, as in SciPy."""
-    case = swing(0.0, 2.0, law=law, probes=["a.pressure", "c.flow", "a.gas_volume", "a.gas_pressure"])
+    case = swing(
+        0.0, 2.0, law=law, probes=["a.pressure", "c.flow", "a.gas_volume", "a.gas_pressure"]
+    )
     case["nodes"]["a"] = {"type": "accumulator", "volume": 0.1, "precharge": 9e5, "exponent": N}
     case["nodes"]["lake"] = reservoir({"time": [0.0, 0.5, 1.0], "value": [P0, P0, 12e5]})
     result, stiff = fvsolve.run(case), WATER["bulk_modulus"] / (0.01 * 0.1)
@@ -191,12 +232,27 @@ def test_a_precharge_above_the_line_stays_until_the_line_exceeds_it(law):
     def lifts(t, y):
         return y[1] - shed
 
-    exact = solve_ivp(rates, (0, 2.0), [0.0, 0.0], t_eval=result.t, events=lifts, rtol=1e-10, atol=1e-15, max_step=2e-4)
+    exact = solve_ivp(
+        rates,
+        (0, 2.0),
+        [0.0, 0.0],
+        t_eval=result.t,
+        events=lifts,
+        rtol=1e-10,
+        atol=1e-15,
+        max_step=2e-4,
+    )
     (event,) = result.summary["events"]
-    assert event["what"] == "holds fluid again" and [event["time"]] == pytest.approx(exact.t_events[0], rel=1e-4)
+    assert event["what"] == "holds fluid again" and [event["time"]] == pytest.approx(
+        exact.t_events[0], rel=1e-4
+    )
     stands = result.t < event["time"]
-    assert (result["a.gas_volume"][stands] == 0.1).all() and result["a.pressure"][stands].max() < 9e5
-    assert result["a.gas_pressure"] == pytest.approx(9e5 * (0.1 / result["a.gas_volume"]) ** N, rel=1e-12)
+    assert (result["a.gas_volume"][stands] == 0.1).all() and result["a.pressure"][
+        stands
+    ].max() < 9e5
+    assert result["a.gas_pressure"] == pytest.approx(
+        9e5 * (0.1 / result["a.gas_volume"]) ** N, rel=1e-12
+    )
     if law == "linear":  # under `log` the fluid in the vessel is compressed too
         assert result["c.flow"] == pytest.approx(exact.y[0], abs=1e-6 * exact.y[0].max())
 
@@ -221,19 +277,37 @@ def test_faults_of_an_accumulator_are_reported(wrong, said):
     assert said in str(refused(case))
 
 
-@pytest.mark.parametrize("precharge, switches, law", [(4.01e5, 3, "linear"), (4.01e5, 3, "log"), (7e5, 2, "linear")])
+@pytest.mark.parametrize(
+    "precharge, switches, law", [(4.01e5, 3, "linear"), (4.01e5, 3, "log"), (7e5, 2, "linear")]
+)
 def test_a_check_valve_next_to_an_empty_bladder_opens_once(precharge, switches, law):
     """The check valve opens where n^2 70 m reaches the lift of 28 m; afterwards its flow equals the outflow."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     speed = {"time": [1.0, 1.5, 5.0, 6.0], "value": [1.0, 0.3, 0.3, 1.0]}
-    links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "speed": speed, "check_valve": True},
-             "g": {"type": "valve", "from": "a", "to": "o", "area": 0.003}}  # fmt: skip
-    nodes = {"s": lake(2.0), "a": {"type": "accumulator", "volume": 0.2, "precharge": precharge}, "o": lake(30.0)}
-    case = scene(nodes, links, 5.485, {}, ["p.flow", "g.flow"], every=1e-3, fluid=WATER | {"law": law})
+    links = {
+        "p": {
+            "type": "pump",
+            "from": "s",
+            "to": "a",
+            "curve": curve,
+            "speed": speed,
+            "check_valve": True,
+        },
+        "g": {"type": "valve", "from": "a", "to": "o", "area": 0.003},
+    }
+    nodes = {
+        "s": lake(2.0),
+        "a": {"type": "accumulator", "volume": 0.2, "precharge": precharge},
+        "o": lake(30.0),
+    }
+    case = scene(
+        nodes, links, 5.485, {}, ["p.flow", "g.flow"], every=1e-3, fluid=WATER | {"law": law}
+    )
     result = fvsolve.run(case)
     events = result.summary["events"]
     times = [event["time"] for event in events if event["what"] == "check valve opens"]
-    assert times == pytest.approx([5.0 + (math.sqrt(0.4) - 0.3) / 0.7], abs=1e-5)  # it opens at a drop of 1 Pa
+    # it opens at a drop of 1 Pa
+    assert times == pytest.approx([5.0 + (math.sqrt(0.4) - 0.3) / 0.7], abs=1e-5)
     assert len(events) == switches
     late = result.t > times[0] + 5e-4
     assert np.count_nonzero(late) > 5
@@ -243,13 +317,24 @@ def test_a_check_valve_next_to_an_empty_bladder_opens_once(precharge, switches, 
 def crowding() -> dict:
     """Return a case of Euler steps of 1 s on bladders that empty every millisecond, so that events cut each step."""
     nodes = {
-        name: {"type": "accumulator", "volume": volume, "precharge": 487697.8989862603, "initial_pressure": pressure}
+        name: {
+            "type": "accumulator",
+            "volume": volume,
+            "precharge": 487697.8989862603,
+            "initial_pressure": pressure,
+        }
         for name, volume, pressure in (
             ("a", 0.004987588103931503, 1199485.5612143674),
             ("b", 0.9755041114238246, 257221.7644945206),
         )
     }
-    way = {"type": "rigid-column", "from": "a", "to": "b", "length": 31.862243811623756, "diameter": 0.02}
+    way = {
+        "type": "rigid-column",
+        "from": "a",
+        "to": "b",
+        "length": 31.862243811623756,
+        "diameter": 0.02,
+    }
     way["friction"] = {"model": "quasi-steady", "factor": 0.02}
     numerics = {"method": "euler", "step": 1.0, "initial": "rest"}
     return scene(nodes, {"way": way}, 3.0, numerics, ["way.flow"], 0.1)
@@ -257,7 +342,10 @@ def crowding() -> dict:
 
 def test_events_that_crowd_within_a_step_are_bounded_and_named():
     result = fvsolve.run(crowding())
-    ended = [said in result.reason for said in ("a changes its state without end", "way.flow has grown to")]
+    ended = [
+        said in result.reason
+        for said in ("a changes its state without end", "way.flow has grown to")
+    ]
     assert not result.ok and any(ended)  # either reason: the step also exceeds Euler's limit
     events = [event["time"] for event in result.summary["events"]]
     assert len(events) < 5000 and 1.0 < events[-1] < 3.0

@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from reference.air import HEAT, SMALL, bores, softened
 from reference.refusals import refused
-from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
+from reference.scenes import (
+    AMBIENT,
+    RHO,
+    WATER,
+    area,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    valve,
+)
 from scipy.integrate import solve_ivp
 
 import fvsolve
@@ -19,13 +30,36 @@ INERTIA = RHO * LENGTH / area(DIAMETER)
 TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
 
 
-def drained(inlet=0.05, outlet=0.05, low=AMBIENT - 0.6e5, end=6.0, numerics=TIGHT, law="linear", flow=0.05, **more):
+def drained(
+    inlet=0.05,
+    outlet=0.05,
+    low=AMBIENT - 0.6e5,
+    end=6.0,
+    numerics=TIGHT,
+    law="linear",
+    flow=0.05,
+    **more,
+):
     """Return a case of a gate that shuts before an air valve, from which a rigid column flows on."""
-    nodes = {"lake": reservoir(2e5), "v": {"type": "air-valve", "inlet": inlet, "outlet": outlet, **more}}
+    nodes = {
+        "lake": reservoir(2e5),
+        "v": {"type": "air-valve", "inlet": inlet, "outlet": outlet, **more},
+    }
     nodes["low"] = reservoir(low)
-    column = {"type": "rigid-column", "from": "v", "to": "low", "length": LENGTH, "diameter": DIAMETER}
-    gate = {"type": "valve", "from": "lake", "to": "v", "area": 0.01,
-            "opening": {"start": 0.1, "duration": 0.4, "value": [1.0, 0.0]}}  # fmt: skip
+    column = {
+        "type": "rigid-column",
+        "from": "v",
+        "to": "low",
+        "length": LENGTH,
+        "diameter": DIAMETER,
+    }
+    gate = {
+        "type": "valve",
+        "from": "lake",
+        "to": "v",
+        "area": 0.01,
+        "opening": {"start": 0.1, "duration": 0.4, "value": [1.0, 0.0]},
+    }
     probes = ["v.air_pressure", "v.air_volume", "v.air_mass", "c.flow", "v.pressure"]
     links = {"gate": gate, "c": {**column, "initial_flow": flow}}
     return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
@@ -51,10 +85,16 @@ def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
     from fvsolve.parts.air_valve.law import orifice_flow
 
     for r in (0.2, 0.5283, 0.53, 0.9, 1.0 - 1.01 * SMALL):
-        textbook = bores(r * AMBIENT, 0.1, 0.1, lambda x: 1.0) / (0.6 * area(0.1) * AMBIENT / math.sqrt(HEAT))
+        textbook = bores(r * AMBIENT, 0.1, 0.1, lambda x: 1.0) / (
+            0.6 * area(0.1) * AMBIENT / math.sqrt(HEAT)
+        )
         assert orifice_flow(r) == pytest.approx(textbook, rel=2e-12)
     for x in np.linspace(0.0, SMALL, 50):
-        assert 0.0 <= math.sqrt(7 * x / 3.5) - orifice_flow(1.0 - x) <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
+        assert (
+            0.0
+            <= math.sqrt(7 * x / 3.5) - orifice_flow(1.0 - x)
+            <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
+        )
 
 
 def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
@@ -75,15 +115,29 @@ def off_scipy(law, beta=2.2e9) -> tuple[float, int]:
     def rates(now, y):
         p, v = y[2] * HEAT / y[1], y[0] / area(30.0 * inlet)
         drop = 0.5 * RHO * v * abs(v)
-        return (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], bores(p, inlet, outlet)
+        return (
+            (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA,
+            y[0],
+            bores(p, inlet, outlet),
+        )
 
-    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01,
-                      method="DOP853")  # fmt: skip
+    exact = solve_ivp(
+        rates,
+        (t[rows][0], t[rows][-1]),
+        first,
+        t_eval=t[rows],
+        rtol=1e-11,
+        atol=1e-14,
+        max_step=0.01,
+        method="DOP853",
+    )
     p = exact.y[2] * HEAT / exact.y[1]
     assert p.max() > 2.0 * AMBIENT and p.min() < 0.95 * AMBIENT
     off = [(result["v.air_mass"][rows], exact.y[2]), (result["v.air_pressure"][rows], p)]
     flow = np.abs(result["c.flow"][rows] - exact.y[0]).max() / np.abs(exact.y[0]).max()
-    return max(flow, *(np.abs(found / true - 1.0).max() for found, true in off)), result.summary["steps"]
+    return max(flow, *(np.abs(found / true - 1.0).max() for found, true in off)), result.summary[
+        "steps"
+    ]
 
 
 def test_subsonic_in_and_out_and_choked_out_follow_scipy():
@@ -98,7 +152,9 @@ def test_under_a_compressible_law_it_differs_by_the_first_order_of_its_compressi
 
 
 def test_it_opens_and_shuts_once_a_swing_and_its_ledger_is_closed():
-    result = fvsolve.run(drained(0.04, 0.04, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-6}))
+    result = fvsolve.run(
+        drained(0.04, 0.04, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-6})
+    )
     texts = [event["what"] for event in result.summary["events"]]
     assert texts[:2] == ["opens", "shuts"] and len(texts) <= 8
     assert texts == (["opens", "shuts"] * 4)[: len(texts)]
@@ -109,10 +165,23 @@ def test_it_opens_again_from_the_very_volume_at_closure():
     """Beside the shut check valve of a pump, its fluid volume is constant while it is shut."""
     curve = {"flow": [0.0, 0.04, 0.06], "head": [70.0, 60.0, 45.0]}
     friction = {"model": "quasi-steady", "roughness": 1e-4}
-    links = {"p": {"type": "pump", "from": "s", "to": "a", "curve": curve, "rated_speed": 150.0, "inertia": 0.1,
-                   "trip": 1.0, "check_valve": True},
-             "m": pipe("a", "o", 800.0, 0.2, 1000.0, 40, friction=friction)}  # fmt: skip
-    nodes = {"s": lake(2.0), "a": {"type": "air-valve", "elevation": 5.0, "inlet": 0.05, "outlet": 0.005}}
+    links = {
+        "p": {
+            "type": "pump",
+            "from": "s",
+            "to": "a",
+            "curve": curve,
+            "rated_speed": 150.0,
+            "inertia": 0.1,
+            "trip": 1.0,
+            "check_valve": True,
+        },
+        "m": pipe("a", "o", 800.0, 0.2, 1000.0, 40, friction=friction),
+    }
+    nodes = {
+        "s": lake(2.0),
+        "a": {"type": "air-valve", "elevation": 5.0, "inlet": 0.05, "outlet": 0.005},
+    }
     result = fvsolve.run(scene(nodes | {"o": lake(40.0)}, links, 15.0, {}, ["a.air_volume"]))
     texts = [event["what"] for event in result.summary["events"] if event["name"] == "a"]
     assert result.ok and texts == ["opens", "shuts", "opens", "shuts"]
@@ -121,7 +190,9 @@ def test_it_opens_again_from_the_very_volume_at_closure():
     assert between.any() and np.all(result["a.air_volume"][between] > result["a.air_volume"][0])
 
 
-@pytest.mark.parametrize("numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}])
+@pytest.mark.parametrize(
+    "numerics", [{"method": "euler", "step": 0.001}, {"method": "rk4", "step": 0.01}]
+)
 def test_fixed_explicit_steps_open_it_once(numerics):
     """A chamber of the usual size of air valves responds no faster than the steps, so the valve does not chatter."""
     found, true = (fvsolve.run(drained(0.05, 0.05, numerics=own)) for own in (numerics, TIGHT))
@@ -134,10 +205,15 @@ def test_shut_it_is_a_junction_to_the_last_bit_but_rounding():
     found = []
     for place in (junction(), {"type": "air-valve", "inlet": 0.1, "outlet": 0.01}):
         nodes = {"lake": reservoir(fall), "v": place, "low": reservoir(2e5)}
-        links = {"one": pipe("lake", "v", 100.0, 0.3, 1000.0, 10), "two": pipe("v", "low", 100.0, 0.3, 1000.0, 10)}
+        links = {
+            "one": pipe("lake", "v", 100.0, 0.3, 1000.0, 10),
+            "two": pipe("v", "low", 100.0, 0.3, 1000.0, 10),
+        }
         for link in links.values():
             link["friction"] = {"model": "steady", "factor": 0.02}
-        found.append(fvsolve.run(scene(nodes, links, 2.0, {"method": "rk4"}, ["v.pressure", "two.flow"])))
+        found.append(
+            fvsolve.run(scene(nodes, links, 2.0, {"method": "rk4"}, ["v.pressure", "two.flow"]))
+        )
     assert not found[1].summary["events"]
     for name in ("v.pressure", "two.flow"):
         assert found[1][name] == pytest.approx(found[0][name], rel=1e-12)
@@ -145,7 +221,9 @@ def test_shut_it_is_a_junction_to_the_last_bit_but_rounding():
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_its_energy_closes_and_its_bores_only_dissipate(law):
-    case = drained(0.04, 0.02, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-8}, end=4.0, law=law)
+    case = drained(
+        0.04, 0.02, RETURN, numerics={"method": "dormand-prince", "rtol": 1e-8}, end=4.0, law=law
+    )
     one = energy(case, port="low")
     column = sum(loss[-1] for loss in one.law.values())
     assert abs(one.numerical_remainder[-1] - column) < 1e-5 * one.throughput and one.port.passive
@@ -170,10 +248,20 @@ def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
 
 
 def test_open_at_the_start_it_is_reported():
-    links = {"m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4), "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4)}
-    nodes = {"lake": lake(0.0), "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05}}
+    links = {
+        "m": pipe("lake", "v", 100.0, 0.1, 1000.0, 4),
+        "n": pipe("v", "low", 100.0, 0.1, 1000.0, 4),
+    }
+    nodes = {
+        "lake": lake(0.0),
+        "v": {"type": "air-valve", "elevation": 2.0, "inlet": 0.05, "outlet": 0.05},
+    }
     model = fvsolve.build(fvsolve.load(scene(nodes | {"low": lake(0.0)}, links, 1.0, {})))
-    (said,) = [one.text for one in model.warnings if one.text.startswith("v: the air valve is open at the start")]
+    (said,) = [
+        one.text
+        for one in model.warnings
+        if one.text.startswith("v: the air valve is open at the start")
+    ]
     assert f"{RHO * 9.80665 * 2.0:.4g} Pa below ambient" in said
 
 
@@ -200,8 +288,12 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
 
     for given, want in ((5e5, 0.002), (2e5, 0.002), (1.2e5, 0.002)):
         nodes = {"lake": reservoir(given)}
-        nodes["j"] = junction(want, required_pressure=AMBIENT + 2e5, minimum_pressure=AMBIENT + 0.2e5)
-        case = scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}, ["gap.flow", "j.pressure"])
+        nodes["j"] = junction(
+            want, required_pressure=AMBIENT + 2e5, minimum_pressure=AMBIENT + 0.2e5
+        )
+        case = scene(
+            nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}, ["gap.flow", "j.pressure"]
+        )
         model = fvsolve.build(fvsolve.load(case))
 
         def drawn(p, want=want):
@@ -247,7 +339,10 @@ def by_stages(case, speed: float | None = None):
     throttled outlet and the automatic bore.
     """
     result = fvsolve.run(case)
-    t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
+    t, times = (
+        np.asarray(result.t),
+        {e["what"]: e["time"] for e in reversed(result.summary["events"])},
+    )
     rows = (t >= 0.6) & (t < times.get("shuts", np.inf) - 0.02)
     y = [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")]
     at = t[rows][0]
@@ -263,16 +358,29 @@ def by_stages(case, speed: float | None = None):
 
         def switches(now, y):
             gauge = y[2] * HEAT / y[1] - AMBIENT
-            return gauge - 4e3 if speed is None else min(-y[0] / area(DIAMETER) - speed, gauge - 10.0)
+            return (
+                gauge - 4e3 if speed is None else min(-y[0] / area(DIAMETER) - speed, gauge - 10.0)
+            )
 
         switches.terminal, switches.direction = wide == 0.02, 1.0
-        exact = solve_ivp(rates, (at, end), y, rtol=1e-11, atol=1e-14, max_step=0.01, method="DOP853",
-                          dense_output=True, events=switches)  # fmt: skip
+        exact = solve_ivp(
+            rates,
+            (at, end),
+            y,
+            rtol=1e-11,
+            atol=1e-14,
+            max_step=0.01,
+            method="DOP853",
+            dense_output=True,
+            events=switches,
+        )
         here = rows & (t >= at) & (t <= exact.t[-1])
         flow, volume, mass = exact.sol(t[here])
-        off += [np.abs(result["v.air_mass"][here] / mass - 1.0).max(),
-                np.abs(result["v.air_pressure"][here] * volume / (mass * HEAT) - 1.0).max(),
-                np.abs(result["c.flow"][here] - flow).max() / np.abs(flow).max()]  # fmt: skip
+        off += [
+            np.abs(result["v.air_mass"][here] / mass - 1.0).max(),
+            np.abs(result["v.air_pressure"][here] * volume / (mass * HEAT) - 1.0).max(),
+            np.abs(result["c.flow"][here] - flow).max() / np.abs(flow).max(),
+        ]
         y, at, parted = exact.y[:, -1], exact.t[-1], parted or exact.t[-1]
     return max(off), (times["throttles"], parted), result
 
@@ -298,8 +406,12 @@ def test_throttled_it_stops_less_and_is_wide_again_once_air_comes_in():
     twice = {"time": [0.0, 2.0, 3.0, 6.0, 7.0], "value": [0.4e5, 0.4e5, 6e5, 6e5, 0.4e5]}
     result = fvsolve.run(drained(0.04, 0.02, twice, end=12.0, **STAGES))
     assert [event["what"] for event in result.summary["events"]][:5] == [
-        "opens", "throttles", "shuts", "opens", "stops throttling"
-    ]  # fmt: skip
+        "opens",
+        "throttles",
+        "shuts",
+        "opens",
+        "stops throttling",
+    ]
     stopped = []
     for more in ({}, STAGES):
         one = fvsolve.run(drained(0.04, 0.04, RETURN, **more))
@@ -308,7 +420,9 @@ def test_throttled_it_stops_less_and_is_wide_again_once_air_comes_in():
     assert 0.0 < stopped[1] < 0.7 * stopped[0]
 
 
-@pytest.mark.parametrize("law, method", [("linear", "rodas-5p"), ("linear", "radau-iia-5"), ("log", "dormand-prince")])
+@pytest.mark.parametrize(
+    "law, method", [("linear", "rodas-5p"), ("linear", "radau-iia-5"), ("log", "dormand-prince")]
+)
 def test_staged_its_energy_closes_and_its_bores_only_dissipate(law, method):
     one = energy(staged(law, numerics={"method": method, "rtol": 1e-7}))
     column = sum(loss[-1] for loss in one.law.values())
@@ -352,7 +466,13 @@ def by_table(p: float) -> float:
     drop, x, y = abs(p - AMBIENT), [0.0, *table["pressure"]], [0.0, *(q * q for q in table["flow"])]
     k = min(int(np.searchsorted(x, drop, side="left")), len(x) - 1) or 1
     square = y[k] + (y[k] - y[k - 1]) / (x[k] - x[k - 1]) * (drop - x[k])
-    return sign * AMBIENT / HEAT * math.sqrt(square) * (softened(drop / high) if drop / high < SMALL else 1.0)
+    return (
+        sign
+        * AMBIENT
+        / HEAT
+        * math.sqrt(square)
+        * (softened(drop / high) if drop / high < SMALL else 1.0)
+    )
 
 
 def test_air_by_the_tables_of_a_maker_follows_scipy():
@@ -368,10 +488,22 @@ def test_air_by_the_tables_of_a_maker_follows_scipy():
     def rates(now, y):
         p, v = y[2] * HEAT / y[1], y[0] / throat
         drop = 0.5 * RHO * v * abs(v)
-        return (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA, y[0], by_table(p)
+        return (
+            (p - drop - np.interp(now, RETURN["time"], RETURN["value"])) / INERTIA,
+            y[0],
+            by_table(p),
+        )
 
-    exact = solve_ivp(rates, (t[rows][0], t[rows][-1]), first, t_eval=t[rows], rtol=1e-11, atol=1e-14, max_step=0.01,
-                      method="DOP853")  # fmt: skip
+    exact = solve_ivp(
+        rates,
+        (t[rows][0], t[rows][-1]),
+        first,
+        t_eval=t[rows],
+        rtol=1e-11,
+        atol=1e-14,
+        max_step=0.01,
+        method="DOP853",
+    )
     p = exact.y[2] * HEAT / exact.y[1]
     assert p.min() < AMBIENT - 0.05e5 and p.max() > AMBIENT + 1e5
     assert result["v.air_mass"][rows] == pytest.approx(exact.y[2], rel=1e-6)
@@ -381,15 +513,20 @@ def test_air_by_the_tables_of_a_maker_follows_scipy():
 
 def orifice_table(bore: float, drops, outward: bool) -> dict:
     """Table of a maker with the flow of an orifice at the given pressure differences."""
-    flows = [abs(bores(AMBIENT + drop if outward else AMBIENT - drop, bore, bore, lambda x: 1.0)) for drop in drops]
+    flows = [
+        abs(bores(AMBIENT + drop if outward else AMBIENT - drop, bore, bore, lambda x: 1.0))
+        for drop in drops
+    ]
     return {"pressure": list(drops), "flow": [flow * HEAT / AMBIENT for flow in flows]}
 
 
 def test_a_table_of_the_orifice_formula_gives_the_run_of_the_orifice():
     drops = np.geomspace(200.0, 3e5, 600)
-    tables = {"inlet": orifice_table(0.04, drops[drops < 0.99 * AMBIENT], False),
-              "outlet": orifice_table(0.02, drops, True),
-              "throttled_outlet": orifice_table(0.005, drops, True)}  # fmt: skip
+    tables = {
+        "inlet": orifice_table(0.04, drops[drops < 0.99 * AMBIENT], False),
+        "outlet": orifice_table(0.02, drops, True),
+        "throttled_outlet": orifice_table(0.005, drops, True),
+    }
     plain = {"inlet": 0.04, "outlet": 0.02, "throttled_outlet": 0.005}
     size = {"volume": 1e-3, "switch": 0.1e5}
     runs = [fvsolve.run(drained(**keys, **size, low=RETURN, end=4.0)) for keys in (plain, tables)]

@@ -49,12 +49,18 @@ def low(pressure=LOW):
 def summit(numerics=CLOSE, end=6.0, law="linear", high=FALL, probes=PROBES, nodes=None, links=None):
     """Return a case of two rigid columns at an air valve; `nodes` adds nodes, `links` replaces the columns."""
     nodes = {"high": low(high), "v": AIR_VALVE, "low": low()} | (nodes or {})
-    links = {"one": column("high", "v"), "two": column("v", "low", 80.0)} if links is None else links
+    links = (
+        {"one": column("high", "v"), "two": column("v", "low", 80.0)} if links is None else links
+    )
     return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
 
 
 def times(result, place="v"):
-    return [(event["what"], event["time"]) for event in result.summary["events"] if event["name"] == place]
+    return [
+        (event["what"], event["time"])
+        for event in result.summary["events"]
+        if event["name"] == place
+    ]
 
 
 class Truth:
@@ -74,8 +80,10 @@ class Truth:
 
     def drives(self, t, flows):
         """Return for each column the pressure at the summit at which its flow stays constant [Pa]."""
-        lost = [FACTOR * length / d * m * abs(m) / (2 * RHO * area(d) ** 2)
-                for (length, d, _), m in zip(self.columns, flows, strict=True)]  # fmt: skip
+        lost = [
+            FACTOR * length / d * m * abs(m) / (2 * RHO * area(d) ** 2)
+            for (length, d, _), m in zip(self.columns, flows, strict=True)
+        ]
         return np.array([p(t) for *_, p in self.columns]) - RHO * GRAVITY * HEIGHT - lost
 
     def gas(self, y):
@@ -93,7 +101,11 @@ class Truth:
     def open(self, t, y):
         brought = y[:-2].sum()
         p = self.gas(y) + brought * abs(brought) / self.throat
-        return [*(self.yields * (self.drives(t, y[:-2]) - p)), brought, bores(self.gas(y), BORE, BORE)]
+        return [
+            *(self.yields * (self.drives(t, y[:-2]) - p)),
+            brought,
+            bores(self.gas(y), BORE, BORE),
+        ]
 
     def follow(self, y, bounds):
         t, rule = 0.0, self.shut
@@ -108,8 +120,17 @@ class Truth:
         opens.direction = shuts.direction = -1
         while t < bounds[-1]:
             stop, event = min(b for b in bounds if b > t), opens if rule == self.shut else shuts
-            run = solve_ivp(rule, (t, stop), y, "Radau", rtol=1e-11, atol=1e-13, events=event, dense_output=True,
-                            max_step=0.05)  # fmt: skip
+            run = solve_ivp(
+                rule,
+                (t, stop),
+                y,
+                "Radau",
+                rtol=1e-11,
+                atol=1e-13,
+                events=event,
+                dense_output=True,
+                max_step=0.05,
+            )
             self.pieces.append(run.sol)
             t, y = run.t[-1], run.y[:, -1].copy()
             if run.status == 1:
@@ -142,8 +163,10 @@ def apart(result, exact, names=("one.flow", "two.flow"), signs=(1, -1)):
     t = np.asarray(result.t)
     rows = np.all([np.abs(t - when) > 0.011 for _, when in exact.events], axis=0)
     found = exact.at(t[rows])
-    off = [np.abs(sign * RHO * result[name][rows] - found[k]).max()
-           for k, (name, sign) in enumerate(zip(names, signs, strict=True))]  # fmt: skip
+    off = [
+        np.abs(sign * RHO * result[name][rows] - found[k]).max()
+        for k, (name, sign) in enumerate(zip(names, signs, strict=True))
+    ]
     mass = np.abs(result["v.air_mass"][rows] / found[-1] - 1.0).max()
     return max(off) / np.abs(found[: len(names)]).max(), mass
 
@@ -152,7 +175,9 @@ def apart(result, exact, names=("one.flow", "two.flow"), signs=(1, -1)):
 def test_it_opens_where_the_joined_columns_would_part_and_joins_them_again(method):
     """Constant to the bit until 1 s; then event times, flows and air mass follow SciPy, with impact."""
     exact, result = truth(), fvsolve.run(summit({"method": method, "rtol": 1e-8}))
-    assert result.ok and [what for what, _ in times(result)] == ["opens", "shuts"] == [what for what, _ in exact.events]
+    assert result.ok and [what for what, _ in times(result)] == ["opens", "shuts"] == [
+        what for what, _ in exact.events
+    ]
     for (_, found), (_, true) in zip(times(result), exact.events, strict=True):
         assert found == pytest.approx(true, abs=1e-8)
     flows, mass = apart(result, exact)
@@ -160,7 +185,9 @@ def test_it_opens_where_the_joined_columns_would_part_and_joins_them_again(metho
     before = np.asarray(result.t) < 1.0
     for name in PROBES:
         assert np.ptp(result[name][before]) == 0.0
-    joined = (np.asarray(result.t) < times(result)[0][1]) | (np.asarray(result.t) > times(result)[1][1])
+    joined = (np.asarray(result.t) < times(result)[0][1]) | (
+        np.asarray(result.t) > times(result)[1][1]
+    )
     assert result["one.flow"][joined] == pytest.approx(result["two.flow"][joined], abs=1e-15)
     assert abs(result.ledger["mass"]["relative"]) < 1e-14
     assert [mark["place"] for mark in result.summary["marks"]] == ["links.one", "links.two"]
@@ -183,13 +210,24 @@ def test_three_columns_equal_a_single_column_at_two_joints():
 
     def flows(p):
         drops = [one(0.0) - p for one in far]
-        return [math.copysign(math.sqrt(abs(drop) / k), drop) for drop, k in zip(drops, loss, strict=True)]
+        return [
+            math.copysign(math.sqrt(abs(drop) / k), drop)
+            for drop, k in zip(drops, loss, strict=True)
+        ]
 
     p = brentq(lambda p: sum(flows(p)), LOW, 3e5, xtol=1e-6)
-    exact = Truth([(*one, p) for one, p in zip(columns, far, strict=True)], flows(p), FALL["time"][1:], 6.0)
-    links = {"a": column("high", "v"), "b": column("v", "low", 80.0), "c": column("third", "v", 30.0, 0.1)}
+    exact = Truth(
+        [(*one, p) for one, p in zip(columns, far, strict=True)], flows(p), FALL["time"][1:], 6.0
+    )
+    links = {
+        "a": column("high", "v"),
+        "b": column("v", "low", 80.0),
+        "c": column("third", "v", 30.0, 0.1),
+    }
     names = ["a.flow", "b.flow", "c.flow"]
-    result = fvsolve.run(summit(nodes={"third": low(1.5e5)}, links=links, probes=[*names, "v.air_mass"]))
+    result = fvsolve.run(
+        summit(nodes={"third": low(1.5e5)}, links=links, probes=[*names, "v.air_mass"])
+    )
     assert [what for what, _ in times(result)] == ["opens", "shuts"]
     for (_, found), (_, true) in zip(times(result), exact.events, strict=True):
         assert found == pytest.approx(true, abs=1e-7)
@@ -199,7 +237,11 @@ def test_three_columns_equal_a_single_column_at_two_joints():
 def test_a_second_air_valve_that_stays_shut_is_but_a_joint():
     """Columns of 80 m and 30 m at a shut air valve are equivalent to a column of 110 m."""
     nodes = {"w": {**AIR_VALVE, "elevation": 4.0}}
-    links = {"one": column("high", "v"), "two": column("v", "w", 80.0), "three": column("w", "low", 30.0)}
+    links = {
+        "one": column("high", "v"),
+        "two": column("v", "w", 80.0),
+        "three": column("w", "low", 30.0),
+    }
     result, exact = fvsolve.run(summit(nodes=nodes, links=links)), truth(110.0)
     assert [what for what, _ in times(result)] == ["opens", "shuts"] and not times(result, "w")
     for (_, found), (_, true) in zip(times(result), exact.events, strict=True):
@@ -240,7 +282,9 @@ def test_its_energy_closes_and_the_loss_of_the_impact_is_accounted():
     """Impact loss (Carnot): M^2 / (2 rho sum(A / L)), with M the net mass flow into the summit before the impact."""
     exact, found = truth(), energy(summit({"method": "dormand-prince", "rtol": 1e-8}), port="low")
     assert abs(found.relative) < 1e-10 and found.port.passive
-    met = exact.pieces[next(k for k, one in enumerate(exact.pieces) if one.t_max >= exact.events[1][1])]
+    met = exact.pieces[
+        next(k for k, one in enumerate(exact.pieces) if one.t_max >= exact.events[1][1])
+    ]
     brought = met(exact.events[1][1])[:2].sum()
     lost = sum(found.dissipated[f"{name} stopped dead"][-1] for name in ("one", "two"))
     assert lost == pytest.approx(0.5 * brought**2 / (RHO * exact.yields.sum()), rel=1e-6)
@@ -285,14 +329,20 @@ def test_advance_in_a_loop_is_the_run():
     state = State(0.0, model.start.copy())
     for until in (1.2, 2.0, 4.0, 5.0, 6.0):
         state = fvsolve.advance(model, state, until)
-    assert model.observe(state)[:2] == pytest.approx([whole[name][-1] for name in PROBES[:2]], rel=1e-6)
+    assert model.observe(state)[:2] == pytest.approx(
+        [whole[name][-1] for name in PROBES[:2]], rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.5, 1, 0)])
 def test_a_valve_beyond_it_that_shuts_stops_both_columns_and_lets_no_air_in(opening):
     """The valve stops two columns as it stops a single column of their total length."""
     nodes = {"g": junction(elevation=0.0)}
-    links = {"one": column("high", "v"), "two": column("v", "g", 80.0), "k": gate("g", "low", 0.01, opening)}
+    links = {
+        "one": column("high", "v"),
+        "two": column("v", "g", 80.0),
+        "k": gate("g", "low", 0.01, opening),
+    }
     probes = ["one.flow", "two.flow", "g.pressure", "v.pressure"]
     result = fvsolve.run(summit(end=2.0, high=3e5, nodes=nodes, links=links, probes=probes))
     single = {"one": column("high", "g", 130.0), "k": links["k"]}
@@ -303,17 +353,25 @@ def test_a_valve_beyond_it_that_shuts_stops_both_columns_and_lets_no_air_in(open
     assert np.abs(off[np.asarray(result.t) != 1.0]).max() < 1e-7
     assert result["one.flow"] == pytest.approx(result["two.flow"], abs=1e-12)
     assert result["g.pressure"].max() == pytest.approx(plain["g.pressure"].max(), rel=1e-6)
-    assert result["one.flow"][-1] == 0.0 and result["g.pressure"][-1] == pytest.approx(3e5, rel=1e-12)
+    assert result["one.flow"][-1] == 0.0 and result["g.pressure"][-1] == pytest.approx(
+        3e5, rel=1e-12
+    )
     assert result["v.pressure"][-1] == pytest.approx(3e5 - RHO * GRAVITY * HEIGHT, rel=1e-12)
 
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.3, 1, 0)])
 def test_a_valve_before_it_that_shuts_lets_the_column_beyond_run_on_over_air(opening):
     nodes = {"g": junction(elevation=0.0)}
-    links = {"k": gate("high", "g", 0.01, opening), "one": column("g", "v"), "two": column("v", "low", 80.0)}
+    links = {
+        "k": gate("high", "g", 0.01, opening),
+        "one": column("g", "v"),
+        "two": column("v", "low", 80.0),
+    }
     result = fvsolve.run(summit(end=2.0, high=3e5, nodes=nodes, links=links))
     assert result.ok and [what for what, _ in times(result)] == ["opens"]
-    assert times(result)[0][1] <= 1.3 and result["one.flow"][-1] == 0.0 < 0.05 < result["two.flow"][-1]
+    assert (
+        times(result)[0][1] <= 1.3 and result["one.flow"][-1] == 0.0 < 0.05 < result["two.flow"][-1]
+    )
 
 
 def test_a_gate_that_shuts_at_once_leaves_the_column_to_the_air():
@@ -330,7 +388,9 @@ def test_a_gate_that_shuts_at_once_leaves_the_column_to_the_air():
 def test_at_the_end_of_a_single_column_it_fills_and_drains_it():
     """The flow is zero until the pressure at the valve is below ambient; then the column drains from it."""
     drop = {"time": [0.0, 1.0, 2.0], "value": [2e5, 2e5, 0.9e5]}
-    case = summit(end=4.0, high=drop, links={"one": column("high", "v")}, probes=["one.flow", "v.pressure"])
+    case = summit(
+        end=4.0, high=drop, links={"one": column("high", "v")}, probes=["one.flow", "v.pressure"]
+    )
     del case["nodes"]["low"]
     result = fvsolve.run(case)
     true = 1.0 + (2e5 - RHO * GRAVITY * HEIGHT - AMBIENT + 10.0) / 1.1e5
@@ -354,13 +414,24 @@ def test_a_column_that_a_valve_shuts_against_higher_pressure_runs_on_to_the_end(
 
     at = np.searchsorted(result.t, 2.0)
     start = [RHO * result["one.flow"][at], RHO * result["t.level"][at]]
-    exact = solve_ivp(rates, (result.t[at], shut - 9e-4), start, "Radau", rtol=1e-10, atol=1e-12, dense_output=True)
+    exact = solve_ivp(
+        rates,
+        (result.t[at], shut - 9e-4),
+        start,
+        "Radau",
+        rtol=1e-10,
+        atol=1e-12,
+        dense_output=True,
+    )
     for ahead in (0.1, 0.01, 1e-3):
         k = np.argmin(np.abs(np.asarray(result.t) - (shut - ahead)))
         assert RHO * result["one.flow"][k] == pytest.approx(exact.sol(result.t[k])[0], rel=2e-5)
     assert np.all(result["one.flow"] >= 0.0) and result.ok and not result.summary["marks"]
     seen = result.summary["extremes"]["v.pressure"]
-    assert seen["minimum"] == pytest.approx(1e5 - RHO * GRAVITY * HEIGHT, rel=1e-12) and seen["maximum"] > 1.9e6
+    assert (
+        seen["minimum"] == pytest.approx(1e5 - RHO * GRAVITY * HEIGHT, rel=1e-12)
+        and seen["maximum"] > 1.9e6
+    )
     assert result.summary["steps"] < 1000
 
 
@@ -372,7 +443,11 @@ def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_s
     """
     opening = {"time": [0.0, 1.0, 1.5, 3.0, 3.5], "value": [1.0, 1.0, 0.0, 0.0, 1.0]}
     nodes = {"g": junction(elevation=0.0)}
-    links = {"k": gate("high", "g", 0.01, opening), "one": column("g", "v"), "two": column("v", "low", 80.0)}
+    links = {
+        "k": gate("high", "g", 0.01, opening),
+        "one": column("g", "v"),
+        "two": column("v", "low", 80.0),
+    }
     numerics = {"method": "rodas-5p", "rtol": 1e-6}
     result = fvsolve.run(summit(numerics, end=4.0, high=3e5, nodes=nodes, links=links, law=law))
     assert result.ok and abs(result.ledger["mass"]["relative"]) < 1e-12
@@ -382,12 +457,18 @@ def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_s
 def test_two_columns_at_a_junction_flow_on_together_when_its_last_valve_shuts(opening):
     """The columns reach the steady flow of one column, without the fault "the demand cannot be supplied"."""
     nodes = {"j": junction(elevation=HEIGHT), "side": low(2e5)}
-    links = {"one": column("high", "j"), "two": column("j", "low", 80.0), "k": gate("j", "side", 0.01, opening)}
+    links = {
+        "one": column("high", "j"),
+        "two": column("j", "low", 80.0),
+        "k": gate("j", "side", 0.01, opening),
+    }
     case = summit(end=20.0, high=3.2e5, nodes=nodes, links=links, probes=["one.flow", "two.flow"])
     del case["nodes"]["v"]
     result = fvsolve.run(case)
     assert result.ok and result["one.flow"][-1] == pytest.approx(result["two.flow"][-1], abs=1e-15)
-    assert RHO * result["one.flow"][-1] == pytest.approx(flow_through((50.0, 80.0), 3.2e5 - LOW), rel=1e-5)
+    assert RHO * result["one.flow"][-1] == pytest.approx(
+        flow_through((50.0, 80.0), 3.2e5 - LOW), rel=1e-5
+    )
 
 
 def test_columns_that_separate_at_the_start_do_so_over_air_and_joined_columns_move_together():
@@ -397,7 +478,9 @@ def test_columns_that_separate_at_the_start_do_so_over_air_and_joined_columns_mo
         result = fvsolve.run(summit(end=4.0, high=2e5, nodes={"low": low(1.8e5)}, links=links))
         assert result.ok and [said for said, _ in times(result)] == what
         if not what:
-            assert result["one.flow"][0] == pytest.approx((0.1 * 50.0 + 0.05 * 80.0) / 130.0, rel=1e-12)
+            assert result["one.flow"][0] == pytest.approx(
+                (0.1 * 50.0 + 0.05 * 80.0) / 130.0, rel=1e-12
+            )
 
 
 def test_without_friction_it_stays_at_rest():
@@ -420,5 +503,8 @@ def test_a_valve_or_pump_between_columns_that_nothing_holds_is_refused_by_name()
     for part in (gate("v", "j", 0.05), lifts):
         links = {"one": column("high", "v"), "k": part, "two": column("j", "low")}
         nodes = {name: junction(elevation=HEIGHT) for name in ("v", "j")}
-        with pytest.raises(fvsolve.CaseError, match="nodes.[vj]: k joins this node to [jv], and otherwise only rigid"):
+        with pytest.raises(
+            fvsolve.CaseError,
+            match="nodes.[vj]: k joins this node to [jv], and otherwise only rigid",
+        ):
             fvsolve.build(fvsolve.load(summit(probes=(), nodes=nodes, links=links)))

@@ -29,7 +29,10 @@ def read(**given) -> Attitude:
 def faults(**given) -> dict[str, str]:
     with pytest.raises(ValidationError) as found:
         read(**given)
-    return {".".join(map(str, keys)): text for keys, text in pydantic_faults(found.value, ["attitude"], {})}
+    return {
+        ".".join(map(str, keys)): text
+        for keys, text in pydantic_faults(found.value, ["attitude"], {})
+    }
 
 
 def notes(one: Attitude) -> list[tuple[str, str]]:
@@ -38,10 +41,19 @@ def notes(one: Attitude) -> list[tuple[str, str]]:
 
 SAID = {
     "roll alone": ({"roll": "30 deg"}, Rotation.from_euler("x", 30, degrees=True)),
-    "roll, pitch, yaw": ({"roll": 0.1, "pitch": "-20 deg", "yaw": 2}, Rotation.from_euler("ZYX", [2, -np.pi / 9, 0.1])),
+    "roll, pitch, yaw": (
+        {"roll": 0.1, "pitch": "-20 deg", "yaw": 2},
+        Rotation.from_euler("ZYX", [2, -np.pi / 9, 0.1]),
+    ),
     "zyz": ({"zyz": [0.1, "20 deg", -1]}, Rotation.from_euler("ZYZ", [0.1, np.pi / 9, -1.0])),
-    "axis": ({"axis": [0, 0.6, 0.8], "angle": "40 deg"}, Rotation.from_rotvec(np.radians([0, 24, 32]))),
-    "Euler parameters": ({"euler_parameters": [0.6, 0, 0.8, 0]}, Rotation.from_quat([0, 0.8, 0, 0.6])),
+    "axis": (
+        {"axis": [0, 0.6, 0.8], "angle": "40 deg"},
+        Rotation.from_rotvec(np.radians([0, 24, 32])),
+    ),
+    "Euler parameters": (
+        {"euler_parameters": [0.6, 0, 0.8, 0]},
+        Rotation.from_quat([0, 0.8, 0, 0.6]),
+    ),
     "matrix": ({"matrix": QUARTER}, Rotation.from_euler("z", 90, degrees=True)),
     "nothing": ({}, Rotation.identity()),
 }
@@ -52,7 +64,12 @@ def test_a_form_is_scipy_s(form):
     given, wanted = SAID[form]
     one = read(**given)
     assert_allclose(one.rotation, wanted.as_matrix(), rtol=0, atol=1e-15)
-    assert_allclose(Rotation.from_quat(one.parameters, scalar_first=True).as_matrix(), one.rotation, rtol=0, atol=1e-15)
+    assert_allclose(
+        Rotation.from_quat(one.parameters, scalar_first=True).as_matrix(),
+        one.rotation,
+        rtol=0,
+        atol=1e-15,
+    )
     assert not notes(one)
     assert read(**one.table()) == one
 
@@ -63,7 +80,10 @@ def test_forms_that_agree_may_stand_together():
     one = read(
         **{"roll": 0.2, "pitch": -0.4, "yaw": 0.3, "zyz": [*turn.as_euler("ZYZ")]},
         **{"axis": [*vector / turn.magnitude()], "angle": turn.magnitude()},
-        **{"euler_parameters": [*turn.as_quat(scalar_first=True)], "matrix": turn.as_matrix().tolist()},
+        **{
+            "euler_parameters": [*turn.as_quat(scalar_first=True)],
+            "matrix": turn.as_matrix().tolist(),
+        },
     )
     assert_allclose(one.rotation, turn.as_matrix(), rtol=0, atol=1e-15)
     assert not notes(one)
@@ -83,7 +103,9 @@ def test_forms_that_disagree_are_named_with_the_angle_between_them():
 
 def test_a_direction_of_another_length_is_normalised_with_a_notice():
     one = read(axis=[1, 1, 0], angle="90 deg")
-    assert notes(one) == [("axis", "the vector has length 1.41421, not 1, and is divided by this length")]
+    assert notes(one) == [
+        ("axis", "the vector has length 1.41421, not 1, and is divided by this length")
+    ]
     wanted = Rotation.from_rotvec(np.pi / 2**1.5 * np.array([1, 1, 0]))
     assert_allclose(one.rotation, wanted.as_matrix(), rtol=0, atol=1e-15)
     assert notes(read(euler_parameters=[0, 0, 0, -3]))[0][0] == "euler_parameters"
@@ -93,15 +115,25 @@ def test_rounded_digits_are_a_notice_and_no_fault():
     typed = [[0.8660, -0.5, 0], [0.5, 0.8660, 0], [0, 0, 1]]
     one = read(matrix=typed)
     assert notes(one) == [
-        ("matrix", "is not exactly a rotation: R'R differs from the identity by 4.4e-05; the nearest rotation is used")
+        (
+            "matrix",
+            "is not exactly a rotation: R'R differs from the identity by 4.4e-05; the nearest rotation is used",
+        )
     ]
-    assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
+    assert_allclose(
+        one.rotation,
+        Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(),
+        rtol=0,
+        atol=1e-15,
+    )
     one = read(matrix=typed, yaw="30.01 deg")  # the matrix has atan(0.5 / 0.866) = 30.00073 deg
     assert notes(one)[1] == (
         "matrix",
         "is 0.00927 deg from the attitude that roll, pitch, yaw give; the latter is used",
     )
-    assert_allclose(one.rotation, Rotation.from_euler("z", 30.01, degrees=True).as_matrix(), rtol=0, atol=1e-15)
+    assert_allclose(
+        one.rotation, Rotation.from_euler("z", 30.01, degrees=True).as_matrix(), rtol=0, atol=1e-15
+    )
 
 
 BAD = {
@@ -153,7 +185,12 @@ def test_shapes_that_do_not_fit_are_named(what):
 
 def test_a_case_has_its_notes_and_faults_with_their_places():
     """The key path of the attitude of a joint names both tables below the part."""
-    body = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "joint": {"attitude": {"axis": [0, 0, 2]}}}
+    body = {
+        "type": "body",
+        "mass": 1.0,
+        "inertia": [1.0, 1.0, 1.0],
+        "joint": {"attitude": {"axis": [0, 0, 2]}},
+    }
     case = scene({"arm": body}, {}, 1.0, {"method": "rk4", "step": 0.1})
     error = refused(case)
     assert [(one.place, one.message) for one in error.faults] == [
@@ -161,14 +198,19 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
     ]
     body["joint"]["attitude"]["angle"] = 30
     assert [
-        (one.key, one.value, one.text.split(": ")[1]) for one in load(scene({"arm": body}, {}, 1.0, {})).notices
+        (one.key, one.value, one.text.split(": ")[1])
+        for one in load(scene({"arm": body}, {}, 1.0, {})).notices
     ] == [
         (
             "joint.attitude.angle",
             30.0,
             '30 rad is outside -6.3 to 6.3 rad, one turn in either direction; did you mean "30 deg"?',
         ),
-        ("joint.attitude.axis", 2.0, "the vector has length 2, not 1, and is divided by this length"),
+        (
+            "joint.attitude.axis",
+            2.0,
+            "the vector has length 2, not 1, and is divided by this length",
+        ),
     ]
 
 

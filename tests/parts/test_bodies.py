@@ -6,7 +6,19 @@ from importlib import import_module
 import numpy as np
 import pytest
 from pytest import approx
-from reference.bodies import CLOSE, COUPLER, CRANK, OIL, Crane, bodies, body, parallelogram, pendulum, random_tree, turn
+from reference.bodies import (
+    CLOSE,
+    COUPLER,
+    CRANK,
+    OIL,
+    Crane,
+    bodies,
+    body,
+    parallelogram,
+    pendulum,
+    random_tree,
+    turn,
+)
 from reference.cylinders import valve_flow
 from reference.jacobians import stray
 from reference.scenes import AMBIENT, GRAVITY, scene
@@ -28,7 +40,9 @@ def run(case, **more):
 def falls(t, values) -> np.ndarray:
     """Times at which a smooth series crosses zero downwards."""
     series = CubicSpline(t, values)
-    return np.array([one for one in series.roots(extrapolate=False) if series.derivative()(one) < 0.0])
+    return np.array(
+        [one for one in series.roots(extrapolate=False) if series.derivative()(one) < 0.0]
+    )
 
 
 # joints and trees -------------------------------------------------------------------------------------------
@@ -47,8 +61,13 @@ def test_a_pendulum_shows_the_order_of_its_method():
     period = 4.0 * math.sqrt(length / GRAVITY) * ellipk(math.sin(angle / 2.0) ** 2)
     errors = []
     for steps in (100, 200, 400):
-        case = bodies({"arm": pendulum(angle, length)}, period, ["arm.angle", "arm.rate"], method="rk4",
-                      step=period / steps)  # fmt: skip
+        case = bodies(
+            {"arm": pendulum(angle, length)},
+            period,
+            ["arm.angle", "arm.rate"],
+            method="rk4",
+            step=period / steps,
+        )
         result = run(case)
         errors.append(abs(result["arm.rate"][-1]))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == approx(4.0, abs=0.2)
@@ -57,16 +76,29 @@ def test_a_pendulum_shows_the_order_of_its_method():
 def test_a_double_pendulum_moves_by_lagranges_equations():
     """Two rods of length l with mass m in the middle; a and b are their angles to the vertical."""
     m, l, inertia = 1.5, 0.8, 0.09  # noqa: E741
-    rod = {"inertia": [inertia, inertia, 0.0], "centre_of_mass": [0, 0, -l / 2], "points": {"end": [0, 0, -l]}}
+    rod = {
+        "inertia": [inertia, inertia, 0.0],
+        "centre_of_mass": [0, 0, -l / 2],
+        "points": {"end": [0, 0, -l]},
+    }
     upper = body(m, **rod, joint={"kind": "revolute", "axis": [0, 1, 0], "angle": 1.2})
-    lower = body(m, **rod, joint={"kind": "revolute", "on": "upper.end", "axis": [0, 1, 0], "angle": -0.5})
+    lower = body(
+        m, **rod, joint={"kind": "revolute", "on": "upper.end", "axis": [0, 1, 0], "angle": -0.5}
+    )
 
     def rates(t, y):
         a, b, u, v = y
         c, s = math.cos(a - b), math.sin(a - b)
-        mass = np.array([[inertia + m * l * l * 1.25, m * l * l / 2 * c], [m * l * l / 2 * c, inertia + m * l * l / 4]])
-        force = [-m * l * l / 2 * s * v * v - 1.5 * m * GRAVITY * l * math.sin(a),
-                 m * l * l / 2 * s * u * u - 0.5 * m * GRAVITY * l * math.sin(b)]  # fmt: skip
+        mass = np.array(
+            [
+                [inertia + m * l * l * 1.25, m * l * l / 2 * c],
+                [m * l * l / 2 * c, inertia + m * l * l / 4],
+            ]
+        )
+        force = [
+            -m * l * l / 2 * s * v * v - 1.5 * m * GRAVITY * l * math.sin(a),
+            m * l * l / 2 * s * u * u - 0.5 * m * GRAVITY * l * math.sin(b),
+        ]
         return [u, v, *np.linalg.solve(mass, force)]
 
     truth = solve_ivp(rates, (0.0, 3.0), [1.2, 0.7, 0.0, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
@@ -78,7 +110,9 @@ def test_a_double_pendulum_moves_by_lagranges_equations():
 def test_a_slider_on_a_turning_arm_feels_coriolis_and_centrifugal_terms():
     """r'' = r w^2, and (I + m r^2) w is constant, because the arm turns about the vertical."""
     arm = body(1.0, [0.0, 0.0, 0.0], {"kind": "revolute", "axis": [0, 0, 1], "rate": 2.0})
-    bead = body(0.5, [0, 0, 0], {"kind": "prismatic", "on": "arm", "axis": [1, 0, 0], "travel": 0.3})
+    bead = body(
+        0.5, [0, 0, 0], {"kind": "prismatic", "on": "arm", "axis": [1, 0, 0], "travel": 0.3}
+    )
     arm["inertia"] = [0.2, 0.2, 0.2]
 
     def rates(t, y):
@@ -86,21 +120,32 @@ def test_a_slider_on_a_turning_arm_feels_coriolis_and_centrifugal_terms():
         return [w, v, -2.0 * 0.5 * r * v * w / (0.2 + 0.5 * r * r), r * w * w]
 
     truth = solve_ivp(rates, (0.0, 1.0), [0.0, 0.3, 2.0, 0.0], rtol=1e-12, atol=1e-13).y[:, -1]
-    result = run(bodies({"arm": arm, "bead": bead}, 1.0, ["arm.angle", "bead.travel", "arm.rate", "bead.rate"]))
+    result = run(
+        bodies(
+            {"arm": arm, "bead": bead}, 1.0, ["arm.angle", "bead.travel", "arm.rate", "bead.rate"]
+        )
+    )
     found = [result[probe][-1] for probe in ("arm.angle", "bead.travel", "arm.rate", "bead.rate")]
     assert found == approx(truth, abs=1e-8)
 
 
 TUMBLING = {"kind": "free", "rate": [0.1, 2.0, 0.3], "velocity": [0.5, 0.0, 0.2]}
 STONE = body(3.0, [0.3, 0.5, 0.7], TUMBLING, centre_of_mass=[0.2, -0.1, 0.3])
-TURNS = [f"stone.{one}" for one in ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z", "kinetic_energy")]
+TURNS = [
+    f"stone.{one}"
+    for one in ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z", "kinetic_energy")
+]
 WEIGHTLESS = {"gravity": 0.0}
 
 
 def drift(method: str, step: float) -> float:
     case = {**bodies({"stone": STONE}, 8.0, TURNS, method=method, step=step), **WEIGHTLESS}
     result = run(case)
-    return max(float(np.abs(result[one] / result[one][0] - 1.0).max()) for one in TURNS if abs(result[one][0]) > 0.1)
+    return max(
+        float(np.abs(result[one] / result[one][0] - 1.0).max())
+        for one in TURNS
+        if abs(result[one][0]) > 0.1
+    )
 
 
 def test_a_tumbling_body_conserves_energy_and_momentum_to_the_order_of_its_method():
@@ -113,7 +158,14 @@ def test_gauss_methods_keep_energy_and_momentum_of_a_tumbling_body_to_rounding()
     """Kinetic energy and angular momentum are quadratic invariants; the centre of mass is at rest."""
     joint = {"kind": "free", "rate": TUMBLING["rate"], "at": [-0.2, 0.1, -0.3]}
     case = {
-        **bodies({"stone": {**STONE, "joint": joint}}, 8.0, TURNS, every=0.04, method="gauss-4", step=0.02),
+        **bodies(
+            {"stone": {**STONE, "joint": joint}},
+            8.0,
+            TURNS,
+            every=0.04,
+            method="gauss-4",
+            step=0.02,
+        ),
         **WEIGHTLESS,
     }
     result = run(case)
@@ -123,13 +175,36 @@ def test_gauss_methods_keep_energy_and_momentum_of_a_tumbling_body_to_rounding()
 
 def test_a_tumbling_body_turns_as_euler_and_poisson_have_it():
     joint = {**TUMBLING, "attitude": {"roll": 0.3, "pitch": -0.4, "yaw": 1.0}}
-    case = {**bodies({"stone": {**STONE, "joint": joint}}, 4.0, [f"stone.{one}" for one in
-            ("eta", "eps_x", "eps_y", "eps_z", "wx", "wy", "wz", "roll", "pitch", "yaw")]), **WEIGHTLESS}  # fmt: skip
+    case = {
+        **bodies(
+            {"stone": {**STONE, "joint": joint}},
+            4.0,
+            [
+                f"stone.{one}"
+                for one in (
+                    "eta",
+                    "eps_x",
+                    "eps_y",
+                    "eps_z",
+                    "wx",
+                    "wy",
+                    "wz",
+                    "roll",
+                    "pitch",
+                    "yaw",
+                )
+            ],
+        ),
+        **WEIGHTLESS,
+    }
     j = np.array(STONE["inertia"])
 
     def rates(t, y):
         e, w = y[:4], y[4:]
-        return [*(0.5 * np.array([-e[1:] @ w, *(e[0] * w + np.cross(e[1:], w))])), *(np.cross(j * w, w) / j)]
+        return [
+            *(0.5 * np.array([-e[1:] @ w, *(e[0] * w + np.cross(e[1:], w))])),
+            *(np.cross(j * w, w) / j),
+        ]
 
     first = Rotation.from_euler("ZYX", [1.0, -0.4, 0.3])
     e = first.as_quat()[[3, 0, 1, 2]]
@@ -138,7 +213,9 @@ def test_a_tumbling_body_turns_as_euler_and_poisson_have_it():
     found = np.array([result[f"stone.{one}"][-1] for one in ("eta", "eps_x", "eps_y", "eps_z")])
     assert found == approx(y[:4], abs=1e-8)
     there = Rotation.from_quat(y[[1, 2, 3, 0]])
-    assert [result[f"stone.{one}"][-1] for one in ("wx", "wy", "wz")] == approx(there.apply(y[4:]), abs=1e-7)
+    assert [result[f"stone.{one}"][-1] for one in ("wx", "wy", "wz")] == approx(
+        there.apply(y[4:]), abs=1e-7
+    )
     angles = [result[f"stone.{one}"][-1] for one in ("yaw", "pitch", "roll")]
     assert angles == approx(there.as_euler("ZYX"), abs=1e-7)
 
@@ -174,8 +251,14 @@ def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
     rng = np.random.default_rng(5)
     tree = random_tree(rng, 3, "free")
     tree["b1"]["joint"]["on"], tree["b2"]["joint"]["on"] = "b0", "b1"
-    names = [f"b2.p.{one}" for one in ("x", "y", "z", "ax", "ay", "az", *(f"a{k}_{s}" for s in SHARES for k in "xyz"))]
-    names += [f"b1.{one}" for one in ("x", "y", "z", "roll", "pitch", "yaw", "ax", "ay", "az", "wx", "wy", "wz")]
+    names = [
+        f"b2.p.{one}"
+        for one in ("x", "y", "z", "ax", "ay", "az", *(f"a{k}_{s}" for s in SHARES for k in "xyz"))
+    ]
+    names += [
+        f"b1.{one}"
+        for one in ("x", "y", "z", "roll", "pitch", "yaw", "ax", "ay", "az", "wx", "wy", "wz")
+    ]
     h = 1e-3
     result = run(bodies(tree, 0.4, names, every=h, method="gauss-4", step=h))
     k = 200
@@ -192,9 +275,11 @@ def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
     r = rows("b2.p.")[k] - rows("b1.")[k]
     v = turned.apply(rates @ seen[about])
     expected = {
-        "relative": turned.apply(weights @ seen[about]), "coriolis": 2.0 * np.cross(w, v),
-        "transversal": np.cross(rates @ rows("b1.w")[about], r), "centripetal": np.cross(w, np.cross(w, r)),
-    }  # fmt: skip
+        "relative": turned.apply(weights @ seen[about]),
+        "coriolis": 2.0 * np.cross(w, v),
+        "transversal": np.cross(rates @ rows("b1.w")[about], r),
+        "centripetal": np.cross(w, np.cross(w, r)),
+    }
     for share, value in expected.items():
         found = [result[f"b2.p.a{axis}_{share}"][k] for axis in "xyz"]
         assert found == approx(value, abs=2e-6 * max(1.0, np.abs(value).max())), share
@@ -204,8 +289,21 @@ def test_the_terms_of_65_are_those_of_motion_seen_from_the_axes_that_move():
 
 
 def test_joint_forces_of_a_pendulum_are_those_of_its_motion():
-    result = run(bodies({"arm": pendulum(1.0)}, 1.0, ["arm.angle", "arm.rate", "arm.joint_fx", "arm.joint_fz",
-                                                      "arm.bob.ax", "arm.bob.az", "arm.joint_ty"]))  # fmt: skip
+    result = run(
+        bodies(
+            {"arm": pendulum(1.0)},
+            1.0,
+            [
+                "arm.angle",
+                "arm.rate",
+                "arm.joint_fx",
+                "arm.joint_fz",
+                "arm.bob.ax",
+                "arm.bob.az",
+                "arm.joint_ty",
+            ],
+        )
+    )
     pull = 2.0 * (GRAVITY * np.cos(result["arm.angle"]) + 0.7 * result["arm.rate"] ** 2)
     assert np.hypot(result["arm.joint_fx"], result["arm.joint_fz"]) == approx(pull, rel=1e-9)
     assert result["arm.joint_fx"] == approx(2.0 * result["arm.bob.ax"], abs=1e-9)
@@ -217,9 +315,15 @@ def test_the_spring_of_a_joint_pulls_its_angle_or_travel_back_to_0(method):
     k, c = 25.0, 0.4
     arm = pendulum(1.0)
     arm["joint"] |= {"stiffness": k, "damping": c}
-    sled = {"type": "body", "mass": 3.0, "inertia": [1, 1, 1],
-            "joint": {"kind": "prismatic", "axis": [0, 2, 0], "travel": 0.2, "stiffness": "12 N/cm"}}  # fmt: skip
-    case = bodies({"arm": arm, "sled": sled}, 1.5, ["arm.angle", "sled.travel"], method=method, step=1e-3)
+    sled = {
+        "type": "body",
+        "mass": 3.0,
+        "inertia": [1, 1, 1],
+        "joint": {"kind": "prismatic", "axis": [0, 2, 0], "travel": 0.2, "stiffness": "12 N/cm"},
+    }
+    case = bodies(
+        {"arm": arm, "sled": sled}, 1.5, ["arm.angle", "sled.travel"], method=method, step=1e-3
+    )
     result, inertia = run(case), 2.0 * 0.7**2
 
     def rates(t, y):
@@ -245,7 +349,13 @@ def test_springs_dampers_and_forces_push_along_the_line_between_points():
     crane, k, c, free = Crane(), 2000.0, 50.0, 1.5
     boom = crane.nodes()["boom"]
     links = {
-        "spring": {"type": "spring", "from": "ground.hook", "to": "boom.tip", "stiffness": k, "free_length": free},
+        "spring": {
+            "type": "spring",
+            "from": "ground.hook",
+            "to": "boom.tip",
+            "stiffness": k,
+            "free_length": free,
+        },
         "damper": {"type": "damper", "from": "boom.tip", "to": "ground.hook", "damping": c},
         "pull": {"type": "force", "from": "boom.tip", "to": "ground.hook", "force": -30.0},
         "load": {"type": "force", "to": "boom.tip", "force": 20.0, "direction": [0, 0, -2]},
@@ -254,7 +364,10 @@ def test_springs_dampers_and_forces_push_along_the_line_between_points():
 
     def rates(t, y):
         angle, w = y
-        tip, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+        tip, along = (
+            np.array([math.cos(angle), math.sin(angle)]),
+            np.array([-math.sin(angle), math.cos(angle)]),
+        )
         far = tip - np.array([1.0, 2.0])
         length = np.linalg.norm(far)
         e = far / length
@@ -284,9 +397,12 @@ def test_shut_chambers_without_a_stated_pressure_support_their_load(stated):
         if key[-1] not in stated:
             del links["lift"][key]
     links["shut"] = {
-        "type": "valve", "from": "pump", "to": "lift.A", "area": 1e-5,
+        "type": "valve",
+        "from": "pump",
+        "to": "lift.A",
+        "area": 1e-5,
         "opening": {"start": 0.5, "duration": 0.1, "value": [0, 1]},
-    }  # fmt: skip
+    }
     nodes = {**crane.nodes(), "pump": {"type": "reservoir", "pressure": 2e7}}
     case = bodies(nodes, 0.6, ["lift.A.pressure", "lift.B.pressure", "boom.angle"], links)
     case["fluid"] = dict(OIL)
@@ -306,9 +422,12 @@ def test_a_locked_cylinder_swings_at_the_root_of_its_spring_and_never_creeps(law
     case = crane.case(4.0, ["boom.angle"], law, 2e-4, {"rate": 1e-4})
     result = run(case)
     times = falls(result.t, result["boom.angle"])
-    tilting = crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance  # the lever grows on sinking
+    # the lever grows on sinking
+    tilting = crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance
     stiffness = crane.spring(law) * crane.lever**2 + tilting
-    assert 2 * math.pi / np.mean(np.diff(times)) == approx(math.sqrt(stiffness / crane.inertia), rel=1e-4)
+    assert 2 * math.pi / np.mean(np.diff(times)) == approx(
+        math.sqrt(stiffness / crane.inertia), rel=1e-4
+    )
     early, late = result["boom.angle"][:4000], result["boom.angle"][-4000:]
     for extreme in (np.max, np.min):
         assert extreme(late) == approx(extreme(early), rel=1e-4)
@@ -317,7 +436,9 @@ def test_a_locked_cylinder_swings_at_the_root_of_its_spring_and_never_creeps(law
 
 def test_a_long_swing_of_a_locked_cylinder_loses_no_oil_by_steps():
     """A closed chamber keeps its mass to the bit at coarse steps, so its load cannot sink."""
-    case = Crane().case(2.0, ["lift.A.pressure"], "log", joint={"rate": 0.05}, method="rk4", step=5e-3)
+    case = Crane().case(
+        2.0, ["lift.A.pressure"], "log", joint={"rate": 0.05}, method="rk4", step=5e-3
+    )
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 2.0)
     at = [model.state_names.index(f"lift.{side}.mass") for side in "AB"]
@@ -328,14 +449,26 @@ def test_a_boom_lifted_through_valves_follows_scipy():
     """Reference: dp/dt = beta / V (q - A dx/dt), with x the change of the length of the cylinder since the start."""
     crane, beta, rho, share = Crane(), OIL["bulk_modulus"], OIL["density"], 2e-6
     supply, sump = 25e6, 1e5
-    nodes = {**crane.nodes(), "pump": {"type": "reservoir", "pressure": supply},
-             "tank": {"type": "reservoir", "pressure": sump}}  # fmt: skip
+    nodes = {
+        **crane.nodes(),
+        "pump": {"type": "reservoir", "pressure": supply},
+        "tank": {"type": "reservoir", "pressure": sump},
+    }
     opening = {"start": 0.1, "duration": 0.05, "value": [0.0, 1.0]}
     orifice = {"type": "valve", "area": share, "discharge_coefficient": 1.0, "opening": opening}
-    links = {**crane.links(), "in": {**orifice, "from": "pump", "to": "lift.A"},
-             "out": {**orifice, "from": "lift.B", "to": "tank"}}  # fmt: skip
-    case = scene(nodes, links, 0.6, CLOSE, ["boom.angle", "lift.A.pressure", "lift.B.pressure"],
-                 fluid={**OIL, "law": "log"})  # fmt: skip
+    links = {
+        **crane.links(),
+        "in": {**orifice, "from": "pump", "to": "lift.A"},
+        "out": {**orifice, "from": "lift.B", "to": "tank"},
+    }
+    case = scene(
+        nodes,
+        links,
+        0.6,
+        CLOSE,
+        ["boom.angle", "lift.A.pressure", "lift.B.pressure"],
+        fluid={**OIL, "law": "log"},
+    )
     a, b = crane.areas
 
     def rates(t, y):
@@ -343,19 +476,34 @@ def test_a_boom_lifted_through_valves_follows_scipy():
         x, z = crane.eye * math.cos(angle), crane.eye * math.sin(angle) - crane.low
         length = math.hypot(x, z)
         lever = (crane.eye * math.cos(angle) * z - crane.eye * math.sin(angle) * x) / length
-        travel, speed, open_ = length - crane.distance, lever * w, min(max((t - 0.1) / 0.05, 0.0), 1.0)
+        travel, speed, open_ = (
+            length - crane.distance,
+            lever * w,
+            min(max((t - 0.1) / 0.05, 0.0), 1.0),
+        )
         force = a * (p - 101325.0) - b * (q - 101325.0)
         density = [rho * math.exp((one - 101325.0) / beta) for one in (supply, p, q)]
-        into = open_ * share * math.copysign(math.sqrt(2 * density[0] * abs(supply - p)), supply - p)
+        into = (
+            open_ * share * math.copysign(math.sqrt(2 * density[0] * abs(supply - p)), supply - p)
+        )
         out = open_ * share * math.copysign(math.sqrt(2 * density[2] * abs(q - sump)), q - sump)
-        volumes = crane.dead[0] + a * (crane.x + travel), crane.dead[1] + b * (crane.stroke - crane.x - travel)
+        volumes = (
+            crane.dead[0] + a * (crane.x + travel),
+            crane.dead[1] + b * (crane.stroke - crane.x - travel),
+        )
         weight = crane.mass * GRAVITY * crane.length / 2.0 * math.cos(angle)
-        return [w, (force * lever - weight) / crane.inertia, beta / volumes[0] * (into / density[1] - a * speed),
-                beta / volumes[1] * (b * speed - out / density[2])]  # fmt: skip
+        return [
+            w,
+            (force * lever - weight) / crane.inertia,
+            beta / volumes[0] * (into / density[1] - a * speed),
+            beta / volumes[1] * (b * speed - out / density[2]),
+        ]
 
     y, t = [0.0, 0.0, crane.p_a, crane.p_b], 0.0
     for until in (0.1, 0.15, 0.6):
-        y = solve_ivp(rates, (t, until), y, rtol=1e-11, atol=[1e-12, 1e-11, 1e-2, 1e-2], max_step=1e-3).y[:, -1]
+        y = solve_ivp(
+            rates, (t, until), y, rtol=1e-11, atol=[1e-12, 1e-11, 1e-2, 1e-2], max_step=1e-3
+        ).y[:, -1]
         t = until
     result = run(case)
     assert result["boom.angle"][-1] == approx(y[0], abs=1e-6) and y[0] > 0.05
@@ -365,11 +513,22 @@ def test_a_boom_lifted_through_valves_follows_scipy():
 def test_an_end_stop_between_points_throws_back_without_loss():
     """A body that falls on an elastic stop returns to its initial height at the time of the closed form."""
     drop = body(2.0, [0, 0, 0], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 1.0})
-    links = {"stop": {"type": "end-stop", "from": "ground.low", "to": "drop", "stiffness": 1e5, "minimum": 0.75}}
+    links = {
+        "stop": {
+            "type": "end-stop",
+            "from": "ground.low",
+            "to": "drop",
+            "stiffness": 1e5,
+            "minimum": 0.75,
+        }
+    }
     result = run(held(links, {"drop": drop}, 1.0, ["drop.travel", "stop.force"], every=1e-3))
     assert result["drop.travel"].min() < 0.5 and result["stop.force"].max() > 1000.0
     fall = math.sqrt(2 * 0.5 / GRAVITY)
-    touch = math.sqrt(2.0 / 1e5) * (math.pi + 2 * math.atan(2.0 * GRAVITY / 1e5 / math.sqrt(2.0 / 1e5) / math.sqrt(2 * GRAVITY * 0.5)))  # noqa: E501  # fmt: skip
+    touch = math.sqrt(2.0 / 1e5) * (
+        math.pi
+        + 2 * math.atan(2.0 * GRAVITY / 1e5 / math.sqrt(2.0 / 1e5) / math.sqrt(2 * GRAVITY * 0.5))
+    )  # noqa: E501
     back = 2 * fall + touch
     assert np.interp(back, result.t, result["drop.travel"]) == approx(1.0, abs=1e-5)
 
@@ -381,12 +540,21 @@ def swing(angle: float, end: float) -> float:
     """Angle of the parallelogram after `end` [s]: a pendulum with w^2 = (m + n) g a / (2/3 m a^2 + n a^2)."""
     (m, a), (n, _) = CRANK, COUPLER
     w2 = (m + n) * GRAVITY * a / (2.0 / 3.0 * m * a * a + n * a * a)
-    return solve_ivp(lambda t, y: [y[1], -w2 * math.sin(y[0])], (0, end), [angle, 0], rtol=1e-12, atol=1e-13).y[0, -1]
+    return solve_ivp(
+        lambda t, y: [y[1], -w2 * math.sin(y[0])], (0, end), [angle, 0], rtol=1e-12, atol=1e-13
+    ).y[0, -1]
 
 
 def test_a_parallelogram_swings_as_a_pendulum():
     nodes, links = parallelogram()
-    case = bodies(nodes, 4.0, ["one.angle", "two.angle", "loop.gap", "loop.force"], links, method="rk4", step=1e-3)
+    case = bodies(
+        nodes,
+        4.0,
+        ["one.angle", "two.angle", "loop.gap", "loop.force"],
+        links,
+        method="rk4",
+        step=1e-3,
+    )
     result = run(case)
     assert result["one.angle"][-1] == approx(swing(1.0, 4.0), abs=2e-8)
     assert result["two.angle"][-1] == approx(result["one.angle"][-1], abs=1e-9)
@@ -397,7 +565,9 @@ def test_a_loop_converges_at_the_order_of_its_method():
     nodes, links = parallelogram()
 
     def angles(h: float) -> np.ndarray:
-        return run(bodies(nodes, 1.0, ["one.angle"], links, 0.05, method="rk4", step=h))["one.angle"]
+        return run(bodies(nodes, 1.0, ["one.angle"], links, 0.05, method="rk4", step=h))[
+            "one.angle"
+        ]
 
     errors = [np.abs(angles(h) - angles(5e-4)).max() for h in (0.01, 0.005)]
     assert math.log2(errors[0] / errors[1]) == approx(4.0, abs=0.4)
@@ -407,7 +577,9 @@ def test_a_loop_converges_at_the_order_of_its_method():
 def test_the_pull_of_a_pin_is_a_rate_that_steps_must_bear(share, fails):
     """RK4 is unstable where stabilisation times step exceeds 2.785, its limit on the negative real axis."""
     nodes, links = parallelogram(0.3, stabilisation=share * 2.785 / 2e-3)
-    model = fvsolve.build(fvsolve.load(bodies(nodes, 2.0, ["loop.gap"], links, method="rk4", step=2e-3)))
+    model = fvsolve.build(
+        fvsolve.load(bodies(nodes, 2.0, ["loop.gap"], links, method="rk4", step=2e-3))
+    )
     result = fvsolve.run(model)
     assert (not result.ok or result["loop.gap"].max() > 1e-3) == fails
 
@@ -417,29 +589,49 @@ def test_a_slider_crank_moves_as_its_closed_form():
     a, b, q, w = 0.3, 1.0, 0.5, 4.0
     tilt = math.asin(a * math.sin(q) / b)
     lean = a * w * math.cos(q) / (b * math.cos(tilt))
-    far, speed = a * math.cos(q) + b * math.cos(tilt), -a * w * math.sin(q) - b * lean * math.sin(tilt)
+    far, speed = (
+        a * math.cos(q) + b * math.cos(tilt),
+        -a * w * math.sin(q) - b * lean * math.sin(tilt),
+    )
     turns = {"kind": "revolute", "axis": [0, 0, 1]}
     nodes = {
         "crank": body(2.0, [0.1] * 3, {**turns, "angle": q, "rate": w}, points={"end": [a, 0, 0]}),
-        "rod": body(1e-6, [0, 1e-9, 1e-9], {**turns, "on": "crank.end", "angle": -q - tilt, "rate": -w - lean},
-                    points={"end": [b, 0, 0]}),
-        "piston": body(0.5, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": far, "rate": speed}),
-    }  # fmt: skip
+        "rod": body(
+            1e-6,
+            [0, 1e-9, 1e-9],
+            {**turns, "on": "crank.end", "angle": -q - tilt, "rate": -w - lean},
+            points={"end": [b, 0, 0]},
+        ),
+        "piston": body(
+            0.5, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": far, "rate": speed}
+        ),
+    }
     links = {"wrist": {"type": "pin", "from": "piston", "to": "rod.end", "axis": [0, 0, 1]}}
-    case = {**bodies(nodes, 2.0, ["crank.angle", "crank.rate", "piston.travel", "piston.rate"], links), **WEIGHTLESS}
+    case = {
+        **bodies(nodes, 2.0, ["crank.angle", "crank.rate", "piston.travel", "piston.rate"], links),
+        **WEIGHTLESS,
+    }
     result = run(case)
     angle = result["crank.angle"]
     assert angle[-1] > 2 * math.pi
     x = a * np.cos(angle) + np.sqrt(b * b - (a * np.sin(angle)) ** 2)
     assert result["piston.travel"] == approx(x, abs=1e-7)
-    per = -a * np.sin(angle) - a * a * np.sin(angle) * np.cos(angle) / np.sqrt(b * b - (a * np.sin(angle)) ** 2)
+    per = -a * np.sin(angle) - a * a * np.sin(angle) * np.cos(angle) / np.sqrt(
+        b * b - (a * np.sin(angle)) ** 2
+    )
     energy_of = 0.5 * result["crank.rate"] ** 2 * (0.1 + 0.5 * per**2)
     assert energy_of == approx(energy_of[0], rel=2e-5)  # difference by the rod of 1 mg
 
 
 def test_a_linkage_in_balance_does_not_change_any_bit():
     nodes, links = parallelogram(0.4)
-    links["stay"] = {"type": "spring", "from": "ground.low", "to": "one.end", "stiffness": 1e3, "preload": 0.0}
+    links["stay"] = {
+        "type": "spring",
+        "from": "ground.low",
+        "to": "one.end",
+        "stiffness": 1e3,
+        "preload": 0.0,
+    }
     truth = fvsolve.build(fvsolve.load(held(links, nodes, 1.0, [])))
     (m, a), (n, _) = CRANK, COUPLER
     end = np.array([-a * math.sin(0.4), -a * math.cos(0.4)])
@@ -447,7 +639,11 @@ def test_a_linkage_in_balance_does_not_change_any_bit():
     lever = float(far @ [-math.cos(0.4), math.sin(0.4)]) / np.linalg.norm(far) * a
     links["stay"]["preload"] = float((m + n) * GRAVITY * a * math.sin(0.4) / lever)
     result = run(held(links, nodes, 3.0, ["one.angle", "loop.force"]))
-    assert truth.steady["moving"] and np.ptp(result["one.angle"]) == 0.0 and np.ptp(result["loop.force"]) == 0.0
+    assert (
+        truth.steady["moving"]
+        and np.ptp(result["one.angle"]) == 0.0
+        and np.ptp(result["loop.force"]) == 0.0
+    )
 
 
 # driven joints ----------------------------------------------------------------------------------------------
@@ -472,7 +668,9 @@ def test_a_pendulum_on_a_driven_cart_feels_its_acceleration():
     assert result["cart.travel"] == approx(0.1 + swing * np.sin(w * result.t + phase), abs=1e-12)
     assert result["cart.rate"] == approx(swing * w * np.cos(w * result.t + phase), abs=1e-12)
     assert result["cart.ax"] == approx(-swing * w * w * np.sin(w * result.t + phase), abs=1e-11)
-    assert result["cart.joint_fx"] == approx(3.0 * result["cart.ax"] + 2.0 * result["arm.bob.ax"], abs=1e-9)
+    assert result["cart.joint_fx"] == approx(
+        3.0 * result["cart.ax"] + 2.0 * result["arm.bob.ax"], abs=1e-9
+    )
 
 
 def test_a_crank_that_is_driven_gives_its_torque():
@@ -481,7 +679,9 @@ def test_a_crank_that_is_driven_gives_its_torque():
     crank = body(1.0, [0.3, 0.3, 0.4], {"kind": "revolute", "axis": [0, 0, 1], "angle": wave})
     crank["centre_of_mass"] = [0.5, 0, 0]
     result = run(bodies({"crank": crank}, 1.0, ["crank.joint_tz", "crank.angle"]))
-    assert result["crank.joint_tz"] == approx(-0.65 * math.pi**2 * np.sin(math.pi * result.t), abs=1e-10)
+    assert result["crank.joint_tz"] == approx(
+        -0.65 * math.pi**2 * np.sin(math.pi * result.t), abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("driven", [
@@ -489,7 +689,9 @@ def test_a_crank_that_is_driven_gives_its_torque():
     {"start": 0.2, "duration": 0.5, "value": [0.0, 1.0], "exponent": 2.0},
 ])  # fmt: skip
 def test_the_drive_of_a_joint_may_not_jump_nor_its_rate(driven):
-    with pytest.raises(fvsolve.errors.CaseError, match="nodes.arm.joint.angle: drives the joint, .* jumps"):
+    with pytest.raises(
+        fvsolve.errors.CaseError, match="nodes.arm.joint.angle: drives the joint, .* jumps"
+    ):
         fvsolve.build(fvsolve.load(bodies({"arm": pendulum(driven)}, 1.0)))
 
 
@@ -500,8 +702,17 @@ def test_a_body_on_a_bushing_swings_by_its_stiffnesses_and_fades_by_its_damping(
     """m r'' = F = -k r - d (r' - q'/2 x r), and J q'' = -K sin q - D q' - (r/2 x F) about z, r = (x, y)."""
     m, k, d, j, turn_k, turn_d = 2.0, 300.0, 1.5, 0.4, 50.0, 0.2
     block = body(m, [j, j, j], {"kind": "free", "velocity": [0.5, 0, 0], "rate": [0, 0, 12.0]})
-    links = {"rubber": {"type": "bushing", "from": "ground.top", "to": "block", "stiffness": k, "damping": d,
-                        "rotational_stiffness": turn_k, "rotational_damping": turn_d}}  # fmt: skip
+    links = {
+        "rubber": {
+            "type": "bushing",
+            "from": "ground.top",
+            "to": "block",
+            "stiffness": k,
+            "damping": d,
+            "rotational_stiffness": turn_k,
+            "rotational_damping": turn_d,
+        }
+    }
     nodes = {"block": block, "ground": {"type": "frame", "points": {"top": [0, 0, 0]}}}
     probes = ["block.x", "block.y", "block.yaw", "rubber.gap", "rubber.torque"]
     result = run({**bodies(nodes, 2.0, probes, links), **WEIGHTLESS})
@@ -512,8 +723,12 @@ def test_a_body_on_a_bushing_swings_by_its_stiffnesses_and_fades_by_its_damping(
         torque = -turn_k * math.sin(q) - turn_d * w - 0.5 * (x * fy - y * fx)
         return [u, v, fx / m, fy / m, w, torque / j]
 
-    x, y, _, _, q, w = solve_ivp(rates, (0.0, 2.0), [0.0, 0.0, 0.5, 0.0, 0.0, 12.0], rtol=1e-12, atol=1e-13).y[:, -1]
-    assert result["block.x"][-1] == approx(x, abs=1e-8) and result["block.y"][-1] == approx(y, abs=1e-8)
+    x, y, _, _, q, w = solve_ivp(
+        rates, (0.0, 2.0), [0.0, 0.0, 0.5, 0.0, 0.0, 12.0], rtol=1e-12, atol=1e-13
+    ).y[:, -1]
+    assert result["block.x"][-1] == approx(x, abs=1e-8) and result["block.y"][-1] == approx(
+        y, abs=1e-8
+    )
     assert abs(y) > 1e-4 and result["rubber.gap"][-1] == approx(math.hypot(x, y), abs=1e-8)
     assert result["block.yaw"][-1] == approx(q, abs=1e-7)
     assert result["rubber.torque"][-1] == approx(abs(turn_k * math.sin(q) + turn_d * w), abs=1e-5)
@@ -527,30 +742,66 @@ def test_a_bushing_with_a_gap_has_no_direction(ends):
     """
     post = {**body(10.0, [2, 3, 4], {"kind": "fixed"}), "points": {"j": [0.3, 0, 0]}}
     joint = {"kind": "revolute", "on": "post.j", "axis": [0, 0, 1], "rate": 2.0}
-    wheel = {**body(5.0, [1, 1, 1], joint), "centre_of_mass": [0.2, 0, 0], "points": {"e": [0.7, 0, 0]}}
+    wheel = {
+        **body(5.0, [1, 1, 1], joint),
+        "centre_of_mass": [0.2, 0, 0],
+        "points": {"e": [0.7, 0, 0]},
+    }
     links = {"l": {"type": "bushing", "from": ends[0], "to": ends[1], "damping": 20.0}}
-    case = {**bodies({"post": post, "wheel": wheel}, 0.5, ["wheel.rate", "l.force", "l.gap"], links), **WEIGHTLESS}
+    case = {
+        **bodies({"post": post, "wheel": wheel}, 0.5, ["wheel.rate", "l.force", "l.gap"], links),
+        **WEIGHTLESS,
+    }
     result = run(case)
     rate = 2.0 * math.exp(-20.0 * 0.35**2 * 0.5 / (1.0 + 5.0 * 0.2**2))
     assert result["wheel.rate"][-1] == approx(rate, rel=1e-7)
-    assert result["l.force"][-1] == approx(20.0 * 0.35 * rate, rel=1e-7) and result["l.gap"] == approx(0.7, abs=1e-12)
+    assert result["l.force"][-1] == approx(20.0 * 0.35 * rate, rel=1e-7) and result[
+        "l.gap"
+    ] == approx(0.7, abs=1e-12)
 
 
 def test_a_bushing_does_not_damp_a_common_rotation():
     """Two bodies on one plate's rotation: a free body, joined by a bushing with a gap to a body that turns with it."""
     turn = {"kind": "revolute", "axis": [0, 0, 1], "rate": 3.0}
     disc = {**body(2.0, [1, 1, 1], turn), "points": {"p": [0.5, 0, 0]}}
-    fixed = {**body(1.0, [1, 1, 1], {"kind": "fixed", "on": "disc.p"}), "points": {"q": [0.2, 0.3, 0]}}
-    links = {"l": {"type": "bushing", "from": "disc.p", "to": "rider.q", "damping": 20.0, "rotational_damping": 5.0}}
-    result = run({**bodies({"disc": disc, "rider": fixed}, 1.0, ["disc.rate", "l.force"], links), **WEIGHTLESS})
-    assert result["disc.rate"] == approx(3.0, abs=1e-12) and result["l.force"] == approx(0.0, abs=1e-12)
+    fixed = {
+        **body(1.0, [1, 1, 1], {"kind": "fixed", "on": "disc.p"}),
+        "points": {"q": [0.2, 0.3, 0]},
+    }
+    links = {
+        "l": {
+            "type": "bushing",
+            "from": "disc.p",
+            "to": "rider.q",
+            "damping": 20.0,
+            "rotational_damping": 5.0,
+        }
+    }
+    result = run(
+        {
+            **bodies({"disc": disc, "rider": fixed}, 1.0, ["disc.rate", "l.force"], links),
+            **WEIGHTLESS,
+        }
+    )
+    assert result["disc.rate"] == approx(3.0, abs=1e-12) and result["l.force"] == approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_a_bushing_between_two_free_bodies_conserves_their_momenta():
     tree = random_tree(np.random.default_rng(12), 1, "free")
     other = random_tree(np.random.default_rng(13), 1, "free")["b0"]
-    links = {"rubber": {"type": "bushing", "from": "b0.p", "to": "b1.p", "stiffness": 100.0, "damping": 1.0,
-                        "rotational_stiffness": 20.0, "rotational_damping": 0.3}}  # fmt: skip
+    links = {
+        "rubber": {
+            "type": "bushing",
+            "from": "b0.p",
+            "to": "b1.p",
+            "stiffness": 100.0,
+            "damping": 1.0,
+            "rotational_stiffness": 20.0,
+            "rotational_damping": 0.3,
+        }
+    }
     sums = [f"{what}momentum_{axis}" for what in ("", "angular_") for axis in "xyz"]
     probes = [f"{name}.{one}" for name in ("b0", "b1") for one in sums]
     result = run({**bodies({**tree, "b1": other}, 2.0, probes, links), **WEIGHTLESS})
@@ -566,21 +817,43 @@ def test_a_bushing_between_two_free_bodies_conserves_their_momenta():
 def machine() -> dict:
     """Return a case of a damped tree of bodies with a driven joint and all kinds of force elements in space."""
     upper = pendulum(0.8, damping=0.3)
-    lower = {**pendulum(-0.4), "joint": {"kind": "revolute", "on": "arm.bob", "axis": [0.6, 0.8, 0], "angle": 0.2}}
+    lower = {
+        **pendulum(-0.4),
+        "joint": {"kind": "revolute", "on": "arm.bob", "axis": [0.6, 0.8, 0], "angle": 0.2},
+    }
     lower["inertia"] = [0.1, 0.2, 0.3]
     wave = {"mean": 0.0, "amplitude": 0.2, "period": 0.9}
     cart = body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": wave})
     upper["joint"]["on"] = "cart"
     links = {
-        "spring": {"type": "spring", "from": "ground.hook", "to": "lower.bob", "stiffness": 50.0, "free_length": 1.0},
+        "spring": {
+            "type": "spring",
+            "from": "ground.hook",
+            "to": "lower.bob",
+            "stiffness": 50.0,
+            "free_length": 1.0,
+        },
         "damper": {"type": "damper", "from": "ground.hook", "to": "arm.bob", "damping": 2.0},
-        "load": {"type": "force", "to": "lower.bob", "force": {"mean": 0.0, "amplitude": 5.0, "period": 0.7},
-                 "direction": [1, 1, 0]},
+        "load": {
+            "type": "force",
+            "to": "lower.bob",
+            "force": {"mean": 0.0, "amplitude": 5.0, "period": 0.7},
+            "direction": [1, 1, 0],
+        },
         "motor": {"type": "torque", "from": "arm", "to": "lower", "torque": 0.5, "axis": [0, 0, 1]},
-        "rubber": {"type": "bushing", "from": "cart", "to": "lower.bob", "stiffness": 20.0, "damping": 0.5,
-                   "rotational_stiffness": 3.0, "rotational_damping": 0.1},
-    }  # fmt: skip
-    return held(links, {"cart": cart, "arm": upper, "lower": lower}, 1.5, [], method="rk4", step=2e-3)
+        "rubber": {
+            "type": "bushing",
+            "from": "cart",
+            "to": "lower.bob",
+            "stiffness": 20.0,
+            "damping": 0.5,
+            "rotational_stiffness": 3.0,
+            "rotational_damping": 0.1,
+        },
+    }
+    return held(
+        links, {"cart": cart, "arm": upper, "lower": lower}, 1.5, [], method="rk4", step=2e-3
+    )
 
 
 def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
@@ -588,22 +861,32 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
     found = [energy(case, {"numerics.step": h}) for h in (4e-3, 2e-3)]
     rest = [float(np.abs(one.remainder).max()) for one in found]
     assert rest[0] / rest[1] > 12.0 and found[1].relative < 1e-7
-    assert {"cart", "load", "motor"} <= {*found[1].supplied} and {"arm joint", "damper", "rubber bushing"} <= {
-        *found[1].dissipated
-    }
+    assert {"cart", "load", "motor"} <= {*found[1].supplied} and {
+        "arm joint",
+        "damper",
+        "rubber bushing",
+    } <= {*found[1].dissipated}
     assert {"cart", "arm", "lower", "spring", "rubber"} <= {*found[1].stored}
 
 
-@pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
+@pytest.mark.parametrize(
+    "kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")]
+)
 def test_a_term_left_out_of_the_ledger_of_bodies_is_its_remainder(kind, place, monkeypatch):
     from fvsolve.features.motion.feature import Motion
 
     honest, plain = energy(machine()), Motion.add_accounts
-    lost = honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
+    lost = (
+        honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
+    )
 
     def forgetful(self, accounts):
         plain(self, accounts)
-        own = [one for one in accounts.accounts if (one.place, one.kind) == (place, kind) and one.category != "rate"]
+        own = [
+            one
+            for one in accounts.accounts
+            if (one.place, one.kind) == (place, kind) and one.category != "rate"
+        ]
         accounts.accounts = [one for one in accounts.accounts if one not in own]
 
     monkeypatch.setattr(Motion, "add_accounts", forgetful)
@@ -618,7 +901,9 @@ def test_a_term_left_out_of_the_ledger_of_bodies_is_its_remainder(kind, place, m
 def test_every_family_of_methods_moves_a_crane_alike(method):
     crane, more = Crane(), {"rtol": 1e-9} if method != "implicit-midpoint" else {"step": 1e-4}
     truth = run(crane.case(0.2, ["boom.angle"], "log", joint={"rate": 0.05}))["boom.angle"]
-    found = run(crane.case(0.2, ["boom.angle"], "log", joint={"rate": 0.05}, method=method, **more))["boom.angle"]
+    found = run(
+        crane.case(0.2, ["boom.angle"], "log", joint={"rate": 0.05}, method=method, **more)
+    )["boom.angle"]
     assert found == approx(truth, abs=2e-4 * np.abs(truth).max())
 
 
@@ -646,10 +931,14 @@ def test_a_scene_that_is_turned_about_the_vertical_moves_alike():
     for one in tree.values():
         if "on" not in one["joint"]:
             one["joint"]["at"] = spin.apply(one["joint"]["at"]).tolist()
-            one["joint"]["attitude"]["matrix"] = (spin.as_matrix() @ one["joint"]["attitude"]["matrix"]).tolist()
+            one["joint"]["attitude"]["matrix"] = (
+                spin.as_matrix() @ one["joint"]["attitude"]["matrix"]
+            ).tolist()
     found = run(bodies(tree, 0.5, probes))
     for k in range(4):
-        here, there = (np.array([one[f"b{k}.{axis}"][-1] for axis in "xyz"]) for one in (found, truth))
+        here, there = (
+            np.array([one[f"b{k}.{axis}"][-1] for axis in "xyz"]) for one in (found, truth)
+        )
         assert here == approx(spin.apply(there), abs=1e-7)
 
 
@@ -658,7 +947,12 @@ def test_bodies_fixed_to_each_other_act_as_a_single_body():
     rng, places, rods = np.random.default_rng(11), [], {}
     turns = [np.eye(3), turn(rng), turn(rng)]
     for k in range(3):
-        joint = {"kind": "fixed", "on": f"r{k - 1}", "at": [0.1, 0.2, -0.5], "attitude": {"matrix": turns[k].tolist()}}
+        joint = {
+            "kind": "fixed",
+            "on": f"r{k - 1}",
+            "at": [0.1, 0.2, -0.5],
+            "attitude": {"matrix": turns[k].tolist()},
+        }
         if k == 0:
             joint = {"kind": "revolute", "axis": [0, 1, 0], "angle": 0.6}
         rods[f"r{k}"] = body(1.0 + k, [0.1, 0.2, 0.15], joint, centre_of_mass=[0.05, 0.02, -0.3])
@@ -696,9 +990,18 @@ def test_no_rate_depends_on_a_state_that_the_pattern_has_not():
 
 
 @pytest.mark.parametrize("method, step", [("rk4", 2e-6), ("implicit-midpoint", 2e-6)])
-def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run(method, step, tmp_path, monkeypatch):
+def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run(
+    method, step, tmp_path, monkeypatch
+):
     monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
-    case = Crane().case(0.1, ["boom.angle", "lift.A.pressure"], "log", joint={"rate": 0.05}, method=method, step=step)
+    case = Crane().case(
+        0.1,
+        ["boom.angle", "lift.A.pressure"],
+        "log",
+        joint={"rate": 0.05},
+        method=method,
+        step=step,
+    )
     calls = []
 
     def third(t, seconds, steps):
@@ -707,7 +1010,9 @@ def test_a_run_interrupted_and_resumed_is_the_uninterrupted_run(method, step, tm
             raise KeyboardInterrupt
 
     whole = run(case, out=tmp_path / "whole")
-    assert fvsolve.run(case, out=tmp_path / "broken", progress=third, pictures=False).reason.startswith("interrupted")
+    assert fvsolve.run(
+        case, out=tmp_path / "broken", progress=third, pictures=False
+    ).reason.startswith("interrupted")
     resumed = run(case, out=tmp_path / "broken", resume=True)
     assert 0.0 < calls[1] < 0.1 and resumed.ledger == whole.ledger
     assert np.array_equal(resumed["boom.angle"], whole["boom.angle"])
@@ -719,7 +1024,8 @@ def test_linearised_a_locked_crane_swings_at_its_frequency_and_fails_where_predi
     case = crane.case(0.5, [], "log", joint={"rate": 1e-6}, method="rk4", step=1e-3)
     values = np.linalg.eigvals(linearise(case).a)
     stiffness = (
-        crane.spring() * crane.lever**2 + crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance
+        crane.spring() * crane.lever**2
+        + crane.mass * GRAVITY * crane.length / 2.0 * crane.lever / crane.distance
     )
     w = math.sqrt(stiffness / crane.inertia)
     assert np.sort(values.imag)[[0, -1]] == approx([-w, w], rel=1e-6)
@@ -738,8 +1044,10 @@ def test_a_body_with_drifting_parameters_gives_a_notice():
 
 
 def test_a_controller_may_hold_forces_on_bodies():
-    links = {"load": {"type": "force", "to": "arm.bob", "force": 0.0, "direction": [1, 0, 0]},
-             "motor": {"type": "torque", "to": "arm", "torque": 0.0, "axis": [0, 1, 0]}}  # fmt: skip
+    links = {
+        "load": {"type": "force", "to": "arm.bob", "force": 0.0, "direction": [1, 0, 0]},
+        "motor": {"type": "torque", "to": "arm", "torque": 0.0, "axis": [0, 1, 0]},
+    }
     model = fvsolve.build(fvsolve.load(bodies({"arm": pendulum(0.0)}, 1.0, [], links)))
     state = fvsolve.initial_state(model)
     held = fvsolve.advance(model, state, 1e-4, inputs={"load.force": 3.0, "motor.torque": 0.7})
@@ -770,7 +1078,10 @@ def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
         a, b, u, v, p, q = y
         arms = [turned(a, 2.2, 0.1), turned(a, 5.0, 0.0), turned(a + b, 0.0, -1.5)]
         across = [np.array([-r[1], r[0]]) for r in arms]
-        jacobians = [np.column_stack([across[0], np.zeros(2)]), np.column_stack([across[1] + across[2], across[2]])]
+        jacobians = [
+            np.column_stack([across[0], np.zeros(2)]),
+            np.column_stack([across[1] + across[2], across[2]]),
+        ]
         drags = [-u * u * arms[0], -u * u * arms[1] - (u + v) ** 2 * arms[2]]
         mass, force = np.zeros((2, 2)), np.array([0.0, -200.0 * v])
         for m, j, d in zip((800.0, 1000.0), jacobians, drags, strict=True):
@@ -786,16 +1097,34 @@ def test_the_crane_that_is_shipped_moves_as_scipy_has_it():
         open_, dense = law(t), lambda one: rho * math.exp((one - 101325.0) / beta)
         into = valve_flow(share, open_, 250e5, p, dense(max(250e5, p))) if open_ else 0.0
         out = valve_flow(share, open_, q, 1e5, dense(max(q, 1e5))) if open_ else 0.0
-        return [u, v, *np.linalg.solve(mass, force), beta / (5e-4 + bore * x) * (into / dense(p) - bore * speed),
-                beta / (5e-4 + ring * (1.2 - x)) * (ring * speed - out / dense(q))]  # fmt: skip
+        return [
+            u,
+            v,
+            *np.linalg.solve(mass, force),
+            beta / (5e-4 + bore * x) * (into / dense(p) - bore * speed),
+            beta / (5e-4 + ring * (1.2 - x)) * (ring * speed - out / dense(q)),
+        ]
 
-    y = [math.radians(10.0), -math.radians(10.0), 0.0, 0.0, 1e5 * result["lift.A.gauge_pressure"][0] + 101325.0, 10e5]
+    y = [
+        math.radians(10.0),
+        -math.radians(10.0),
+        0.0,
+        0.0,
+        1e5 * result["lift.A.gauge_pressure"][0] + 101325.0,
+        10e5,
+    ]
     assert rates(0.0, y, lambda t: 0.0)[2:4] == approx([0.0, 0.0], abs=1e-9)
-    ramps = [(1.2, lambda t: (t - 1.0) / 0.2), (4.0, lambda t: 1.0), (4.2, lambda t: (4.2 - t) / 0.2)]
+    ramps = [
+        (1.2, lambda t: (t - 1.0) / 0.2),
+        (4.0, lambda t: 1.0),
+        (4.2, lambda t: (4.2 - t) / 0.2),
+    ]
     ramps.append((6.0, lambda t: 0.0))
     at = 1.0
     for until, law in ramps:
-        y = solve_ivp(rates, (at, until), y, method="LSODA", args=(law,), rtol=1e-9, atol=1e-9, max_step=0.01).y[:, -1]
+        y = solve_ivp(
+            rates, (at, until), y, method="LSODA", args=(law,), rtol=1e-9, atol=1e-9, max_step=0.01
+        ).y[:, -1]
         at = until
     assert math.radians(result["boom.angle"][-1]) == approx(y[0], abs=1e-5)
     assert math.radians(result["load.angle"][-1]) == approx(y[1], abs=1e-4)
@@ -810,12 +1139,24 @@ def bennett(axis: bool) -> dict:
     a, b, alpha = 1.0, 1.5, math.radians(30.0)
     beta = math.asin(b / a * math.sin(alpha))
     one = 1.0
-    two = 2.0 * math.atan(math.sin((beta + alpha) / 2.0) / math.sin((beta - alpha) / 2.0) / math.tan(one / 2.0))
-    turns = {"one": (one, a, {}), "two": (two, b, {"on": "one.end", "attitude": {"roll": alpha}}),
-             "three": (-one, a, {"on": "two.end", "attitude": {"roll": beta}})}  # fmt: skip
-    nodes = {name: body(1.0, [0.1, 0.2, 0.2], {"kind": "revolute", "axis": [0, 0, 1], "angle": angle, **joint},
-                        centre_of_mass=[0.5 * length, 0.1, 0.05], points={"end": [length, 0, 0]})
-             for name, (angle, length, joint) in turns.items()}  # fmt: skip
+    two = 2.0 * math.atan(
+        math.sin((beta + alpha) / 2.0) / math.sin((beta - alpha) / 2.0) / math.tan(one / 2.0)
+    )
+    turns = {
+        "one": (one, a, {}),
+        "two": (two, b, {"on": "one.end", "attitude": {"roll": alpha}}),
+        "three": (-one, a, {"on": "two.end", "attitude": {"roll": beta}}),
+    }
+    nodes = {
+        name: body(
+            1.0,
+            [0.1, 0.2, 0.2],
+            {"kind": "revolute", "axis": [0, 0, 1], "angle": angle, **joint},
+            centre_of_mass=[0.5 * length, 0.1, 0.05],
+            points={"end": [length, 0, 0]},
+        )
+        for name, (angle, length, joint) in turns.items()
+    }
     nodes["ground"] = {"type": "frame", "points": {"hinge": [-b, 0, 0]}}
     pin = {"type": "pin", "from": "ground.hinge", "to": "three.end"}
     pin |= {"axis": [0, math.sin(beta), math.cos(beta)]} if axis else {}
@@ -834,6 +1175,7 @@ def test_bennetts_linkage_moves_as_its_half_angles_have_it_and_a_ball_there_is_r
     gap = np.array([result["three.end.x"] + 1.5, result["three.end.y"], result["three.end.z"]])
     assert np.abs(gap).max() < 1e-8  # also along the axis of the pin, without a constraint
     with pytest.raises(
-        fvsolve.errors.CaseError, match="in some direction joints or other pins already hold its two points together"
+        fvsolve.errors.CaseError,
+        match="in some direction joints or other pins already hold its two points together",
     ):
         fvsolve.build(fvsolve.load(bennett(axis=False)))

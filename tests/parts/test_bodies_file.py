@@ -79,7 +79,9 @@ def test_a_bad_body_gets_its_message(name):
 
 
 def test_bodies_that_hang_in_a_loop_are_named():
-    nodes = {name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))}
+    nodes = {
+        name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))
+    }
     found = refusal_text({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
     assert (
         "is carried by itself: a on c on b on a; remove `on` from one of these bodies" in found
@@ -89,24 +91,35 @@ def test_bodies_that_hang_in_a_loop_are_named():
 
 CRANE = Crane()
 LINKS = {
-    "beyond its stroke": (CRANE.links(closed_length=0.0), "links.lift.stroke: the piston starts at 0.353553 m"),
+    "beyond its stroke": (
+        CRANE.links(closed_length=0.0),
+        "links.lift.stroke: the piston starts at 0.353553 m",
+    ),
     "an unknown point": (
-        CRANE.links(ports={"case": "ground.lug", "rod": "boom.eyes"}), 'no place named "boom.eyes"; places are',
+        CRANE.links(ports={"case": "ground.lug", "rod": "boom.eyes"}),
+        'no place named "boom.eyes"; places are',
     ),
     "a mass and a point": (
         {"s": {"type": "spring", "from": "ground", "to": "boom.eye", "stiffness": 1}},
         '"ground" is a place on the axis of masses, "boom.eye" a place in space',
     ),
-    "a force without direction": ({"f": {"type": "force", "to": "boom.eye", "force": 1}}, "direction is missing"),
-    "a torque without axis": ({"t": {"type": "torque", "to": "boom", "torque": 1}}, "axis is missing"),
+    "a force without direction": (
+        {"f": {"type": "force", "to": "boom.eye", "force": 1}},
+        "direction is missing",
+    ),
+    "a torque without axis": (
+        {"t": {"type": "torque", "to": "boom", "torque": 1}},
+        "axis is missing",
+    ),
     "points in one place": (
-        {"s": {"type": "spring", "from": "ground.top", "to": "boom", "stiffness": 1}}, "coincide at the start",
+        {"s": {"type": "spring", "from": "ground.top", "to": "boom", "stiffness": 1}},
+        "coincide at the start",
     ),
     "a pipe to a point": (
         {"p": {"type": "valve", "from": "boom.eye", "to": "boom.tip", "area": 1}},
         '"boom.eye" is a point, a spatial place, and this port of a valve needs a hydraulic place',
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", LINKS)
@@ -130,24 +143,36 @@ def test_an_open_loop_is_reported_with_its_gap_and_a_redundant_loop_with_its_pin
     assert text in refusal_text(nodes, links)
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
-    assert "links.loop: velocities at the start separate the two points of this pin at" in refusal_text(nodes, links)
+    assert (
+        "links.loop: velocities at the start separate the two points of this pin at"
+        in refusal_text(nodes, links)
+    )
 
 
 def test_a_pin_that_opens_across_its_axis_in_a_single_direction_is_refused():
     straight = {f"nodes.{name}.joint.angle": 0.0 for name in ("one", "two", "coupler")}
-    with pytest.raises(CaseError, match="loop: velocities at the start separate the two points of this pin at 1.5 m/s"):
+    with pytest.raises(
+        CaseError,
+        match="loop: velocities at the start separate the two points of this pin at 1.5 m/s",
+    ):
         fvsolve.build(fvsolve.load("four-bar", straight | {"nodes.coupler.joint.rate": 1.0}))
 
 
 def test_a_probe_that_a_joint_has_not_is_refused():
     found = refusal_text(arm(), probes=["arm.travel", "arm.bob.roll", "arm.bop.x"])
-    assert 'arm is a body, which has no "travel"' in found and 'arm.bob is a point, which has no "roll"' in found
+    assert (
+        'arm is a body, which has no "travel"' in found
+        and 'arm.bob is a point, which has no "roll"' in found
+    )
     assert 'no part named "arm.bop"' in found
 
 
 def test_all_faults_of_bodies_are_reported_at_once():
     found = refusal_text(
-        {**arm(mass=0, inertia=[1, 1, 9]), "b": body(1, [1, 1, 1], {"kind": "revolute", "on": "nobody"})}
+        {
+            **arm(mass=0, inertia=[1, 1, 9]),
+            "b": body(1, [1, 1, 1], {"kind": "revolute", "on": "nobody"}),
+        }
     )
     for message in ("mass", "are not possible", "axis is missing"):
         assert message in found
@@ -156,36 +181,51 @@ def test_all_faults_of_bodies_are_reported_at_once():
 def test_a_faulty_body_is_no_fault_of_parts_that_name_it():
     """Bodies on it or on its points, links between points, tanks and basins on it, and probes add no faults."""
     nodes = {
-        **arm(mass=0), "b": body(1, [1, 1, 1], hinge(on="arm.bob")), "c": body(1, [1, 1, 1], hinge(on="arm")),
-        **{one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0} for one, y in (("p",
-            1), ("q", -1))},
+        **arm(mass=0),
+        "b": body(1, [1, 1, 1], hinge(on="arm.bob")),
+        "c": body(1, [1, 1, 1], hinge(on="arm")),
+        **{
+            one: {"type": "tank", "on": "arm", "at": [0, y, 1], "area": 1.0, "level": 1.0}
+            for one, y in (("p", 1), ("q", -1))
+        },
         "pool": {"type": "basin", "on": "arm", "size": [1, 1], "cells": [2, 2], "level": 1.0},
         "ground": {"type": "frame", "points": {"eye": [0, 0, 3]}},
-    }  # fmt: skip
-    links = {"s": {"type": "spring", "from": "ground.eye", "to": "arm.bob", "stiffness": 1.0},
-             "pin": {"type": "pin", "from": "ground.eye", "to": "arm.bob"},
-             "duct": {"type": "rigid-column", "from": "p", "to": "q", "length": 2.0, "diameter": 0.1}}  # fmt: skip
+    }
+    links = {
+        "s": {"type": "spring", "from": "ground.eye", "to": "arm.bob", "stiffness": 1.0},
+        "pin": {"type": "pin", "from": "ground.eye", "to": "arm.bob"},
+        "duct": {"type": "rigid-column", "from": "p", "to": "q", "length": 2.0, "diameter": 0.1},
+    }
     found = refusal_text(nodes, links, ["arm.x", "arm.bob.x", "b.angle"])
     assert found == "case: 1 fault\n  nodes.arm.mass: 0 is out of range; expected a value above 0"
 
 
 def test_an_axis_that_is_not_of_unit_length_is_divided_by_it_and_noted():
     model = fvsolve.build(fvsolve.load(bodies(arm(joint=hinge(axis=[0, 2, 0], angle=1.0)), 1.0)))
-    assert [one.key for one in model.warnings] == ["joint.axis"] and "not 1" in model.warnings[0].text
+    assert [one.key for one in model.warnings] == ["joint.axis"] and "not 1" in model.warnings[
+        0
+    ].text
     assert motion_of(model).body_table[0]["axis"].tolist() == [0.0, 1.0, 0.0]
 
 
 def test_motion_at_the_start_is_reported():
     case = bodies(arm(joint=hinge(angle=1.0, rate=2.0)), 1.0)
     model = fvsolve.build(fvsolve.load(case))
-    assert model.steady["moving"] == ["body arm turns at 2 rad/s", "body arm accelerates at 11.79 rad/s2"]
+    assert model.steady["moving"] == [
+        "body arm turns at 2 rad/s",
+        "body arm accelerates at 11.79 rad/s2",
+    ]
     case["numerics"]["initial"] = "equilibrium"
-    with pytest.raises(CaseError, match="expects that nothing moves, but body arm turns at 2 rad/s"):
+    with pytest.raises(
+        CaseError, match="expects that nothing moves, but body arm turns at 2 rad/s"
+    ):
         fvsolve.build(fvsolve.load(case))
 
 
 def test_a_case_of_bodies_reads_back_as_itself():
-    case = fvsolve.load(Crane().case(1.0, ["boom.angle"], joint={"attitude": {"yaw": 0.3}, "rate": 0.1}))
+    case = fvsolve.load(
+        Crane().case(1.0, ["boom.angle"], joint={"attitude": {"yaw": 0.3}, "rate": 0.1})
+    )
     import tomllib
 
     again = fvsolve.load(tomllib.loads(case.resolved()))
@@ -270,7 +310,9 @@ TOLD = """all.toml: 11 faults
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 
 
-def test_all_faults_of_moving_parts_are_reported_at_once_with_their_lines_and_nothing_else(tmp_path):
+def test_all_faults_of_moving_parts_are_reported_at_once_with_their_lines_and_nothing_else(
+    tmp_path,
+):
     (tmp_path / "all.toml").write_text(ALL.lstrip())
     assert str(refused(tmp_path / "all.toml")) == TOLD
 
@@ -355,14 +397,24 @@ def test_the_scene_is_read_in_si_and_reads_back_as_itself():
     assert cylinder.areas() == pytest.approx((1.25663706e-3, 7.65763213e-4))
     assert case.places["cyl.B"].volume == pytest.approx(50e-6 + 7.65763213e-4 * 0.1)
     assert cylinder.leakage == pytest.approx(1e-5 / 60 / 1e5)
-    assert [case.links[name].ports for name in ("push", "spring")] == [{"to": "load"}, {"from": "ground", "to": "load"}]
+    assert [case.links[name].ports for name in ("push", "spring")] == [
+        {"to": "load"},
+        {"from": "ground", "to": "load"},
+    ]
     assert [probe.dimension for probe in case.probes] == ["pressure", "force", "position", "flow"]
     assert load_text(case.resolved()) == case
 
 
 def test_no_probes_means_bodies_chambers_and_forces_too():
     found = [probe.text for probe in load_text(SCENE[: SCENE.index("[output]")]).probes]
-    for wanted in ("cyl.A.pressure", "load.velocity", "ground.position", "spool.flow_B", "cyl.force", "stop.force"):
+    for wanted in (
+        "cyl.A.pressure",
+        "load.velocity",
+        "ground.position",
+        "spool.flow_B",
+        "cyl.force",
+        "stop.force",
+    ):
         assert wanted in found
 
 
@@ -396,32 +448,65 @@ BAD_MECHANICS = {
         'links.spring.from: "cyl.A" is a chamber, a hydraulic place, and this port of a spring '
         "needs a translational or spatial place",
     ),
-    "a cylinder for its chamber": (swap('"cyl.A"', '"cyl"'), '"cyl" is a cylinder; its places are cyl.A, cyl.B'),
-    "no such chamber": (swap('"cyl.A"', '"cyl.C"'), 'no place named "cyl.C"; places are cyl.A, cyl.B, ground, load'),
-    "two ports at a place": (swap('A = "cyl.A"', 'A = "pump"'), 'links.spool.ports.A: joins "pump" to itself'),
-    "rod and case alike": (swap('case = "ground"', 'case = "load"'), 'links.cyl.ports.case: joins "load" to itself'),
+    "a cylinder for its chamber": (
+        swap('"cyl.A"', '"cyl"'),
+        '"cyl" is a cylinder; its places are cyl.A, cyl.B',
+    ),
+    "no such chamber": (
+        swap('"cyl.A"', '"cyl.C"'),
+        'no place named "cyl.C"; places are cyl.A, cyl.B, ground, load',
+    ),
+    "two ports at a place": (
+        swap('A = "cyl.A"', 'A = "pump"'),
+        'links.spool.ports.A: joins "pump" to itself',
+    ),
+    "rod and case alike": (
+        swap('case = "ground"', 'case = "load"'),
+        'links.cyl.ports.case: joins "load" to itself',
+    ),
     "a port too few": (swap(', B = "cyl.B"', ""), "links.spool.ports: B is missing"),
-    "a port too many": (swap(', B = "cyl.B"', ', B = "cyl.B", X = "pump"'), "links.spool.ports.X: unknown key"),
-    "ports that are none": (swap(SPOOL, "ports = 3"), 'links.spool.ports: 3 is not a table; expected { P = "...", T ='),
+    "a port too many": (
+        swap(', B = "cyl.B"', ', B = "cyl.B", X = "pump"'),
+        "links.spool.ports.X: unknown key",
+    ),
+    "ports that are none": (
+        swap(SPOOL, "ports = 3"),
+        'links.spool.ports: 3 is not a table; expected { P = "...", T =',
+    ),
     "no ports": (swap(SPOOL, ""), "links.spool: ports is missing"),
     "from and to": (swap(SPOOL, 'from = "pump"'), "links.spool.from: unknown key; keys are "),
     "a force for a stiffness": (
         swap('"20 N/mm"', '"20 N"'),
         'links.spring.stiffness: "20 N" is a force; expected a stiffness, for example "50 N/mm"',
     ),
-    "a pressure for a force": (swap('"-1.5 kN"', '"3 bar"'), '"3 bar" is a pressure; expected a force'),
-    "a length for a damping": (swap('"0.1 N s/mm"', '"3 m"'), '"3 m" is a length; expected a damping'),
+    "a pressure for a force": (
+        swap('"-1.5 kN"', '"3 bar"'),
+        '"3 bar" is a pressure; expected a force',
+    ),
+    "a length for a damping": (
+        swap('"0.1 N s/mm"', '"3 m"'),
+        '"3 m" is a length; expected a damping',
+    ),
     "a flow for a leakage": (
         swap('"0.01 l/min/bar"', '"1 l/min"'),
         'links.cyl.leakage: "1 l/min" is a flow; expected a leakage, for example "0.1 l/min/bar"',
     ),
-    "a volume for a mass": (swap('"50 kg"', '"50 l"'), 'nodes.load.mass: "50 l" is a volume; expected a mass'),
+    "a volume for a mass": (
+        swap('"50 kg"', '"50 l"'),
+        'nodes.load.mass: "50 l" is a volume; expected a mass',
+    ),
     "a piston outside": (
         swap('"100 mm"', '"300 mm"'),
         "links.cyl.stroke: the piston starts at 0.3 m (distance from ground to load); expected 0 to 0.2 m",
     ),
-    "no area": (swap('piston_diameter = "40 mm"', ""), "links.cyl: area_A or piston_diameter is missing"),
-    "no area at B": (swap('rod_diameter = "25 mm"', ""), "links.cyl: area_B or rod_diameter is missing"),
+    "no area": (
+        swap('piston_diameter = "40 mm"', ""),
+        "links.cyl: area_A or piston_diameter is missing",
+    ),
+    "no area at B": (
+        swap('rod_diameter = "25 mm"', ""),
+        "links.cyl: area_B or rod_diameter is missing",
+    ),
     "two areas": (
         swap('piston_diameter = "40 mm"', 'piston_diameter = "40 mm"\narea_A = 1'),
         "area_A and piston_diameter are given; keep one",
@@ -458,14 +543,19 @@ BAD_MECHANICS = {
         swap('minimum = "1 mm"\nmaximum = "199 mm"', ""),
         "links.stop: expected one of minimum, maximum",
     ),
-    "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.maximum: 0.001 m is not above `minimum`, 0.001 m"),
+    "a stop without room": (
+        swap('"199 mm"', '"1 mm"'),
+        "links.stop.maximum: 0.001 m is not above `minimum`, 0.001 m",
+    ),
     "a force on nothing": (swap('to = "load"\nforce', "force"), "links.push: to is missing"),
     "a loose mass": (
         swap("[nodes.ground]", '[nodes.m]\ntype = "mass"\nmass = 1\n[nodes.ground]'),
         "no link touches it",
     ),
     "an elevation missing": (
-        swap('"100 barg"', '"100 barg"\nelevation = 1').replace('"0 barg"', '"0 barg"\nelevation = 1'),
+        swap('"100 barg"', '"100 barg"\nelevation = 1').replace(
+            '"0 barg"', '"0 barg"\nelevation = 1'
+        ),
         "links.cyl: elevation is missing, but stated for pump, sump",
     ),
     "a pressure of a mass": (
@@ -476,7 +566,10 @@ BAD_MECHANICS = {
         swap('"cyl.force"', '"cyl.flow"'),
         'cyl is a cylinder, which has no "flow"; it has force, position, velocity',
     ),
-    "a chamber's probe misspelt": (swap('"cyl.A.pressure"', '"cyl.A.presure"'), 'did you mean "pressure"?'),
+    "a chamber's probe misspelt": (
+        swap('"cyl.A.pressure"', '"cyl.A.presure"'),
+        'did you mean "pressure"?',
+    ),
     "a mass among links": (swap('type = "damper"', 'type = "mass"'), "it belongs under [nodes]"),
 }
 
@@ -493,9 +586,11 @@ def test_a_case_without_masses_loads_none_of_their_kernels(tmp_path):
     import subprocess
     import sys
 
-    code = ("import sys, fvsolve; result = fvsolve.run('cases/chamber-and-orifice.toml');"
-            "ends = 'motion.lower', 'mass_dynamics';"
-            "print([name for name in sys.modules if name.endswith(ends)])")  # fmt: skip
+    code = (
+        "import sys, fvsolve; result = fvsolve.run('cases/chamber-and-orifice.toml');"
+        "ends = 'motion.lower', 'mass_dynamics';"
+        "print([name for name in sys.modules if name.endswith(ends)])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
     model = fvsolve.build(fvsolve.load("cases/chamber-and-orifice.toml"))

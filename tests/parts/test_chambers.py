@@ -24,7 +24,12 @@ def test_a_chamber_fills_in_finite_time_and_rests(supply, numerics, near):
     slope = BETA / VOLUME * HOLE * math.sqrt(2 / RHO)
     filled = 2 * math.sqrt(abs(supply - P0)) / slope
     case = scene(
-        nodes, {"hole": valve("pump", "pot", HOLE)}, filled + 60.0, numerics, ["pot.pressure", "hole.flow"], 0.1
+        nodes,
+        {"hole": valve("pump", "pot", HOLE)},
+        filled + 60.0,
+        numerics,
+        ["pot.pressure", "hole.flow"],
+        0.1,
     )
     result = fvsolve.run(case)
     drop = vessels.filling(VOLUME, BETA, HOLE, RHO, abs(supply - P0), result.t)
@@ -55,12 +60,23 @@ def orifice(k: float, drop):
 
 def test_chambers_and_orifices_agree_with_scipy_to_ten_digits():
     """Supply, orifice, chamber, closing valve, chamber and two outlets, with all drops far from zero."""
-    nodes = {"pump": reservoir(8e6), "a": chamber(0.02, 5e6), "b": chamber(0.05, 3e6), "out": reservoir(5e5)}
+    nodes = {
+        "pump": reservoir(8e6),
+        "a": chamber(0.02, 5e6),
+        "b": chamber(0.05, 3e6),
+        "out": reservoir(5e5),
+    }
     links = {
         "in": valve("pump", "a", 2e-7),
         "mid": valve("a", "b", 4e-7, ramp(0.0, 4.0, 1.0, 0.2, 2.0)),
         "out1": valve("b", "out", 1e-7),
-        "out2": {"type": "orifice", "from": "out", "to": "b", "discharge_coefficient": 0.5, "area": 1e-7},
+        "out2": {
+            "type": "orifice",
+            "from": "out",
+            "to": "b",
+            "discharge_coefficient": 0.5,
+            "area": 1e-7,
+        },
     }
     end, every = 1.0, 0.05
     probes = ["a.pressure", "b.pressure", "mid.flow", "out2.flow"]
@@ -70,7 +86,10 @@ def test_chambers_and_orifices_agree_with_scipy_to_ten_digits():
         opening = 0.2 + 0.8 * (1 - t / 4.0) ** 2
         through = orifice(4e-7 * opening, p[0] - p[1])
         leaves = orifice(1.5e-7, p[1] - 5e5)
-        return [BETA / 0.02 * (orifice(2e-7, 8e6 - p[0]) - through), BETA / 0.05 * (through - leaves)]
+        return [
+            BETA / 0.02 * (orifice(2e-7, 8e6 - p[0]) - through),
+            BETA / 0.05 * (through - leaves),
+        ]
 
     t = np.asarray(result.t)
     run = solve_ivp(rate, (0, end), [5e6, 3e6], "DOP853", rtol=1e-13, atol=1e-6, t_eval=t)
@@ -85,14 +104,18 @@ def test_a_chamber_turned_round_by_its_supply_agrees_with_scipy():
     pump = {"time": times, "value": pressures, "kind": "linear"}
     nodes = {"pump": reservoir(pump), "pot": chamber(VOLUME, 2.1e6)}
     numerics = {"method": "dormand-prince", "rtol": 1e-10}
-    result = fvsolve.run(scene(nodes, {"hole": valve("pump", "pot", HOLE)}, 10.0, numerics, ["pot.pressure"], 0.5))
+    result = fvsolve.run(
+        scene(nodes, {"hole": valve("pump", "pot", HOLE)}, 10.0, numerics, ["pot.pressure"], 0.5)
+    )
 
     def rate(t, p):
         return BETA / VOLUME * orifice(HOLE, np.interp(t, times, pressures) - p)
 
     y, found = np.array([2.1e6]), [2.1e6]
     for k in range(20):
-        y = solve_ivp(rate, (k / 2, (k + 1) / 2), y, "Radau", rtol=1e-11, atol=1e-4, max_step=0.01).y[:, -1]
+        y = solve_ivp(
+            rate, (k / 2, (k + 1) / 2), y, "Radau", rtol=1e-11, atol=1e-4, max_step=0.01
+        ).y[:, -1]
         found.append(y[0])
     at = np.interp(np.arange(0, 10.01, 0.5), result.t, result["pot.pressure"])
     assert at == pytest.approx(np.array(found), abs=1e-6 * 3e6)
@@ -117,7 +140,9 @@ def test_a_chamber_on_a_pipe_swings_as_mass_on_a_spring():
 
     w = brentq(mode, 1e-3, 0.49 * math.pi * speed / length, xtol=1e-13)
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
-    result = fvsolve.run(scene(nodes, links, 2.4 * math.pi * 2 / w, numerics, ["pot.pressure"], 1e-3))
+    result = fvsolve.run(
+        scene(nodes, links, 2.4 * math.pi * 2 / w, numerics, ["pot.pressure"], 1e-3)
+    )
     t, p = np.asarray(result.t), result["pot.pressure"] - 2e6
     rising = np.flatnonzero((p[:-1] < 0) & (p[1:] >= 0))
     crossing = t[rising] - p[rising] * (t[rising + 1] - t[rising]) / (p[rising + 1] - p[rising])
@@ -128,14 +153,22 @@ def test_a_chamber_on_a_pipe_swings_as_mass_on_a_spring():
 @pytest.mark.parametrize("opening", [0.0, 1.0], ids=["shut", "open"])
 def test_a_valve_between_pipe_and_chamber_and_a_junction_between_valves_run(opening):
     nodes = {
-        "lake": reservoir(2e6), "gate": junction(), "pot": chamber(0.01, 1e6), "mid": junction(), "out": reservoir(5e5),
-    }  # fmt: skip
+        "lake": reservoir(2e6),
+        "gate": junction(),
+        "pot": chamber(0.01, 1e6),
+        "mid": junction(),
+        "out": reservoir(5e5),
+    }
     links = {
-        "main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 20), "v1": valve("gate", "pot", 1e-4, opening),
-        "v2": valve("pot", "mid", 1e-4, opening), "v3": valve("mid", "out", 2e-4, opening),
-    }  # fmt: skip
+        "main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 20),
+        "v1": valve("gate", "pot", 1e-4, opening),
+        "v2": valve("pot", "mid", 1e-4, opening),
+        "v3": valve("mid", "out", 2e-4, opening),
+    }
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.9}
-    result = fvsolve.run(scene(nodes, links, 3.0, numerics, ["pot.pressure", "mid.pressure", "v2.flow"], 0.1))
+    result = fvsolve.run(
+        scene(nodes, links, 3.0, numerics, ["pot.pressure", "mid.pressure", "v2.flow"], 0.1)
+    )
     assert result.ok
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
     if opening == 0.0:
@@ -151,7 +184,10 @@ SIZES = {
     "discharge": ({"area": 2e-4, "discharge_coefficient": 0.7}, 0.7 * 2e-4),
     "by diameter": ({"diameter": 0.02}, 0.61 * math.pi / 4 * 0.02**2),
     "loss": ({"loss_coefficient": 4.0, "area": 2e-4}, 1e-4),
-    "loss by diameter": ({"loss_coefficient": 2.0, "diameter": 0.05}, math.pi / 4 * 0.05**2 / math.sqrt(2.0)),
+    "loss by diameter": (
+        {"loss_coefficient": 2.0, "diameter": 0.05},
+        math.pi / 4 * 0.05**2 / math.sqrt(2.0),
+    ),
     "Kv": ({"Kv": 10.0}, 10 / 3600 / math.sqrt(2 * 1e5 / RHO)),
     "Cv": ({"Cv": 10.0}, 10 * GALLON / 60 / math.sqrt(2 * PSI / 999.016)),
 }
@@ -166,7 +202,9 @@ def test_a_valve_passes_the_flow_of_its_size_in_both_directions(name, kind):
         "down": {"type": kind, "from": "a", "to": "b", **size},
         "up": {"type": kind, "from": "b", "to": "c", **size},
     }
-    result = fvsolve.run(scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["down.flow", "up.flow"], 0.1))
+    result = fvsolve.run(
+        scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["down.flow", "up.flow"], 0.1)
+    )
     assert result["down.flow"] == pytest.approx(flow_area * math.sqrt(2 * 1e5 / RHO), rel=1e-4)
     assert result["up.flow"] == pytest.approx(-flow_area * math.sqrt(2 * 2.5e5 / RHO), rel=1e-4)
 
@@ -188,4 +226,6 @@ def test_a_characteristic_turns_the_stem_into_flow_area(name, opening):
     nodes = {"a": reservoir(3e5), "b": reservoir(2e5)}
     links = {"v": valve("a", "b", 1e-4, opening, characteristic=given)}
     result = fvsolve.run(scene(nodes, links, 0.1, {"method": "rk4", "step": 0.1}, ["v.flow"], 0.1))
-    assert result["v.flow"] == pytest.approx(1e-4 * share(opening) * math.sqrt(2 * 1e5 / RHO), rel=1e-9)
+    assert result["v.flow"] == pytest.approx(
+        1e-4 * share(opening) * math.sqrt(2 * 1e5 / RHO), rel=1e-9
+    )

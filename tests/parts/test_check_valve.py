@@ -38,16 +38,34 @@ FRICTION = {"model": "steady", "factor": 0.02}
 
 
 def check(start, end, flow_area=0.02, **more):
-    return {"type": "check-valve", "from": start, "to": end, "area": flow_area, "discharge_coefficient": 1.0, **more}
+    return {
+        "type": "check-valve",
+        "from": start,
+        "to": end,
+        "area": flow_area,
+        "discharge_coefficient": 1.0,
+        **more,
+    }
 
 
 def column(numerics):
     """Return a case of a rigid column behind a check valve, whose reservoir pressure falls at 1 s."""
-    nodes = {"pump": reservoir({"time": [0.0, 1.0], "value": [3e5, 1e5], "kind": "step"}), "a": junction()}
+    nodes = {
+        "pump": reservoir({"time": [0.0, 1.0], "value": [3e5, 1e5], "kind": "step"}),
+        "a": junction(),
+    }
     nodes["town"] = reservoir(2e5)
-    links = {"check": check("pump", "a"),
-             "way": {"type": "rigid-column", "from": "a", "to": "town", "length": 20.0, "diameter": 0.2,
-                     "friction": {"model": "none"}}}  # fmt: skip
+    links = {
+        "check": check("pump", "a"),
+        "way": {
+            "type": "rigid-column",
+            "from": "a",
+            "to": "town",
+            "length": 20.0,
+            "diameter": 0.2,
+            "friction": {"model": "none"},
+        },
+    }
     return scene(nodes, links, 4.0, numerics, ["check.flow"], 0.1)
 
 
@@ -71,53 +89,98 @@ def test_the_time_of_shutting_converges_with_the_order_of_the_method(method, ord
 
 def test_under_error_control_it_shuts_on_time():
     result = fvsolve.run(column({"method": "dormand-prince", "rtol": 1e-11}))
-    assert [e["time"] for e in result.summary["events"]] == pytest.approx([column_shuts()], abs=1e-8)
+    assert [e["time"] for e in result.summary["events"]] == pytest.approx(
+        [column_shuts()], abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_at_a_jump_it_stops_the_flow_at_once(law):
     """The reservoir falls by more than Z M0: the flow stops within the step, and the pressure behind falls by Z M0."""
-    nodes = {"pump": reservoir({"time": [0.0, 0.1], "value": [6e5, 1e5], "kind": "step"}), "a": junction()}
+    nodes = {
+        "pump": reservoir({"time": [0.0, 0.1], "value": [6e5, 1e5], "kind": "step"}),
+        "a": junction(),
+    }
     nodes["town"] = reservoir(5.9e5)
     links = {"check": check("pump", "a", 0.005), "main": pipe("a", "town", 100.0, 0.3, 1000.0, 20)}
     result = fvsolve.run(
-        scene(nodes, links, 0.25, SHARP, ["check.flow", "a.pressure"], 0.01, fluid={**WATER, "law": law})
+        scene(
+            nodes,
+            links,
+            0.25,
+            SHARP,
+            ["check.flow", "a.pressure"],
+            0.01,
+            fluid={**WATER, "law": law},
+        )
     )
     first = math.sqrt(2.0 * RHO * 0.005**2 * 1e4)
     after = (result.t > 0.1) & (result.t < 0.29)
     assert not result["check.flow"][after].any()
     near = 1e-12 if law == "linear" else 5e-3
-    assert result["a.pressure"][after] == pytest.approx(5.9e5 - 1000.0 / area(0.3) * first, rel=near)
+    assert result["a.pressure"][after] == pytest.approx(
+        5.9e5 - 1000.0 / area(0.3) * first, rel=near
+    )
 
 
 def test_valves_that_a_jump_shuts_and_opens_are_listed_once():
     """Each jump of the lake gives one event of the check valve and one of the check valve of the pump."""
     fall = reservoir({"time": [0.0, 1.0, 2.0], "value": [3e5, 1e5, 3e5], "kind": "step"})
     nodes = {"pump": fall, "a": junction(), "b": junction(), "town": reservoir(2e5)}
-    links = {"check": check("pump", "a"), "tap": valve("a", "town", 0.01), "way": valve("b", "town", 0.01),
-             "lift": {"type": "pump", "from": "pump", "to": "b", "check_valve": True,
-                      "curve": {"flow": [0.05], "head": [5.0]}}}  # fmt: skip
-    result = fvsolve.run(scene(nodes, links, 3.0, {"method": "rk4", "step": 0.1}, ["check.flow", "lift.flow"], 0.1))
+    links = {
+        "check": check("pump", "a"),
+        "tap": valve("a", "town", 0.01),
+        "way": valve("b", "town", 0.01),
+        "lift": {
+            "type": "pump",
+            "from": "pump",
+            "to": "b",
+            "check_valve": True,
+            "curve": {"flow": [0.05], "head": [5.0]},
+        },
+    }
+    result = fvsolve.run(
+        scene(nodes, links, 3.0, {"method": "rk4", "step": 0.1}, ["check.flow", "lift.flow"], 0.1)
+    )
     shuts = [(1.0, "check", "shuts"), (1.0, "lift", "check valve shuts")]
     opens = [(2.0, "check", "opens"), (2.0, "lift", "check valve opens")]
-    assert sorted((e["time"], e["name"], e["what"]) for e in result.summary["events"]) == [*shuts, *opens]
+    assert sorted((e["time"], e["name"], e["what"]) for e in result.summary["events"]) == [
+        *shuts,
+        *opens,
+    ]
     stands = (result.t > 1.0) & (result.t < 2.0)
     assert not result["check.flow"][stands].any() and not result["lift.flow"][stands].any()
 
 
 FALL_AND_RISE = {"time": [0.0, 0.5, 2.0, 2.5], "value": [50.0, 10.0, 10.0, 60.0]}
 HARD = {
-    "two in series": ({"a": junction(), "m": junction(), "b": junction()},
-                      {"one": check("a", "m"), "two": check("m", "b")}),
-    "two in parallel": ({"a": junction(), "b": junction()}, {"one": check("a", "b"), "two": check("a", "b", 0.01)}),
-    "against each other": ({"a": junction(), "b": junction()}, {"one": check("a", "b"), "two": check("b", "a", 0.01)}),
+    "two in series": (
+        {"a": junction(), "m": junction(), "b": junction()},
+        {"one": check("a", "m"), "two": check("m", "b")},
+    ),
+    "two in parallel": (
+        {"a": junction(), "b": junction()},
+        {"one": check("a", "b"), "two": check("a", "b", 0.01)},
+    ),
+    "against each other": (
+        {"a": junction(), "b": junction()},
+        {"one": check("a", "b"), "two": check("b", "a", 0.01)},
+    ),
     "between chambers": ({"a": chamber(0.01), "b": chamber(0.02)}, {"one": check("a", "b", 0.001)}),
-    "spring loaded": ({"a": junction(), "b": junction()}, {"one": check("a", "b", cracking_pressure=2e4)}),
-    "on a slope": ({"a": junction(elevation=5.0), "b": junction(elevation=9.0)}, {"one": check("a", "b")}),
-}  # fmt: skip
+    "spring loaded": (
+        {"a": junction(), "b": junction()},
+        {"one": check("a", "b", cracking_pressure=2e4)},
+    ),
+    "on a slope": (
+        {"a": junction(elevation=5.0), "b": junction(elevation=9.0)},
+        {"one": check("a", "b")},
+    ),
+}
 WAYS = [
-    ("linear", SMOOTH), ("linear", {"method": "rodas-5p", "rtol": 1e-5}), ("log", SMOOTH),
-]  # fmt: skip
+    ("linear", SMOOTH),
+    ("linear", {"method": "rodas-5p", "rtol": 1e-5}),
+    ("log", SMOOTH),
+]
 
 
 def hard(name, law, numerics, head=FALL_AND_RISE, end=3.0):
@@ -125,8 +188,10 @@ def hard(name, law, numerics, head=FALL_AND_RISE, end=3.0):
     nodes = {"pump": lake(head), "town": lake(40.0), **nodes}
     if name == "on a slope":
         nodes = {k: {"elevation": 0.0, **node} for k, node in nodes.items()}
-    ways = {"up": pipe("pump", "a", 60.0, 0.2, 1000.0, 10, friction=FRICTION),
-            "down": pipe("b", "town", 90.0, 0.2, 1000.0, 15, friction=FRICTION)}  # fmt: skip
+    ways = {
+        "up": pipe("pump", "a", 60.0, 0.2, 1000.0, 10, friction=FRICTION),
+        "down": pipe("b", "town", 90.0, 0.2, 1000.0, 15, friction=FRICTION),
+    }
     probes = [f"{link}.flow" for link in links]
     return scene(nodes, {**ways, **links}, end, numerics, probes, 0.01, fluid={**WATER, "law": law})
 
@@ -159,24 +224,35 @@ def test_a_stretch_depends_on_its_state_and_on_nothing_that_ran_before():
     assert np.array_equal(fvsolve.advance(model, halfway, 0.7).y, once)
     assert np.array_equal(model.rhs(0.4, halfway.y), rates)
     assert np.array_equal(
-        fvsolve.advance(model, fvsolve.advance(model, fvsolve.initial_state(model), 0.4), 0.7).y, once
+        fvsolve.advance(model, fvsolve.advance(model, fvsolve.initial_state(model), 0.4), 0.7).y,
+        once,
     )
 
 
 @pytest.mark.parametrize("name", ["two in series", "between chambers"])
 def test_at_rest_it_rests(name):
     result = fvsolve.run(hard(name, "linear", SMOOTH, 40.0, 1.0))
-    assert all(not np.ptp(result[probe]) for probe in result.probes) and result.summary["events"] == []
+    assert (
+        all(not np.ptp(result[probe]) for probe in result.probes) and result.summary["events"] == []
+    )
 
 
 @pytest.mark.parametrize("head, shut", [(58.0, False), (30.0, True)])
 def test_steady_states_find_the_shut_valves(head, shut):
     """The check valve of the lower lake is shut at a head of 30 m and open at 58 m; that of the higher lake is open."""
-    nodes = {"low": lake(head), "high": lake(60.0), "a": junction(), "b": junction(), "town": junction(0.02)}
+    nodes = {
+        "low": lake(head),
+        "high": lake(60.0),
+        "a": junction(),
+        "b": junction(),
+        "town": junction(0.02),
+    }
     nodes["lake"] = lake(45.0)
     links = {"one": check("low", "a"), "two": check("high", "b")}
     for k, (i, j) in enumerate([("a", "town"), ("b", "town"), ("town", "lake")]):
-        links[f"p{k}"] = pipe(i, j, 200.0, 0.2, 1000.0, 5, friction={"model": "steady", "factor": 0.02})
+        links[f"p{k}"] = pipe(
+            i, j, 200.0, 0.2, 1000.0, 5, friction={"model": "steady", "factor": 0.02}
+        )
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, SMOOTH)))
     heads = {name: node["head"] for name, node in model.checks["nodes"].items()}
     assert (heads["a"] > head) == shut and heads["b"] < 60.0
@@ -198,15 +274,20 @@ def test_a_disc_that_shuts_late_slams_by_waves_and_its_own_equation():
     found, slammed = [e["time"] for e in result.summary["events"]], events[1][0]
     assert found[: len(events)] == pytest.approx([e[0] for e in events], abs=1e-4)
     before, after = result.t < slammed - 0.05, (result.t > slammed + 1e-3) & (result.t < 5.0)
-    assert result["check.opening"][before] == pytest.approx(np.interp(result.t, t, x)[before], abs=5e-4)
-    assert result["check.flow"][before] == pytest.approx(np.interp(result.t, t, m)[before], abs=0.1)  # [l/s]
+    assert result["check.opening"][before] == pytest.approx(
+        np.interp(result.t, t, x)[before], abs=5e-4
+    )
+    # [l/s]
+    assert result["check.flow"][before] == pytest.approx(np.interp(result.t, t, m)[before], abs=0.1)
     assert result["check.flow"].min() < -1.0 and not result["check.flow"][after].any()
 
 
 @pytest.mark.parametrize("method, courant, near", [("implicit-euler", 1.0, 0.05), ("implicit-euler", 2.0, 0.1),
                                                    ("trapezoid", 1.0, 7e-3), ("alexander-2", 2.0, 7e-3),
                                                    ("gauss-4", 2.0, 2e-3)])  # fmt: skip
-def test_a_disc_that_slams_within_a_given_implicit_step_is_placed_on_its_seat(method, courant, near):
+def test_a_disc_that_slams_within_a_given_implicit_step_is_placed_on_its_seat(
+    method, courant, near
+):
     """A long implicit step in which the disc shuts ends with the lift 0.
 
     The equation of the lift has a solution near zero and one far below it, and in longer steps only the latter.
@@ -226,10 +307,24 @@ def test_a_disc_that_slams_within_a_given_implicit_step_is_placed_on_its_seat(me
 def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol):
     """The disc shuts on a flowing column, and leaves its seat at a head of 20 m plus the cracking pressure."""
     head = {"time": [1.0, 3.0, 8.0, 10.0], "value": [22.0, 5.0, 5.0, 30.0]}
-    links = {"cv": check("up", "a", 0.0122, cracking_pressure=2e3, overpressure=4e4, time_constant=0.4),
-             "c": {"type": "rigid-column", "from": "a", "to": "o", "length": 300.0, "diameter": 0.2,
-                   "friction": FRICTION}}  # fmt: skip
-    case = scene({"up": lake(head), "a": junction(), "o": lake(20.0)}, links, 15.0, {"rtol": rtol}, ["c.flow"])
+    links = {
+        "cv": check("up", "a", 0.0122, cracking_pressure=2e3, overpressure=4e4, time_constant=0.4),
+        "c": {
+            "type": "rigid-column",
+            "from": "a",
+            "to": "o",
+            "length": 300.0,
+            "diameter": 0.2,
+            "friction": FRICTION,
+        },
+    }
+    case = scene(
+        {"up": lake(head), "a": junction(), "o": lake(20.0)},
+        links,
+        15.0,
+        {"rtol": rtol},
+        ["c.flow"],
+    )
     result = fvsolve.run(case)
     assert result.ok and [mark["what"] for mark in result.summary["marks"]] == ["stopped dead"]
     shuts, opens = result.summary["events"]
@@ -243,11 +338,14 @@ def test_a_disc_that_slams_on_a_rigid_column_stops_it_dead_and_opens_again(rtol)
 
 LAG, SWING = {"time_constant": 0.4}, {"natural_frequency": 0.6, "damping_ratio": 0.5}
 METHODS = {
-    "auto": {"rtol": 1e-6}, "rodas-5p": {"method": "rodas-5p", "rtol": 1e-6},
-    "rodas-4": {"method": "rodas-4", "rtol": 1e-6}, "radau": {"method": "radau-iia-5", "rtol": 1e-6},
-    "explicit": {"method": "dormand-prince", "rtol": 1e-6}, "sharp": {"method": "rodas-5p", "rtol": 1e-9},
+    "auto": {"rtol": 1e-6},
+    "rodas-5p": {"method": "rodas-5p", "rtol": 1e-6},
+    "rodas-4": {"method": "rodas-4", "rtol": 1e-6},
+    "radau": {"method": "radau-iia-5", "rtol": 1e-6},
+    "explicit": {"method": "dormand-prince", "rtol": 1e-6},
+    "sharp": {"method": "rodas-5p", "rtol": 1e-9},
     "given": {"method": "rk4", "step": 1e-3},
-}  # fmt: skip
+}
 
 
 def held_column(kind, after, disc, numerics):
@@ -258,10 +356,17 @@ def held_column(kind, after, disc, numerics):
     drop = {"time": [4.0, 9.0, 9.5], "value": [1.9e5, 3.1e5, 3.1e5]}
     part = {"type": kind, "area": 0.01, "discharge_coefficient": 0.61, "overpressure": 1e4, **disc}
     part |= {"cracking_pressure": 2e3} if kind == "check-valve" else {"set_pressure": 3.02e5}
-    column = {"type": "rigid-column", "length": 50.0, "diameter": 0.1,
-              "friction": {"model": "quasi-steady", "factor": 0.02}}  # fmt: skip
+    column = {
+        "type": "rigid-column",
+        "length": 50.0,
+        "diameter": 0.1,
+        "friction": {"model": "quasi-steady", "factor": 0.02},
+    }
     first, second = (column, part) if after else (part, column)
-    links = {"one": {**first, "from": "up", "to": "m"}, "two": {**second, "from": "m", "to": "down"}}
+    links = {
+        "one": {**first, "from": "up", "to": "m"},
+        "two": {**second, "from": "m", "to": "down"},
+    }
     nodes = {"up": reservoir(drop), "m": junction(), "down": reservoir(3e5)}
     name = "two" if after else "one"
     return scene(nodes, links, 10.0, numerics, [f"{name}.opening", f"{name}.flow"], 0.1), name
@@ -278,13 +383,17 @@ def leaving_of(disc, felt):
     friction = 0.02 * 50.0 / (0.1 * 2.0 * RHO * area(0.1) ** 2)
     source = lambda t: np.interp(t, [4.0, 9.0], [-1.1e5, 1e4])  # noqa: E731
     g = 2.0 * RHO * (0.61 * 0.01) ** 2
-    return lifted_valves.leaves_with_column(source, 9.0, g, 2e3, 1e4, disc, inertia, friction, felt, (8.8, 9.0, 10.0))
+    return lifted_valves.leaves_with_column(
+        source, 9.0, g, 2e3, 1e4, disc, inertia, friction, felt, (8.8, 9.0, 10.0)
+    )
 
 
 def assert_leaves(case, name, disc, felt):
     result = fvsolve.run(case)
     start, (lift, flow) = leaving(disc, felt)
-    assert result.ok and not [w for w in result.summary["warnings"] if w["place"].startswith("links")]
+    assert result.ok and not [
+        w for w in result.summary["warnings"] if w["place"].startswith("links")
+    ]
     assert [(e["what"], e["time"]) for e in result.summary["events"]] == [
         ("leaves its seat", pytest.approx(start, abs=1e-8))
     ]
@@ -312,7 +421,10 @@ def test_so_do_a_disc_behind_its_column_and_a_relief_valve(kind, after, felt, di
 def test_advance_stops_a_column_dead_as_a_run_does():
     """The slam removes the remaining flow also in `advance`: the flow after the next opening is that of a run."""
     case, name = held_column("check-valve", False, LAG, METHODS["sharp"])
-    case["nodes"]["up"]["pressure"] = {"time": [0.5, 2.0, 4.0, 9.0], "value": [3.1e5, 1.9e5, 1.9e5, 3.1e5]}
+    case["nodes"]["up"]["pressure"] = {
+        "time": [0.5, 2.0, 4.0, 9.0],
+        "value": [3.1e5, 1.9e5, 1.9e5, 3.1e5],
+    }
     model = fvsolve.build(fvsolve.load(case))
     state, result = fvsolve.initial_state(model), fvsolve.run(case)
     assert [mark["what"] for mark in result.summary["marks"]] == ["stopped dead"]
@@ -340,7 +452,9 @@ def slamming_of(disc, rho):
     disc = dict(disc)
     far, k = (lambda t: np.interp(t, [1.0, 4.0, 9.0], [3e5, 4.4e5, 3.2e5])), area(0.1) / 50.0
     g, friction = 2.0 * rho * (0.61 * 0.01) ** 2, 0.02 * 50.0 / (0.1 * 2.0 * rho * area(0.1) ** 2)
-    lag, w, zeta = (disc.get(key, 0.0) for key in ("time_constant", "natural_frequency", "damping_ratio"))
+    lag, w, zeta = (
+        disc.get(key, 0.0) for key in ("time_constant", "natural_frequency", "damping_ratio")
+    )
     w *= 2.0 * math.pi
     drop = lambda x, m: m * abs(m) / (g * x * x)  # noqa: E731
     lift = lambda x, m: (drop(x, m) - 2e3) / 1e4 - x  # noqa: E731
@@ -350,15 +464,19 @@ def slamming_of(disc, rho):
         drive, braked = lift(x, m), k * (3.3e5 - far(t) - drop(x, m) - friction * m * abs(m))
         held = x >= 1.0 and (drive if lag else max(v, drive)) >= 0.0
         return [
-            0.0 if held else drive / lag if lag else v, braked, 0.0 if lag or held else w * (w * drive - 2 * zeta * v),
-        ]  # fmt: skip
+            0.0 if held else drive / lag if lag else v,
+            braked,
+            0.0 if lag or held else w * (w * drive - 2 * zeta * v),
+        ]
 
     seat = lambda t, y: y[0] - 1e-5  # noqa: E731
     seat.terminal = True
     x = brentq(lambda x: lift(x, math.sqrt(3e4 / (friction + 1.0 / (g * x * x)))), 1e-3, 2.0)
     x = min(x, 1.0)
     y = [x, math.sqrt(3e4 / (friction + 1.0 / (g * x * x))), 0.0]
-    found = solve_ivp(rates, (0.0, 4.0), y, method="Radau", rtol=1e-9, atol=1e-12, events=seat, max_step=0.01)
+    found = solve_ivp(
+        rates, (0.0, 4.0), y, method="Radau", rtol=1e-9, atol=1e-12, events=seat, max_step=0.01
+    )
     return found.t_events[0][0] + 1e-5 / abs(rates(found.t[-1], found.y[:, -1])[0])
 
 
@@ -385,7 +503,10 @@ def test_a_column_that_slams_its_disc_shut_is_followed_under_every_law(numerics,
     result, name = slammed(disc, law, numerics, 10.0)
     shuts, leaves = result.summary["events"]
     start, (_, flow) = leaving(disc, "drop")
-    assert result.reason == "finished" and (shuts["what"], leaves["what"]) == ("is shut", "leaves its seat")
+    assert result.reason == "finished" and (shuts["what"], leaves["what"]) == (
+        "is shut",
+        "leaves its seat",
+    )
     assert shuts["time"] == pytest.approx(slamming(disc), abs=2e-3)
     assert leaves["time"] == pytest.approx(start, abs=1e-6)
     assert result[f"{name}.flow"][-1] * RHO == pytest.approx(flow[-1], rel=5e-3)
@@ -405,17 +526,26 @@ def test_steps_of_given_length_do_not_pass_over_a_slam(method, step, law, disc):
     result, _ = slammed(disc, law, {"method": method, "step": step}, 3.6)
     (shuts,) = result.summary["events"]
     assert result.ok and shuts["what"] == "is shut"
-    assert shuts["time"] == pytest.approx(slamming(disc, result.summary["fluid"]["density"]), rel=3e-5)
-    (limit,) = [row for row in result.summary["warnings"] if row["kind"] != "end"]  # schedules continue after the end
+    assert shuts["time"] == pytest.approx(
+        slamming(disc, result.summary["fluid"]["density"]), rel=3e-5
+    )
+    # schedules continue after the end
+    (limit,) = [row for row in result.summary["warnings"] if row["kind"] != "end"]
     assert (limit["kind"], limit["ok"]) == ("step-limit", True) and "rigid column" in limit["text"]
 
 
-@pytest.mark.parametrize("disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}])
+@pytest.mark.parametrize(
+    "disc", [{"time_constant": 0.1}, {"natural_frequency": 2.0, "damping_ratio": 0.2}]
+)
 def test_a_disc_half_open_at_the_start_does_not_move(disc):
     case = hard("spring loaded", "linear", SMOOTH, 50.0, 0.5)
     case["links"]["one"] = {**case["links"]["one"], **disc, "overpressure": 2e5}
     result = fvsolve.run(case)
-    assert np.ptp(result["one.flow"]) == 0.0 and result["one.flow"][0] > 0.0 and result.summary["events"] == []
+    assert (
+        np.ptp(result["one.flow"]) == 0.0
+        and result["one.flow"][0] > 0.0
+        and result.summary["events"] == []
+    )
 
 
 def test_shut_or_open_it_gives_nothing_out():
@@ -444,8 +574,14 @@ def test_bad_check_valves_are_refused(more, text):
 DEAD_ENDS = {
     "check valve": check("x", "m"),
     "spring loaded": check("x", "m", cracking_pressure=2e3),
-    "pump": {"type": "pump", "from": "x", "to": "m", "check_valve": True, "curve": {"flow": [0.05], "head": [20.0]}},
-}  # fmt: skip
+    "pump": {
+        "type": "pump",
+        "from": "x",
+        "to": "m",
+        "check_valve": True,
+        "curve": {"flow": [0.05], "head": [20.0]},
+    },
+}
 
 
 @pytest.mark.in_turn
@@ -466,7 +602,9 @@ def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
         links["tap"], ends = valve("lake", "m", 0.01, ramp(0.1, 0.1, 1.0, 0.0)), ("x", "sink")
     links["way"] = pipe(*ends, 50.0, 0.2, 1000.0, 10, friction=FRICTION)
     for numerics in ({**SHARP, "courant": 0.7}, {"method": "rodas-5p", "rtol": 1e-6}):
-        case = scene(nodes, links, 1.0, numerics, ["one.flow", "tap.flow"], 0.05, fluid={**WATER, "law": law})
+        case = scene(
+            nodes, links, 1.0, numerics, ["one.flow", "tap.flow"], 0.05, fluid={**WATER, "law": law}
+        )
         result = fvsolve.run(case)
         assert result.ok and len(result.summary["events"]) <= 6, result.reason
         assert abs(result["one.flow"][-1]) < 1e-12
@@ -477,22 +615,42 @@ def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
 def test_liquid_that_does_not_part_shuts_it_when_the_law_without_cavities_does(beside):
     """Without cavities, `cavitation = true` changes event times by less than the travel time of a cell."""
     ground = {"elevation": 0.0}
-    ends = {"tank": {"type": "tank", "area": 0.5, "level": 15.0}, "reservoir": {"type": "reservoir", "head": 15.0}}
-    nodes = {"lake": {"type": "reservoir", "head": 20.0, **ground}, "a": junction(**ground), "j": junction(**ground)}
+    ends = {
+        "tank": {"type": "tank", "area": 0.5, "level": 15.0},
+        "reservoir": {"type": "reservoir", "head": 15.0},
+    }
+    nodes = {
+        "lake": {"type": "reservoir", "head": 20.0, **ground},
+        "a": junction(**ground),
+        "j": junction(**ground),
+    }
     nodes["far"] = ends[beside] | ground
     times = [0.5, 0.6, 1.1, 1.2, 1.6, 1.7, 3.0, 3.3, 4.0, 4.1]
     opening = {"time": times, "value": [1.0, 0.05, 0.05, 1.0, 1.0, 0.1, 0.1, 0.8, 0.8, 0.0]}
-    disc = {"type": "check-valve", "from": "j", "to": "far", "diameter": 0.3, "loss_coefficient": 1.0}
-    links = {"tap": valve("lake", "a", 0.001, opening), "check": disc,
-             "main": pipe("a", "j", 200.0, 0.3, 1200.0, 160, friction=FRICTION)}  # fmt: skip
+    disc = {
+        "type": "check-valve",
+        "from": "j",
+        "to": "far",
+        "diameter": 0.3,
+        "loss_coefficient": 1.0,
+    }
+    links = {
+        "tap": valve("lake", "a", 0.001, opening),
+        "check": disc,
+        "main": pipe("a", "j", 200.0, 0.3, 1200.0, 160, friction=FRICTION),
+    }
     numerics, found = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, []
     for fluid in ({"law": "log"}, {"law": "mixture", "cavitation": True}):
-        result = fvsolve.run(scene(nodes, links, 2.6, numerics, ["check.flow"], 0.05, fluid={**WATER, **fluid}))
+        result = fvsolve.run(
+            scene(nodes, links, 2.6, numerics, ["check.flow"], 0.05, fluid={**WATER, **fluid})
+        )
         assert result.ok and not result.summary["cavities"]
         found.append([(one["what"], one["time"]) for one in result.summary["events"]])
     without, among = found
     assert [what for what, _ in without] == [what for what, _ in among] and len(without) >= 8
-    assert [t for _, t in among] == pytest.approx([t for _, t in without], abs=200.0 / 1200.0 / 160.0)
+    assert [t for _, t in among] == pytest.approx(
+        [t for _, t in without], abs=200.0 / 1200.0 / 160.0
+    )
 
 
 BORE, LENGTH = 0.2, 50.0
@@ -502,8 +660,15 @@ TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
 
 def slam_curve_case(start: str, end: str, **more) -> dict:
     """Return a check valve with a deceleration curve and a negligible loss."""
-    return {"type": "check-valve", "from": start, "to": end, "diameter": BORE, "loss_coefficient": 1e-7,
-            "deceleration": {"rate": RATES, "reverse_velocity": VELOCITIES}, **more}  # fmt: skip
+    return {
+        "type": "check-valve",
+        "from": start,
+        "to": end,
+        "diameter": BORE,
+        "loss_coefficient": 1e-7,
+        "deceleration": {"rate": RATES, "reverse_velocity": VELOCITIES},
+        **more,
+    }
 
 
 def slam_curve_column(
@@ -511,8 +676,15 @@ def slam_curve_column(
 ) -> dict:
     """Return a case of a rigid column with the velocity `first` [m/s], which its ends decelerate by `rate` [m/s2]."""
     nodes = {"up": reservoir(3e5), "mid": junction(), "town": reservoir(3e5 + rate * RHO * LENGTH)}
-    way = {"type": "rigid-column", "from": "mid", "to": "town", "length": LENGTH, "diameter": BORE,
-           "friction": {"model": "none"}, "initial_flow": first * area(BORE)}  # fmt: skip
+    way = {
+        "type": "rigid-column",
+        "from": "mid",
+        "to": "town",
+        "length": LENGTH,
+        "diameter": BORE,
+        "friction": {"model": "none"},
+        "initial_flow": first * area(BORE),
+    }
     if against:
         way |= {"from": "town", "to": "mid", "initial_flow": -first * area(BORE)}
     links = {"check": slam_curve_case("up", "mid"), "way": way}
@@ -537,8 +709,13 @@ def test_on_a_column_that_slows_down_evenly_it_returns_its_curve(rate):
     assert not result["check.flow"][after].any() and not result["check.opening"][after].any()
 
 
-CURVE_WAYS = [("linear", {"method": "radau-iia-5", "rtol": 1e-8}), ("linear", {"method": "rodas-5p", "rtol": 1e-8}),
-        ("linear", {"method": "rk4", "step": 0.01}), ("log", TIGHT), ("mixture", TIGHT)]  # fmt: skip
+CURVE_WAYS = [
+    ("linear", {"method": "radau-iia-5", "rtol": 1e-8}),
+    ("linear", {"method": "rodas-5p", "rtol": 1e-8}),
+    ("linear", {"method": "rk4", "step": 0.01}),
+    ("log", TIGHT),
+    ("mixture", TIGHT),
+]
 
 
 @pytest.mark.in_turn
@@ -547,7 +724,9 @@ CURVE_WAYS = [("linear", {"method": "radau-iia-5", "rtol": 1e-8}), ("linear", {"
 def test_so_it_does_by_every_method_and_law_however_the_column_is_drawn(law, numerics, against):
     at = times(fvsolve.run(slam_curve_column(3.0, numerics, law, against)))
     near = 1e-6 if law == "linear" else 1e-3  # compressibility
-    assert 3.0 * (at["shuts"] - at["flow reverses"]) == pytest.approx(np.interp(3.0, RATES, VELOCITIES), rel=near)
+    assert 3.0 * (at["shuts"] - at["flow reverses"]) == pytest.approx(
+        np.interp(3.0, RATES, VELOCITIES), rel=near
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -556,9 +735,20 @@ def test_in_a_main_joukowskys_jump_follows_its_slam(law):
     v, d, speed = 0.3, 1.5, 1000.0
     fall = {"time": [0.0, 0.1, 0.6], "value": [9e5, 9e5, 9e5 - 0.5 * RHO * speed * d]}
     nodes = {"up": reservoir(fall), "mid": junction(), "town": junction(v * area(BORE))}
-    links = {"check": slam_curve_case("up", "mid"), "main": pipe("mid", "town", 500.0, BORE, speed, 500)}
+    links = {
+        "check": slam_curve_case("up", "mid"),
+        "main": pipe("mid", "town", 500.0, BORE, speed, 500),
+    }
     numerics = {"scheme": "upwind", "method": "euler", "courant": 1.0}
-    case = scene(nodes, links, 0.5, numerics, ["check.flow", "mid.pressure"], 1e-3, fluid=WATER | {"law": law})
+    case = scene(
+        nodes,
+        links,
+        0.5,
+        numerics,
+        ["check.flow", "mid.pressure"],
+        1e-3,
+        fluid=WATER | {"law": law},
+    )
     result = fvsolve.run(case)
     at, wanted = times(result), float(np.interp(d, RATES, VELOCITIES))
     assert at["flow reverses"] == pytest.approx(0.1 + v / d, abs=2e-3)
@@ -598,10 +788,22 @@ def test_faults_of_its_curve_are_reported(wrong, said):
 
 
 def test_its_energy_closes_through_a_slam_and_it_only_dissipates():
-    nodes = {"up": reservoir({"time": [0.0, 0.05, 0.35], "value": [9e5, 9e5, 3e5]}), "mid": junction()}
+    nodes = {
+        "up": reservoir({"time": [0.0, 0.05, 0.35], "value": [9e5, 9e5, 3e5]}),
+        "mid": junction(),
+    }
     nodes["town"] = junction(0.3 * area(BORE))
-    links = {"check": slam_curve_case("up", "mid"), "main": pipe("mid", "town", 200.0, BORE, 1000.0, 20)}
-    case = scene(nodes, links, 0.6, {"scheme": "upwind3", "method": "dormand-prince", "rtol": 1e-8}, ["check.flow"])
+    links = {
+        "check": slam_curve_case("up", "mid"),
+        "main": pipe("mid", "town", 200.0, BORE, 1000.0, 20),
+    }
+    case = scene(
+        nodes,
+        links,
+        0.6,
+        {"scheme": "upwind3", "method": "dormand-prince", "rtol": 1e-8},
+        ["check.flow"],
+    )
     assert "shuts" in times(fvsolve.run(case))
     found = energy(case)
     scheme = sum(taken[-1] for taken in found.scheme.values())

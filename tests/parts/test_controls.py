@@ -32,7 +32,9 @@ LAWS = [WATER, {**WATER, "law": "log"}, REAL]
 def solved(rates, y, times):
     """Solution of dy/dt = rates(t, y, k) over intervals number k between given times, by SciPy."""
     for k, (start, end) in enumerate(zip(times, times[1:], strict=False)):
-        found = solve_ivp(lambda t, y, k=k: rates(t, y, k), (start, end), y, "DOP853", rtol=1e-12, atol=1e-13)
+        found = solve_ivp(
+            lambda t, y, k=k: rates(t, y, k), (start, end), y, "DOP853", rtol=1e-12, atol=1e-13
+        )
         y = found.y[:, -1]
     return y
 
@@ -56,8 +58,17 @@ def test_a_level_controlled_by_pi_follows_the_explicit_equations(method):
 def test_pid_with_limits_and_tracking_follows_the_explicit_equations(method):
     gain, ti, td, n, b, c, tt = 1.5, 60.0, 8.0, 6.0, 0.7, 0.3, 25.0
     steps = {"time": [0.0, 20.0, 120.0], "value": [4.0, 4.6, 4.2], "kind": "step"}
-    control = pi(steps, gain, ti, derivative_time=td, derivative_filter=n, setpoint_weight=b, derivative_weight=c,
-                 tracking_time=tt, limits=[0.1, 0.6]) | {"type": "pid"}  # fmt: skip
+    control = pi(
+        steps,
+        gain,
+        ti,
+        derivative_time=td,
+        derivative_filter=n,
+        setpoint_weight=b,
+        derivative_weight=c,
+        tracking_time=tt,
+        limits=[0.1, 0.6],
+    ) | {"type": "pid"}
 
     def rates(t, y, k):
         level, integral, lagged = y
@@ -66,7 +77,11 @@ def test_pid_with_limits_and_tracking_follows_the_explicit_equations(method):
         v = gain * (b * setpoint - level) + integral + gain * n * (z - lagged)
         u = min(max(v, 0.1), 0.6)
         flow = orifice_flow(u, SUPPLY - level) - orifice_flow(0.5, level)
-        return [flow / SECTION, gain * (setpoint - level) / ti + (u - v) / tt, (z - lagged) * n / td]
+        return [
+            flow / SECTION,
+            gain * (setpoint - level) / ti + (u - v) / tt,
+            (z - lagged) * n / td,
+        ]
 
     start = [4.0, 0.25 - gain * (b * 4.0 - 4.0), (c - 1.0) * 4.0]
     level = solved(rates, start, [0.0, 20.0, 120.0, 300.0])[0]
@@ -78,12 +93,26 @@ def test_pid_with_limits_and_tracking_follows_the_explicit_equations(method):
 def test_pi_on_two_lags_without_any_fluid_is_the_step_response_of_its_equations(method):
     step = {"time": [0.0, 1.0], "value": [0.0, 1.0], "kind": "step"}
     controls = {
-        "plant": {"type": "transfer-function", "input": "controls.loop", "numerator": [1.0],
-                  "denominator": [0.05, 0.6, 1.0]},
-        "loop": {"type": "pi", "input": "controls.plant", "setpoint": step, "gain": 5.0, "integral_time": 0.4},
-    }  # fmt: skip
-    case = {"schema": 1, "controls": controls, "numerics": {"end": 5.0},
-            "output": {"probes": ["controls.plant.output", "controls.loop.error"]}}  # fmt: skip
+        "plant": {
+            "type": "transfer-function",
+            "input": "controls.loop",
+            "numerator": [1.0],
+            "denominator": [0.05, 0.6, 1.0],
+        },
+        "loop": {
+            "type": "pi",
+            "input": "controls.plant",
+            "setpoint": step,
+            "gain": 5.0,
+            "integral_time": 0.4,
+        },
+    }
+    case = {
+        "schema": 1,
+        "controls": controls,
+        "numerics": {"end": 5.0},
+        "output": {"probes": ["controls.plant.output", "controls.loop.error"]},
+    }
     found = final(case, method)
     assert list(final({**case, "fluid": {"name": "ISO VG 46"}}, method)) == list(found)
 
@@ -102,8 +131,13 @@ def lagged() -> list[float]:
     def rates(t, y, k):
         level, lag = y  # G = (2 s + 1) / (20 s + 1) = 0.1 + 0.9 / (20 s + 1)
         e = 0.1 * level + lag
-        u = min(0.6, max(0.1, 0.25 + 1.5 * (4.0 - level) + 0.2 * e)) + (0.02 * np.sin(t / 7.0) if k == 0 else 0.0)
-        return [(orifice_flow(u, SUPPLY - level) - orifice_flow(0.5, level)) / SECTION, (0.9 * level - lag) / 20.0]
+        u = min(0.6, max(0.1, 0.25 + 1.5 * (4.0 - level) + 0.2 * e)) + (
+            0.02 * np.sin(t / 7.0) if k == 0 else 0.0
+        )
+        return [
+            (orifice_flow(u, SUPPLY - level) - orifice_flow(0.5, level)) / SECTION,
+            (0.9 * level - lag) / 20.0,
+        ]
 
     fine = {"rtol": 1e-11, "atol": 1e-13, "max_step": 0.05}
     y = [3.5, 0.9 * 3.5]
@@ -116,13 +150,23 @@ def lagged() -> list[float]:
 def test_a_formula_of_level_and_lagged_level_follows_the_explicit_equations(method):
     formula = "min(0.6, max(0.1, 0.25 + 1.5*(4 - h) + 0.2*e)) + 0.02*sin(t/7)*where(t < 50, 1, 0)"
     controls = {
-        "act": {"type": "function", "inputs": {"h": "tower.level", "e": "controls.lag"}, "formula": formula},
-        "lag": {"type": "transfer-function", "input": "tower.level", "numerator": [2.0, 1.0],
-                "denominator": [20.0, 1.0]},
-    }  # fmt: skip
+        "act": {
+            "type": "function",
+            "inputs": {"h": "tower.level", "e": "controls.lag"},
+            "formula": formula,
+        },
+        "lag": {
+            "type": "transfer-function",
+            "input": "tower.level",
+            "numerator": [2.0, 1.0],
+            "denominator": [20.0, 1.0],
+        },
+    }
     y = lagged()
     found = final(tower({"control": "act"}, 0.5, 3.5, 200.0, controls=controls), method)
-    assert found[0] == pytest.approx(y[0], abs=CLOSE) and found[2] == pytest.approx(0.1 * y[0] + y[1], abs=CLOSE)
+    assert found[0] == pytest.approx(y[0], abs=CLOSE) and found[2] == pytest.approx(
+        0.1 * y[0] + y[1], abs=CLOSE
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -134,8 +178,14 @@ def test_a_table_is_a_monotone_cubic_held_beyond_its_ends(method):
         u = float(curve(np.clip(y[0], 3.6, 4.05)))
         return [(orifice_flow(u, SUPPLY - y[0]) - orifice_flow(0.5, y[0])) / SECTION]
 
-    level = solve_ivp(rates, (0.0, 100.0), [3.5], "Radau", rtol=1e-11, atol=1e-13, max_step=0.05).y[0, -1]
-    control = {"type": "table", "input": "tower.level", "table": {"input": inputs, "output": outputs}}
+    level = solve_ivp(rates, (0.0, 100.0), [3.5], "Radau", rtol=1e-11, atol=1e-13, max_step=0.05).y[
+        0, -1
+    ]
+    control = {
+        "type": "table",
+        "input": "tower.level",
+        "table": {"input": inputs, "output": outputs},
+    }
     found = final(tower({"control": "act"}, 0.5, 3.5, 100.0, controls={"act": control}), method)
     assert found == pytest.approx([level, float(curve(level))], abs=CLOSE)
 
@@ -152,7 +202,13 @@ def test_a_force_that_holds_a_mass_is_decided_after_the_nodes(method):
         "drag": {"type": "damper", "from": "wall", "to": "body", "damping": 2.0},
     }
     setpoint = {"time": [0.0, 1.0], "value": [0.5, 0.8], "kind": "step"}
-    control = {"type": "pid", "input": "body.position", "setpoint": setpoint, "gain": "40 N/m", "derivative_time": 0.5}
+    control = {
+        "type": "pid",
+        "input": "body.position",
+        "setpoint": setpoint,
+        "gain": "40 N/m",
+        "derivative_time": 0.5,
+    }
     case = scene(nodes, links, 4.0, {}, ["body.position"], 0.1, controls={"hold": control})
 
     def rates(t, y, k):
@@ -166,20 +222,49 @@ def test_a_force_that_holds_a_mass_is_decided_after_the_nodes(method):
 
 def moving_case(law):
     """Case of a pump whose speed holds the filtered pressure behind a pipe, and a demand that follows a formula."""
-    nodes = {"lake": lake(5.0, elevation=0.0), "a": {"type": "junction", "elevation": 0.0},
-             "b": {"type": "chamber", "volume": 0.2, "elevation": 0.0},
-             "out": reservoir({"control": "back"}, elevation=0.0)}  # fmt: skip
+    nodes = {
+        "lake": lake(5.0, elevation=0.0),
+        "a": {"type": "junction", "elevation": 0.0},
+        "b": {"type": "chamber", "volume": 0.2, "elevation": 0.0},
+        "out": reservoir({"control": "back"}, elevation=0.0),
+    }
     links = {
-        "pump": {"type": "pump", "from": "lake", "to": "a", "speed": {"control": "hold"},
-                 "curve": {"flow": [0.0, 0.02, 0.04], "head": [40.0, 34.0, 16.0]}},
-        "main": pipe("a", "b", 60.0, 0.1, 1000.0, 6), "gate": valve("b", "out", 8e-4),
-    }  # fmt: skip
-    hold = {"type": "pi", "input": "b.pressure", "setpoint": "2.2 bar", "gain": "0.02 1/bar", "integral_time": 0.5,
-            "filter": 0.05, "limits": [0.2, 1.5]}  # fmt: skip
-    back = {"type": "function", "formula": "1.2 + 0.3*where(t > 1, sin(t - 1), 0)", "unit": "bar", "limits": [1e5, 2e5]}
+        "pump": {
+            "type": "pump",
+            "from": "lake",
+            "to": "a",
+            "speed": {"control": "hold"},
+            "curve": {"flow": [0.0, 0.02, 0.04], "head": [40.0, 34.0, 16.0]},
+        },
+        "main": pipe("a", "b", 60.0, 0.1, 1000.0, 6),
+        "gate": valve("b", "out", 8e-4),
+    }
+    hold = {
+        "type": "pi",
+        "input": "b.pressure",
+        "setpoint": "2.2 bar",
+        "gain": "0.02 1/bar",
+        "integral_time": 0.5,
+        "filter": 0.05,
+        "limits": [0.2, 1.5],
+    }
+    back = {
+        "type": "function",
+        "formula": "1.2 + 0.3*where(t > 1, sin(t - 1), 0)",
+        "unit": "bar",
+        "limits": [1e5, 2e5],
+    }
     controls = {"hold": hold, "back": back}
-    return scene(nodes, links, 3.0, {}, ["b.pressure", "controls.hold.output"], 0.01,
-                 fluid=law, controls=controls)  # fmt: skip
+    return scene(
+        nodes,
+        links,
+        3.0,
+        {},
+        ["b.pressure", "controls.hold.output"],
+        0.01,
+        fluid=law,
+        controls=controls,
+    )
 
 
 @pytest.mark.in_turn
@@ -197,7 +282,11 @@ def test_a_loop_at_rest_does_not_change_any_bit(method, law):
         assert np.ptp(run[probe]) <= rounding * run[probe][0]
 
 
-NO_NUMBERS = ["0.1 + 0.1*log(h - 3.5)", "min(0.6, max(0.05, log(h - 3.5)))", "where(log(h - 3.5) < 5, 0.05, 0.6)"]
+NO_NUMBERS = [
+    "0.1 + 0.1*log(h - 3.5)",
+    "min(0.6, max(0.05, log(h - 3.5)))",
+    "where(log(h - 3.5) < 5, 0.05, 0.6)",
+]
 
 
 @pytest.mark.parametrize("numerics", [{"method": method, "rtol": 1e-8} for method in METHODS]
@@ -226,7 +315,9 @@ def test_an_output_that_is_no_number_ends_the_run_whatever_it_drives(driven, mon
     case = {key: case[key] for key in case if key not in ("expect", "compare", "limits", "output")}
     end = 0.05 if "push" in case.get("links", ()) else 5.0
     case |= {"numerics": {"end": end, "method": "dormand-prince", "rtol": 1e-7}}
-    with pytest.raises(CaseError, match=r"controls.act.formula: .* at t = (2.5|0.025)\d* s is not a finite number"):
+    with pytest.raises(
+        CaseError, match=r"controls.act.formula: .* at t = (2.5|0.025)\d* s is not a finite number"
+    ):
         fvsolve.run(case)
     # a block with inputs is not searched before the run: without the search this block ends the run as one with inputs
     monkeypatch.setattr(Program, "pole_fault", lambda *_: "")
@@ -251,7 +342,9 @@ def test_outputs_that_follow_from_levels_and_setpoints_need_no_search(monkeypatc
     output = result["controls.loop.output"]
     assert output[0] == pytest.approx(0.5, abs=1e-12)
     away = np.abs(result.t - 60.0) > 1e-6  # a jump has two rows
-    assert output[away] == pytest.approx(np.clip(0.5 * (level - setpoint), 0.0, 1.0)[away], abs=1e-9)
+    assert output[away] == pytest.approx(
+        np.clip(0.5 * (level - setpoint), 0.0, 1.0)[away], abs=1e-9
+    )
 
 
 def test_a_stated_initial_output_is_that_at_the_start():
@@ -263,21 +356,37 @@ def test_a_stated_initial_output_is_that_at_the_start():
 PROPORTIONAL = {  # u = 2 (4 - x): 2 at the start, where the limit is 1
     "pi": pi(4.0, 2.0, None),
     "function": {"type": "function", "inputs": {"x": "tower.level"}, "formula": "2*(4 - x)"},
-    "table": {"type": "table", "input": "tower.level", "table": {"input": [2.0, 6.0], "output": [4.0, -4.0]}},
-    "transfer-function": {"type": "transfer-function", "input": "controls.error", "numerator": [2.0],
-                          "denominator": [1e-9, 1.0]},
-}  # fmt: skip
+    "table": {
+        "type": "table",
+        "input": "tower.level",
+        "table": {"input": [2.0, 6.0], "output": [4.0, -4.0]},
+    },
+    "transfer-function": {
+        "type": "transfer-function",
+        "input": "controls.error",
+        "numerator": [2.0],
+        "denominator": [1e-9, 1.0],
+    },
+}
 
 
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [*((kind, "radau-iia-5") for kind in PROPORTIONAL), ("pi", "rodas-5p"), ("pi", "dormand-prince")],
+    [
+        *((kind, "radau-iia-5") for kind in PROPORTIONAL),
+        ("pi", "rodas-5p"),
+        ("pi", "dormand-prince"),
+    ],
 )
 def test_a_law_that_begins_beyond_its_limits_is_followed_when_it_comes_back(kind, method):
     error = {"type": "function", "inputs": {"x": "tower.level"}, "formula": "4 - x"}
-    controls = {"hold": PROPORTIONAL[kind]} | ({"error": error} if kind == "transfer-function" else {})
+    controls = {"hold": PROPORTIONAL[kind]} | (
+        {"error": error} if kind == "transfer-function" else {}
+    )
     limits = {} if kind != "table" else {"limits": [0.0, 1.0]}
-    case = tower({"control": "hold"}, 0.3, 3.0, controls=controls | {"hold": controls["hold"] | limits})
+    case = tower(
+        {"control": "hold"}, 0.3, 3.0, controls=controls | {"hold": controls["hold"] | limits}
+    )
 
     def rates(t, y, k):
         u = min(max(2.0 * (4.0 - y[0]), 0.0), 1.0)
@@ -306,7 +415,9 @@ def test_initial_of_a_function_leaves_no_offset(period):
         ("max(0, min(1, (t - 3600)/60))", 86400.0, math.inf), ("t^2", 3.0, math.inf),
     ],
 )  # fmt: skip
-def test_the_period_of_a_formula_is_that_of_its_waves_not_of_jumps_or_plateaus(formula, end, period):
+def test_the_period_of_a_formula_is_that_of_its_waves_not_of_jumps_or_plateaus(
+    formula, end, period
+):
     assert period_of(Program(formula), 0.0, end) == pytest.approx(period, rel=0.02)
 
 
@@ -321,10 +432,15 @@ def test_explicit_and_implicit_methods_agree_on_a_pump_a_pipe_and_a_filter_under
 
 @pytest.mark.parametrize("law", LAWS, ids=["linear", "log", "table"])
 def test_the_pattern_of_the_jacobian_contains_inputs_and_targets_of_blocks(law):
-    for case in (moving_case(law), tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0, filter=3.0)})):
+    for case in (
+        moving_case(law),
+        tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0, filter=3.0)}),
+    ):
         model = fvsolve.build(fvsolve.load(case))
         pattern = jacobian_pattern(model).toarray()[: model.y_size].astype(bool)
-        y = model.start + 1e-3 * model.scale * np.random.default_rng(1).standard_normal(model.y_size)
+        y = model.start + 1e-3 * model.scale * np.random.default_rng(1).standard_normal(
+            model.y_size
+        )
         jacobian = model.jacobian(0.1, y)
         small = 1e-9 * np.abs(jacobian).max(axis=1, keepdims=True)
         assert not (np.abs(jacobian) > small)[~pattern].any()
@@ -336,19 +452,52 @@ def test_restated_loops_have_the_same_result(method):
     steps = {"time": [0.0, 20.0], "value": [4.0, 4.1], "kind": "step"}
     plain = tower({"control": "hold"}, 0.5, controls={"hold": pi(steps)})
     found = final(plain, method)[0]
-    turned = {**plain, "nodes": dict(reversed(plain["nodes"].items())), "links": dict(reversed(plain["links"].items()))}
+    turned = {
+        **plain,
+        "nodes": dict(reversed(plain["nodes"].items())),
+        "links": dict(reversed(plain["links"].items())),
+    }
     assert final(turned, method)[0] == pytest.approx(found, abs=1e-12)
-    error = {"type": "function", "inputs": {"h": "tower.level"}, "formula": "where(t < 20, 4.0, 4.1) - h"}
-    as_transfer = {"error": error, "hold": {"type": "transfer-function", "input": "controls.error",
-                                            "numerator": [0.8, 0.8 / 120.0], "denominator": [1.0, 0.0]}}  # fmt: skip
-    assert final(tower({"control": "hold"}, 0.5, controls=as_transfer), method)[0] == pytest.approx(found, abs=CLOSE)
-    summed = {"hold": {"type": "function", "inputs": {"e": "controls.error", "i": "controls.integral"},
-                       "formula": "0.8*e + i"},
-              "integral": {"type": "transfer-function", "input": "controls.error", "numerator": [0.8 / 120.0],
-                           "denominator": [1.0, 0.0]}, "error": error}  # fmt: skip
-    assert final(tower({"control": "hold"}, 0.5, controls=summed), method)[0] == pytest.approx(found, abs=CLOSE)
-    centimetres = pi({"time": [0.0, 20.0], "value": ["400 cm", "410 cm"], "kind": "step"}, "0.008 1/cm", "2 min")
-    assert final(tower({"control": "hold"}, 0.5, controls={"hold": centimetres}), method)[0] == found
+    error = {
+        "type": "function",
+        "inputs": {"h": "tower.level"},
+        "formula": "where(t < 20, 4.0, 4.1) - h",
+    }
+    as_transfer = {
+        "error": error,
+        "hold": {
+            "type": "transfer-function",
+            "input": "controls.error",
+            "numerator": [0.8, 0.8 / 120.0],
+            "denominator": [1.0, 0.0],
+        },
+    }
+    assert final(tower({"control": "hold"}, 0.5, controls=as_transfer), method)[0] == pytest.approx(
+        found, abs=CLOSE
+    )
+    summed = {
+        "hold": {
+            "type": "function",
+            "inputs": {"e": "controls.error", "i": "controls.integral"},
+            "formula": "0.8*e + i",
+        },
+        "integral": {
+            "type": "transfer-function",
+            "input": "controls.error",
+            "numerator": [0.8 / 120.0],
+            "denominator": [1.0, 0.0],
+        },
+        "error": error,
+    }
+    assert final(tower({"control": "hold"}, 0.5, controls=summed), method)[0] == pytest.approx(
+        found, abs=CLOSE
+    )
+    centimetres = pi(
+        {"time": [0.0, 20.0], "value": ["400 cm", "410 cm"], "kind": "step"}, "0.008 1/cm", "2 min"
+    )
+    assert (
+        final(tower({"control": "hold"}, 0.5, controls={"hold": centimetres}), method)[0] == found
+    )
 
 
 @pytest.mark.in_turn
@@ -365,16 +514,29 @@ def test_restated_loops_have_the_same_result(method):
     ids=["wave", "ramp", "jump", "kink"],
 )  # fmt: skip
 def test_a_formula_is_the_schedule_that_it_states(method, formula, schedule):
-    by_formula, by_schedule = (final(tower(0.25, outlet, end=60.0), method)[0] for outlet in (formula, schedule))
+    by_formula, by_schedule = (
+        final(tower(0.25, outlet, end=60.0), method)[0] for outlet in (formula, schedule)
+    )
     assert by_formula == pytest.approx(by_schedule, abs=CLOSE)
 
 
 def test_a_formula_with_a_unit_is_that_of_its_si_value():
     case = tower(0.25, 0.3)
-    case["nodes"]["town"] = {"type": "inflow", "flow": {"formula": "-2 - sin(t/30)", "unit": "l/s"}, "elevation": 0.0}
-    si = {**case, "nodes": {**case["nodes"], "town": {"type": "inflow", "flow": "-2e-3 - 1e-3*sin(t/30)",
-                                                      "elevation": 0.0}}}  # fmt: skip
-    assert final(case, "dormand-prince")[0] == pytest.approx(final(si, "dormand-prince")[0], abs=1e-12)
+    case["nodes"]["town"] = {
+        "type": "inflow",
+        "flow": {"formula": "-2 - sin(t/30)", "unit": "l/s"},
+        "elevation": 0.0,
+    }
+    si = {
+        **case,
+        "nodes": {
+            **case["nodes"],
+            "town": {"type": "inflow", "flow": "-2e-3 - 1e-3*sin(t/30)", "elevation": 0.0},
+        },
+    }
+    assert final(case, "dormand-prince")[0] == pytest.approx(
+        final(si, "dormand-prince")[0], abs=1e-12
+    )
 
 
 def test_a_formula_drives_a_joint_with_its_slopes():
@@ -390,7 +552,10 @@ def test_a_formula_drives_a_joint_with_its_slopes():
         }
     }
     wave = {**nodes["arm"], "joint": {**joint, "angle": "0.4*sin(t)"}}
-    for body, angle, rate in ((nodes["arm"], lambda t: 0.1 * t * t, 0.2), (wave, lambda t: 0.4 * math.sin(t), None)):
+    for body, angle, rate in (
+        (nodes["arm"], lambda t: 0.1 * t * t, 0.2),
+        (wave, lambda t: 0.4 * math.sin(t), None),
+    ):
         case = scene({"arm": body}, {}, 1.3, {"rtol": 1e-10}, ["arm.angle", "arm.joint_ty"], 0.1)
         run = fvsolve.run(case)
         change = rate if rate is not None else -0.4 * math.sin(1.3)
@@ -406,7 +571,9 @@ def test_linearise_knows_the_slopes_of_formulas():
         "formula": "0.02*h^2 + where(t < 1, 0, 0.3)",
         "filter": 9.0,
     }
-    system = linearise(tower({"control": "act"}, 0.9, controls={"act": act}), inputs=["outlet.opening"], at=0.0)
+    system = linearise(
+        tower({"control": "act"}, 0.9, controls={"act": act}), inputs=["outlet.opening"], at=0.0
+    )
     mass_flow = WATER["density"] * orifice_flow(1.0, SUPPLY - 4.0)
     assert system.a[0, 1] == pytest.approx(0.16 * mass_flow, rel=1e-7)
 
@@ -415,7 +582,9 @@ def test_linearise_cuts_a_loop_at_its_output():
     """Return ratio of a PI on a tank: its output over its output, L = -K (1 + 1 / (Ti s)) B / (s - a)."""
     case = tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})
     system = linearise(
-        case, ["controls.hold.output", "controls.hold.setpoint"], ["tower.level", "controls.hold.output"]
+        case,
+        ["controls.hold.output", "controls.hold.setpoint"],
+        ["tower.level", "controls.hold.output"],
     )
     slope = orifice_flow(1.0, 16.0)  # d flow / d opening
     loss = -(orifice_flow(0.25, 16.0) / 32.0 + orifice_flow(0.5, 4.0) / 8.0) / SECTION
@@ -438,14 +607,18 @@ def test_advance_knows_outputs_and_setpoints_as_inputs():
     assert held.y[0] == pytest.approx(free.y[0], rel=1e-9)
     moved = fvsolve.advance(model, start, 50.0, {"controls.hold.setpoint": 4.2})
     step = {"time": [-1.0, 0.0], "value": [4.0, 4.2], "kind": "step"}
-    stepped = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(step)})))
+    stepped = fvsolve.build(
+        fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(step)}))
+    )
     bumped = fvsolve.advance(stepped, fvsolve.initial_state(stepped), 50.0)
     assert moved.y == pytest.approx(bumped.y, rel=1e-9)
 
 
 @pytest.mark.parametrize("method", ["ssp-rk3", "rodas-5p", "auto"])
 def test_a_killed_and_resumed_loop_is_the_unbroken_run(tmp_path, method):
-    case = fvsolve.load(moving_case(WATER), {"numerics.method": method, "numerics.end": 60.0, "output.every": 1.0})
+    case = fvsolve.load(
+        moving_case(WATER), {"numerics.method": method, "numerics.end": 60.0, "output.every": 1.0}
+    )
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)
     assert whole.ok
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 20.0))

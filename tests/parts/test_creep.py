@@ -19,16 +19,28 @@ LENGTH, BORE, WALL, FLOW, START = 400.0, 0.05, 0.0063, 1e-3, 0.1
 ELEMENTS = {"compliance": [1e-10, 2e-10, 3e-10], "time": [0.05, 0.5, 3.0]}
 
 
-def line(cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS, **numerics) -> dict:
+def line(
+    cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS, **numerics
+) -> dict:
     """Return a case of a plastic pipe between a reservoir and a demand that stops."""
     s = np.linspace(0.0, 1.0, 400)
     stop = 1.0 - s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
     demand = {"time": (START + 0.4 * s).tolist(), "value": (FLOW * stop).tolist(), "kind": "smooth"}
     if kind == "step":
         demand = {"time": [0.0, START], "value": [FLOW, 0.0], "kind": "step"}
-    wall = {"youngs_modulus": 1.43e9, "thickness": WALL} | ({} if creep is None else {"creep": creep})
-    pipe = {"type": "pipe", "from": "lake", "to": "gate", "length": LENGTH, "diameter": BORE, "cells": cells,
-            "wall": wall, "friction": {"model": "none"}}  # fmt: skip
+    wall = {"youngs_modulus": 1.43e9, "thickness": WALL} | (
+        {} if creep is None else {"creep": creep}
+    )
+    pipe = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "gate",
+        "length": LENGTH,
+        "diameter": BORE,
+        "cells": cells,
+        "wall": wall,
+        "friction": {"model": "none"},
+    }
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8} | numerics
     numerics = {key: value for key, value in numerics.items() if value is not None}
     nodes = {"lake": reservoir(1e6, elevation=0.0), "gate": junction(demand, elevation=0.0)}
@@ -55,8 +67,10 @@ def error(*given, **more) -> float:
 
 def test_the_exact_line_is_that_of_another_inversion():
     run, probe, jump, travel = solved(line(5, "step"))
-    share = [(BORE / WALL * WATER["density"] * (LENGTH / travel) ** 2 * compliance, time / travel)
-             for compliance, time in zip(*ELEMENTS.values(), strict=True)]  # fmt: skip
+    share = [
+        (BORE / WALL * WATER["density"] * (LENGTH / travel) ** 2 * compliance, time / travel)
+        for compliance, time in zip(*ELEMENTS.values(), strict=True)
+    ]
     ages = np.array([0.01, 0.5, 1.9, 2.1, 3.3])
     found = (probe(0, START + ages * travel) - float(run["gate.pressure"][0])) / jump
     assert found == approx([stopped_lines.creep_jump(share, age) for age in ages], abs=1e-8)
@@ -84,7 +98,9 @@ def test_other_methods_and_schemes_find_the_same(numerics):
 @pytest.mark.parametrize(("law", "cells"), [("log", 40), ("table", 40), ("mixture", 160)])
 def test_under_other_laws_small_waves_are_those_of_the_linear_law(law, cells):
     fluid = {"name": "Water", "temperature": 293.15, "law": "linear"}
-    of_law = {**fluid, "law": law} | ({"air_fraction": 1e-7, "cavitation": True} if law == "mixture" else {})
+    of_law = {**fluid, "law": law} | (
+        {"air_fraction": 1e-7, "cavitation": True} if law == "mixture" else {}
+    )
     found = []
     for one in (fluid, of_law):
         case = {**line(cells, end=3.0, scheme="muscl", method="ssp-rk3", courant=0.5), "fluid": one}
@@ -99,7 +115,13 @@ def test_under_other_laws_small_waves_are_those_of_the_linear_law(law, cells):
 
 def test_a_wall_that_creeps_shrinks_about_a_cavity_and_no_liquid_is_lost():
     case = line(40, end=3.0, scheme="muscl", method="ssp-rk2", courant=0.5)
-    case["fluid"] = {"name": "Water", "temperature": 293.15, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
+    case["fluid"] = {
+        "name": "Water",
+        "temperature": 293.15,
+        "law": "mixture",
+        "air_fraction": 1e-6,
+        "cavitation": True,
+    }
     case["nodes"]["lake"]["pressure"] = 2e5
     demand = case["nodes"]["gate"]["demand"]
     demand["value"] = [value - FLOW for value in demand["value"]]  # flow out of the line begins
@@ -141,20 +163,29 @@ def test_its_energy_is_accounted_and_never_created():
 
 def test_under_other_laws_too_and_the_residual_of_a_law_has_a_line_of_its_own():
     """The law loss belongs to liquid of reference density in the wider bore; the scheme loss falls with the cells."""
-    linear, *other = [energy(falling_line(cells, law)) for cells, law in ((60, "linear"), (30, "log"), (60, "log"))]
+    linear, *other = [
+        energy(falling_line(cells, law))
+        for cells, law in ((60, "linear"), (30, "log"), (60, "log"))
+    ]
     taken = np.array(other[1].dissipated["main creep"])
-    assert taken[-1] == approx(linear.dissipated["main creep"][-1], rel=0.02) and np.all(np.diff(taken) >= 0.0)
+    assert taken[-1] == approx(linear.dissipated["main creep"][-1], rel=0.02) and np.all(
+        np.diff(taken) >= 0.0
+    )
     left = [one.scheme["main"][-1] for one in other]
     assert abs(left[1]) < abs(left[0]) / 8.0 and abs(left[1]) < 2e-6 * other[1].throughput
     law = other[1].law["main"][-1]
     assert abs(law) < 5e-3 * taken[-1] and law == approx(other[0].law["main"][-1], rel=1e-3)
-    assert other[1].remainder[-1] == approx(law + left[1] + other[1].step[-1] + other[1].newton[-1], abs=1e-9)
+    assert other[1].remainder[-1] == approx(
+        law + left[1] + other[1].step[-1] + other[1].newton[-1], abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_energy_stored_in_the_wall_is_part_of_the_available_energy(law):
     cases = [line(10, end=0.1, creep=creep) for creep in (ELEMENTS, None)]
-    held = [energy(case | {"fluid": case["fluid"] | {"law": law}}).at_start["main"] for case in cases]
+    held = [
+        energy(case | {"fluid": case["fluid"] | {"law": law}}).at_start["main"] for case in cases
+    ]
     volume, elastic = area(BORE) * LENGTH, 1e6 - 101325.0
     if law == "log":
         elastic -= 0.5 * WATER["density"] * (FLOW / area(BORE)) ** 2  # dynamic pressure
@@ -174,11 +205,14 @@ def test_its_port_is_the_impedance_of_the_exact_line_and_passive():
     speed = case.wave_speed("main")
     s = 1j * np.array([0.2, 0.7, 1.5, 2.3]) * speed / LENGTH
     share = BORE / WALL * WATER["density"] * speed**2
-    swelling = 1.0 + sum(share * j / (1.0 + tau * s) for j, tau in zip(*ELEMENTS.values(), strict=True))
+    swelling = 1.0 + sum(
+        share * j / (1.0 + tau * s) for j, tau in zip(*ELEMENTS.values(), strict=True)
+    )
     root = np.sqrt(swelling)
     exact_z = WATER["density"] * speed / area(BORE) / root * np.tanh(s * LENGTH / speed * root)
     assert found.transfer(s) == approx(exact_z, rel=1e-4)
-    assert found.verdict.positive_real is not False and not found.verdict.dips  # lossless at frequencies 0 and inf
+    # lossless at frequencies 0 and inf
+    assert found.verdict.positive_real is not False and not found.verdict.dips
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -201,7 +235,10 @@ def test_a_wall_of_no_elements_has_no_state_and_elements_that_give_nothing_chang
     none = fvsolve.build(fvsolve.load(line(9, creep=None)))
     assert none.y_size == 18 and not none.creeps
     small = {"compliance": ["1e-21 1/GPa"], "time": [1.0]}
-    one, other = (np.array(fvsolve.run(line(20, end=1.0, creep=creep))["gate.pressure"]) for creep in (None, small))
+    one, other = (
+        np.array(fvsolve.run(line(20, end=1.0, creep=creep))["gate.pressure"])
+        for creep in (None, small)
+    )
     assert one == approx(other, rel=1e-12)
 
 
@@ -247,9 +284,14 @@ def test_the_shipped_main_without_friction_is_the_transform_of_two_lines_in_seri
 
     def line_of(name, s):
         pipe, speed = case.links[name], case.wave_speed(name)
-        share = [(growth * case.properties.density * speed**2, time) for growth, time in pipe.creep_elements]
+        share = [
+            (growth * case.properties.density * speed**2, time)
+            for growth, time in pipe.creep_elements
+        ]
         root = np.sqrt(1.0 + sum(one / (1.0 + time * s) for one, time in share))
-        return case.properties.density * speed / area(pipe.diameter) / root, np.tanh(s * pipe.length / speed * root)
+        return case.properties.density * speed / area(pipe.diameter) / root, np.tanh(
+            s * pipe.length / speed * root
+        )
 
     def gate(s):
         (upper, first), (lower, second) = line_of("upper", s), line_of("lower", s)

@@ -17,7 +17,9 @@ from fvsolve.studies.energy_balance import energy
 EXACT = 1e-9
 METHODS = ["dormand-prince", "radau-iia-5", "rodas-5p", "auto"]
 FRICTION = {"coulomb": 60.0, "static": 100.0, "stribeck_velocity": 0.01}
-JACK = Jack("linear", mass=8.0, friction=300.0, pressures=(2e6, 2.85e6), extra={"friction": FRICTION})
+JACK = Jack(
+    "linear", mass=8.0, friction=300.0, pressures=(2e6, 2.85e6), extra={"friction": FRICTION}
+)
 END = 0.05
 FEED = 1e-6  # flow into chamber A [m3/s]
 
@@ -26,10 +28,18 @@ def fed(jack=JACK, end=END, law="linear", **more):
     """Cylinder whose chamber A is fed by a constant flow."""
     nodes = {"feed": {"type": "inflow", "flow": FEED}, **jack.nodes()}
     links = {"line": {"type": "valve", "from": "feed", "to": "cyl.A", "area": 1e-7}, **jack.links()}
-    return {"schema": 1, "fluid": replace(jack, law=law).fluid(), "nodes": nodes, "links": links,
-            "numerics": {"end": end, "rtol": 1e-11},
-            "output": {"every": end / 50, "probes": ["load.velocity", "load.position", "cyl.force", "cyl.A.pressure"]},
-            **more}  # fmt: skip
+    return {
+        "schema": 1,
+        "fluid": replace(jack, law=law).fluid(),
+        "nodes": nodes,
+        "links": links,
+        "numerics": {"end": end, "rtol": 1e-11},
+        "output": {
+            "every": end / 50,
+            "probes": ["load.velocity", "load.position", "cyl.force", "cyl.A.pressure"],
+        },
+        **more,
+    }
 
 
 def runs(case, method="dormand-prince", **set):
@@ -78,8 +88,17 @@ def stick_slip(jack, flows, push, times, most):
             ends[0].direction = -direction
         for end in ends:
             end.terminal = True
-        run = solve_ivp(rates, (t, times[-1]), y, "DOP853", events=ends, rtol=1e-13, dense_output=True,
-                        atol=[1e-5, 1e-5, 1e-15, 1e-13], max_step=1e-3)  # fmt: skip
+        run = solve_ivp(
+            rates,
+            (t, times[-1]),
+            y,
+            "DOP853",
+            events=ends,
+            rtol=1e-13,
+            dense_output=True,
+            atol=[1e-5, 1e-5, 1e-15, 1e-13],
+            max_step=1e-3,
+        )
         inside = (times >= t) & (times <= run.t[-1])
         if inside.any():
             found[:, inside] = run.sol(times[inside])
@@ -105,7 +124,9 @@ def test_a_fed_cylinder_tears_off_and_sticks_as_that_of_scipy(method):
     """Stribeck friction: the pressure rises until it tears off, it moves, and sticks again, several times."""
     case = fed()
     run = runs(case, method)
-    exact, events = stick_slip(JACK, fed_flows, lambda t, x, v: 0.0, np.array(run.t), FRICTION["static"])
+    exact, events = stick_slip(
+        JACK, fed_flows, lambda t, x, v: 0.0, np.array(run.t), FRICTION["static"]
+    )
     assert len(events) > 3
     assert [what for _, what in events_of(run)] == [what for _, what in events]
     assert [t for t, _ in events_of(run)] == pytest.approx([t for t, _ in events], abs=END * EXACT)
@@ -119,7 +140,9 @@ def test_a_fed_cylinder_tears_off_and_sticks_as_that_of_scipy(method):
     force = np.array(run["cyl.force"])
     assert np.abs(force[still]).max() < 1e-9  # while it sticks, the friction balances the chambers
     speed = exact[3][~still]
-    sliding = JACK.thrust(*exact[:2, ~still]) - JACK.friction * speed - np.array([dry(v) for v in speed])
+    sliding = (
+        JACK.thrust(*exact[:2, ~still]) - JACK.friction * speed - np.array([dry(v) for v in speed])
+    )
     assert force[~still] == pytest.approx(sliding, abs=1e-4)
 
 
@@ -130,7 +153,9 @@ def in_two(case, share):
     feed = nodes.pop("feed")
     sizes = ("area_A", "area_B", "dead_volume_A", "dead_volume_B", "viscous_friction")
     for name, part in (("cyl", share), ("twin", 1.0 - share)):
-        friction = whole["friction"] | {key: part * whole["friction"][key] for key in ("coulomb", "static")}
+        friction = whole["friction"] | {
+            key: part * whole["friction"][key] for key in ("coulomb", "static")
+        }
         links[name] = whole | {key: part * whole[key] for key in sizes} | {"friction": friction}
         nodes[f"feed_{name}"] = feed | {"flow": part * feed["flow"]}
         links[f"line_{name}"] = line | {"from": f"feed_{name}", "to": f"{name}.A"}
@@ -142,8 +167,12 @@ def in_two(case, share):
 def test_two_cylinders_on_a_mass_stick_and_tear_off_as_their_sum(share, method):
     """Both lock the same mass; each bears a part of the force in proportion to its own greatest force."""
     one, two = runs(fed(), method), runs(in_two(fed(), share), method)
-    assert np.array(two["load.position"]) == pytest.approx(np.array(one["load.position"]), abs=0.2 * EXACT)
-    assert np.array(two["load.velocity"]) == pytest.approx(np.array(one["load.velocity"]), abs=EXACT)
+    assert np.array(two["load.position"]) == pytest.approx(
+        np.array(one["load.position"]), abs=0.2 * EXACT
+    )
+    assert np.array(two["load.velocity"]) == pytest.approx(
+        np.array(one["load.velocity"]), abs=EXACT
+    )
     assert np.array(two["cyl.force"]) == pytest.approx(share * np.array(one["cyl.force"]), abs=1e-4)
     times = [t for t, _ in events_of(one)]
     for name in ("cyl", "twin"):
@@ -154,9 +183,15 @@ def test_two_cylinders_on_a_mass_stick_and_tear_off_as_their_sum(share, method):
 def restated():
     """Other order, ports exchanged (the case moves), other units, `static` as a text, all at once or alone."""
     case, links = fed(), fed()["links"]
-    yield "order", case | {"links": dict(reversed(links.items())), "nodes": dict(reversed(case["nodes"].items()))}
+    yield (
+        "order",
+        case
+        | {"links": dict(reversed(links.items())), "nodes": dict(reversed(case["nodes"].items()))},
+    )
     cylinder = links["cyl"]
-    in_units = cylinder | {"friction": {"coulomb": "0.06 kN", "static": "100 N", "stribeck_velocity": "10 mm/s"}}
+    in_units = cylinder | {
+        "friction": {"coulomb": "0.06 kN", "static": "100 N", "stribeck_velocity": "10 mm/s"}
+    }
     yield "units", case | {"links": links | {"cyl": in_units}}
 
 
@@ -165,7 +200,9 @@ def test_restated_friction_moves_alike(what, case):
     one, other = runs(fed()), runs(case)
     for probe in ("load.position", "load.velocity", "cyl.force"):
         assert np.array(other[probe]) == pytest.approx(np.array(one[probe]), abs=1e-9), what
-    assert [t for t, _ in events_of(other)] == pytest.approx([t for t, _ in events_of(one)], abs=END * EXACT)
+    assert [t for t, _ in events_of(other)] == pytest.approx(
+        [t for t, _ in events_of(one)], abs=END * EXACT
+    )
 
 
 def test_a_cylinder_with_a_moving_case_has_the_same_friction():
@@ -175,24 +212,42 @@ def test_a_cylinder_with_a_moving_case_has_the_same_friction():
     links = fed()["links"]
     links["cyl"] = links["cyl"] | {"ports": {"rod": "ground", "case": "load"}}
     one, other = runs(fed()), runs(fed() | {"nodes": nodes, "links": links})
-    assert np.array(other["load.velocity"]) == pytest.approx(-np.array(one["load.velocity"]), abs=EXACT)
+    assert np.array(other["load.velocity"]) == pytest.approx(
+        -np.array(one["load.velocity"]), abs=EXACT
+    )
     assert np.array(other["cyl.force"]) == pytest.approx(np.array(one["cyl.force"]), abs=1e-4)
-    assert events_of(other) == [(pytest.approx(t, abs=END * EXACT), what) for t, what in events_of(one)]
+    assert events_of(other) == [
+        (pytest.approx(t, abs=END * EXACT), what) for t, what in events_of(one)
+    ]
 
 
 def test_a_cylinder_between_two_masses_sticks_them_together():
     """A force moves both; they part where the inertia of the second exceeds the friction, and stick again."""
-    links = {"cyl": JACK.links()["cyl"] | {"ports": {"rod": "load", "case": "base"}, "friction": {"coulomb": 50.0},
-                                           "viscous_friction": 0.0, "area_A": 1e-6, "area_B": 1e-6,
-                                           "initial_pressure_A": 2e6, "initial_pressure_B": 2e6},
-             "push": {"type": "force", "to": "load", "force": {"time": [0.0, 1.0], "value": [0.0, 200.0]}},
-             "soft": {"type": "spring", "from": "ground", "to": "base", "stiffness": 1e-3}}  # fmt: skip
+    links = {
+        "cyl": JACK.links()["cyl"]
+        | {
+            "ports": {"rod": "load", "case": "base"},
+            "friction": {"coulomb": 50.0},
+            "viscous_friction": 0.0,
+            "area_A": 1e-6,
+            "area_B": 1e-6,
+            "initial_pressure_A": 2e6,
+            "initial_pressure_B": 2e6,
+        },
+        "push": {
+            "type": "force",
+            "to": "load",
+            "force": {"time": [0.0, 1.0], "value": [0.0, 200.0]},
+        },
+        "soft": {"type": "spring", "from": "ground", "to": "base", "stiffness": 1e-3},
+    }
     nodes = JACK.nodes() | {"base": {"type": "mass", "mass": 12.0}}
     case = fed(end=0.8) | {"nodes": nodes, "links": links}
     case["output"]["probes"] = ["load.velocity", "base.velocity"]
     run = runs(case)
     t, load, base = np.array(run.t), np.array(run["load.velocity"]), np.array(run["base.velocity"])
-    tear = 50.0 / (200.0 * 12.0 / 20.0)  # force on the base while both move: share 12 / 20 of the push
+    # force on the base while both move: share 12 / 20 of the push
+    tear = 50.0 / (200.0 * 12.0 / 20.0)
     assert events_of(run)[0] == (pytest.approx(tear, abs=1e-6), "slips forward")
     joined = t < tear
     assert np.array_equal(load[joined], base[joined])
@@ -205,7 +260,9 @@ def test_a_cylinder_between_two_masses_sticks_them_together():
 def test_a_held_load_does_not_move_by_a_bit(law, method):
     """Shut chambers with stated pressures push with less than the force at rest, in either direction."""
     for force in (90.0, -90.0, 0.0):
-        links = JACK.links() | {"push": {"type": "force", "to": "load", "force": force - JACK.thrust(*JACK.pressures)}}
+        links = JACK.links() | {
+            "push": {"type": "force", "to": "load", "force": force - JACK.thrust(*JACK.pressures)}
+        }
         case = fed(end=1.0, law=law) | {"nodes": JACK.nodes(), "links": links}
         run = runs(case, method)
         assert set(run["load.velocity"]) == {0.0} and set(run["load.position"]) == {JACK.x}
@@ -217,8 +274,10 @@ def test_a_held_load_does_not_move_by_a_bit(law, method):
 @pytest.mark.parametrize("force", [90.0, -90.0, 500.0, -500.0])
 def test_an_equilibrium_start_counts_the_friction_that_holds(force, method):
     """A mass stays where friction can hold it; a greater force moves it until its spring and friction hold it."""
-    links = JACK.links() | {"push": {"type": "force", "to": "load", "force": force - JACK.thrust(*JACK.pressures)},
-                            "spring": {"type": "spring", "from": "post", "to": "load", "stiffness": 1e5}}  # fmt: skip
+    links = JACK.links() | {
+        "push": {"type": "force", "to": "load", "force": force - JACK.thrust(*JACK.pressures)},
+        "spring": {"type": "spring", "from": "post", "to": "load", "stiffness": 1e5},
+    }
     nodes = JACK.nodes() | {"post": {"type": "frame", "initial_position": JACK.x}}
     case = fed() | {"nodes": nodes, "links": links}
     case["numerics"]["initial"] = "equilibrium"
@@ -228,7 +287,9 @@ def test_an_equilibrium_start_counts_the_friction_that_holds(force, method):
 
 
 def test_a_force_that_nothing_holds_is_named():
-    links = JACK.links() | {"push": {"type": "force", "to": "load", "force": 150.0 - JACK.thrust(*JACK.pressures)}}
+    links = JACK.links() | {
+        "push": {"type": "force", "to": "load", "force": 150.0 - JACK.thrust(*JACK.pressures)}
+    }
     case = fed() | {"nodes": JACK.nodes(), "links": links}
     case["numerics"]["initial"] = "equilibrium"
     with pytest.raises(CaseError, match="the forces on load balance: 50 N remain; add a spring"):
@@ -237,7 +298,8 @@ def test_a_force_that_nothing_holds_is_named():
 
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
 def test_friction_only_takes_energy_and_the_ledger_closes(method):
-    case = fed(law="log")  # the law `linear` does not conserve energy, which is an account of its own
+    # the law `linear` does not conserve energy, which is an account of its own
+    case = fed(law="log")
     case["numerics"] |= {"method": method, "rtol": 1e-11 if method == "dormand-prince" else 1e-8}
     found = energy(case)
     assert abs(found.remainder).max() < 1e-9 * found.throughput
@@ -277,11 +339,19 @@ def test_a_shut_chamber_holds_the_load_and_the_friction_has_nothing_to_do():
 
 
 FAULTS = [
-    ({"coulomb": 60.0, "static": 50.0}, "links.cyl.friction.static", "is 50 N, below `coulomb`, 60 N"),
+    (
+        {"coulomb": 60.0, "static": 50.0},
+        "links.cyl.friction.static",
+        "is 50 N, below `coulomb`, 60 N",
+    ),
     ({"static": 50.0}, "links.cyl.friction", "coulomb is missing"),
     ({"coulomb": -1.0}, "links.cyl.friction.coulomb", "at least 0"),
     ({"coulomb": 1.0, "stribeck_velocity": 0.0}, "links.cyl.friction.stribeck_velocity", "above 0"),
-    ({"coulomb": 1.0, "stribek_velocity": 0.1}, "links.cyl.friction.stribek_velocity", "did you mean"),
+    (
+        {"coulomb": 1.0, "stribek_velocity": 0.1},
+        "links.cyl.friction.stribek_velocity",
+        "did you mean",
+    ),
     ({"coulomb": "1 m"}, "links.cyl.friction.coulomb", "a force"),
     (3.0, "links.cyl.friction", "is not a table"),
 ]
@@ -297,9 +367,17 @@ def test_faults_of_friction_are_named(friction, place, text):
 
 
 def test_a_cylinder_between_points_in_space_has_no_dry_friction():
-    nodes = {"world": {"type": "frame", "points": {"foot": [0.0, 0.0, 0.0]}},
-             "load": {"type": "body", "mass": 20.0, "points": {"lug": [0.0, 0.0, 0.0]},
-                      "joint": {"kind": "prismatic", "axis": [1.0, 0.0, 0.0], "travel": JACK.x}}}  # fmt: skip
+    nodes = {
+        "world": {"type": "frame", "points": {"foot": [0.0, 0.0, 0.0]}},
+        "load": {
+            "type": "body",
+            "mass": 20.0,
+            "points": {"lug": [0.0, 0.0, 0.0]},
+            "joint": {"kind": "prismatic", "axis": [1.0, 0.0, 0.0], "travel": JACK.x},
+        },
+    }
     cylinder = JACK.links()["cyl"] | {"ports": {"rod": "load.lug", "case": "world.foot"}}
-    with pytest.raises(CaseError, match="friction: dry friction acts between masses on an axis only"):
+    with pytest.raises(
+        CaseError, match="friction: dry friction acts between masses on an axis only"
+    ):
         fvsolve.load(fed() | {"nodes": nodes, "links": {"cyl": cylinder}})

@@ -25,8 +25,15 @@ TANK = {"tank": {"type": "reservoir", "pressure": P0}}
 def scene(nodes, links, end, probes, **more):
     numerics = {"end": end, "rtol": 1e-11, **more.pop("numerics", {})}
     fluid = FLUID | more.pop("fluid", {})
-    return {"schema": 1, "fluid": fluid, "nodes": TANK | nodes, "links": links, "numerics": numerics,
-            "output": {"every": end / 20, "probes": probes}, **more}  # fmt: skip
+    return {
+        "schema": 1,
+        "fluid": fluid,
+        "nodes": TANK | nodes,
+        "links": links,
+        "numerics": numerics,
+        "output": {"every": end / 20, "probes": probes},
+        **more,
+    }
 
 
 def runs(case, method="dormand-prince", **set):
@@ -50,20 +57,46 @@ def machine(kind, start, stop, **keys):
 def test_efficiencies_return_flow_and_torque_of_the_rated_point(kind):
     d, dp, w = 28.0 * CC, 200e5, 1500.0 * pi / 30.0
     ends = ("tank", "high") if kind == "pump" else ("high", "tank")
-    given = {"displacement": "28 cc/rev", "speed": "1500 rpm", "volumetric_efficiency": 0.95,
-             "mechanical_efficiency": 0.92, "rated_pressure": "200 bar", "rated_speed": "1500 rpm"}  # fmt: skip
-    case = scene({"high": {"type": "reservoir", "pressure": P0 + dp}}, {"m": machine(kind, *ends, **given)}, 1.0,
-                 ["m.flow", "m.torque"])  # fmt: skip
+    given = {
+        "displacement": "28 cc/rev",
+        "speed": "1500 rpm",
+        "volumetric_efficiency": 0.95,
+        "mechanical_efficiency": 0.92,
+        "rated_pressure": "200 bar",
+        "rated_speed": "1500 rpm",
+    }
+    case = scene(
+        {"high": {"type": "reservoir", "pressure": P0 + dp}},
+        {"m": machine(kind, *ends, **given)},
+        1.0,
+        ["m.flow", "m.torque"],
+    )
     run = runs(case)
-    flow, torque = (d * w * 0.95, d * dp / 0.92) if kind == "pump" else (d * w / 0.95, d * dp * 0.92)
+    flow, torque = (
+        (d * w * 0.95, d * dp / 0.92) if kind == "pump" else (d * w / 0.95, d * dp * 0.92)
+    )
     assert run["m.flow"][-1] == pytest.approx(flow, rel=1e-12)
     assert run["m.torque"][-1] == pytest.approx(torque, rel=1e-12)
 
 
 def test_torque_losses_are_half_viscous_and_half_dry():
-    case = scene({"high": {"type": "reservoir", "pressure": "200 bar"}}, {"m": machine(
-        "pump", "tank", "high", displacement="28 cc/rev", mechanical_efficiency=0.9, rated_pressure="200 bar",
-        rated_speed="100 rad/s", speed="50 rad/s")}, 1.0, ["m.torque"])  # fmt: skip
+    case = scene(
+        {"high": {"type": "reservoir", "pressure": "200 bar"}},
+        {
+            "m": machine(
+                "pump",
+                "tank",
+                "high",
+                displacement="28 cc/rev",
+                mechanical_efficiency=0.9,
+                rated_pressure="200 bar",
+                rated_speed="100 rad/s",
+                speed="50 rad/s",
+            )
+        },
+        1.0,
+        ["m.torque"],
+    )
     ideal, loss = 28.0 * CC * (200e5 - P0), 28.0 * CC * 200e5 * (1.0 / 0.9 - 1.0)
     assert runs(case)["m.torque"][-1] == pytest.approx(ideal + 0.75 * loss, rel=1e-12)
 
@@ -76,17 +109,44 @@ D1, D2, L1, L2, W1 = 28.0 * CC, 60.0 * CC, 0.01 / 6e9, 0.02 / 6e9, 1500.0 * pi /
 
 def drive(**changes):
     """Pump at constant speed, chamber, and a motor with dry friction on a shaft with a viscous load."""
-    nodes = {"high": {"type": "chamber", "volume": "1 l", "initial_pressure": P0},
-             "drum": {"type": "shaft", "inertia": J, "initial_speed": 0.0}, "frame": {"type": "housing"}}  # fmt: skip
+    nodes = {
+        "high": {"type": "chamber", "volume": "1 l", "initial_pressure": P0},
+        "drum": {"type": "shaft", "inertia": J, "initial_speed": 0.0},
+        "frame": {"type": "housing"},
+    }
     links = {
-        "pump": machine("pump", "tank", "high", speed="1500 rpm", displacement="28 cc/rev", leakage="0.01 l/min/bar",
-                        setting=ramp(0.1, 0.5, 0.0, 1.0)),
-        "motor": machine("motor", "high", "tank", ports={"shaft": "drum"}, displacement="60 cc/rev", leakage=L2,
-                         viscous_friction=0.02, friction_torque=T),
+        "pump": machine(
+            "pump",
+            "tank",
+            "high",
+            speed="1500 rpm",
+            displacement="28 cc/rev",
+            leakage="0.01 l/min/bar",
+            setting=ramp(0.1, 0.5, 0.0, 1.0),
+        ),
+        "motor": machine(
+            "motor",
+            "high",
+            "tank",
+            ports={"shaft": "drum"},
+            displacement="60 cc/rev",
+            leakage=L2,
+            viscous_friction=0.02,
+            friction_torque=T,
+        ),
         "load": {"type": "bearing", "from": "drum", "to": "frame", "damping": 0.5},
-    }  # fmt: skip
-    probes = ["high.pressure", "drum.speed", "motor.torque", "motor.flow", "pump.flow", "pump.torque"]
-    return scene(nodes | changes.pop("nodes", {}), links | changes.pop("links", {}), 2.0, probes, **changes)
+    }
+    probes = [
+        "high.pressure",
+        "drum.speed",
+        "motor.torque",
+        "motor.flow",
+        "pump.flow",
+        "pump.torque",
+    ]
+    return scene(
+        nodes | changes.pop("nodes", {}), links | changes.pop("links", {}), 2.0, probes, **changes
+    )
 
 
 def drive_by_scipy():
@@ -104,7 +164,9 @@ def drive_by_scipy():
     tolerance = {"method": "Radau", "rtol": 1e-12, "atol": [1e-4, 1e-11]}
     held = solve_ivp(rhs, (0.1, 0.6), [P0, 0.0], args=(False,), events=torn, **tolerance)
     ramped = solve_ivp(rhs, (held.t[-1], 0.6), held.y[:, -1], args=(True,), **tolerance)
-    return held.t[-1], solve_ivp(rhs, (0.6, 2.0), ramped.y[:, -1], args=(True,), **tolerance).y[:, -1]
+    return held.t[-1], solve_ivp(rhs, (0.6, 2.0), ramped.y[:, -1], args=(True,), **tolerance).y[
+        :, -1
+    ]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -115,13 +177,19 @@ def test_a_hydrostatic_drive_is_that_of_scipy(method):
     assert run.summary["events"][0]["time"] == pytest.approx(torn, abs=2.0 * EXACT)
     assert run["high.pressure"][-1] == pytest.approx(pressure, rel=EXACT)
     assert run["drum.speed"][-1] == pytest.approx(speed, rel=EXACT)
-    assert run["motor.torque"][-1] == pytest.approx(D2 * (pressure - P0) - 0.02 * speed - T, rel=EXACT)
+    assert run["motor.torque"][-1] == pytest.approx(
+        D2 * (pressure - P0) - 0.02 * speed - T, rel=EXACT
+    )
     assert set(run["drum.speed"][: int(torn / 0.1)]) == {0.0}
 
 
 def test_energy_of_a_drive_closes_and_is_only_lost():
-    for case in (drive(), drive(fluid={"law": "log"}), drive(nodes={"drum": {
-            "type": "shaft", "inertia": J, "initial_speed": "40 rad/s"}}), load_sensing()):  # fmt: skip
+    for case in (
+        drive(),
+        drive(fluid={"law": "log"}),
+        drive(nodes={"drum": {"type": "shaft", "inertia": J, "initial_speed": "40 rad/s"}}),
+        load_sensing(),
+    ):
         balance = energy(case)
         assert abs(balance.remainder[-1]) < 1e-9 * balance.throughput
         lost = [line[-1] for line in balance.dissipated.values()]
@@ -136,28 +204,64 @@ def restatements():
     turned = pump | {"from": "high", "to": "tank", "setting": ramp(0.1, 0.5, 0.0, -1.0)}
     yield "pump drawn the other way", drive(links={"pump": turned})
     yield "pump as motor", drive(links={"pump": pump | {"type": "displacement-motor"}})
-    halves = {"pump": pump | {"displacement": "14 cc/rev"},
-              "second": pump | {"displacement": 14.0 * CC, "leakage": 0.0}}  # fmt: skip
+    halves = {
+        "pump": pump | {"displacement": "14 cc/rev"},
+        "second": pump | {"displacement": 14.0 * CC, "leakage": 0.0},
+    }
     yield "pump in two halves", drive(links=halves)
     housing = {"type": "housing", "speed": "25 rad/s"}
     gear = {"type": "gear", "from": "prime", "to": "pinion", "ratio": 25.0 / W1}
     geared = {k: v for k, v in pump.items() if k != "speed"} | {"ports": {"shaft": "pinion"}}
-    yield "pump on the gear of a housing", drive(nodes={"prime": housing, "pinion": {"type": "shaft"}},
-                                                 links={"gear": gear, "pump": geared})  # fmt: skip
-    two = {"drum": {"type": "shaft", "inertia": "3000 kg cm2", "initial_speed": 0.0},
-           "other": {"type": "shaft", "inertia": 0.2}}  # fmt: skip
-    yield "shaft in two halves", drive(nodes=two, links={"join": {"type": "gear", "from": "other", "to": "drum",
-                                                                  "ratio": 1.0}})  # fmt: skip
+    yield (
+        "pump on the gear of a housing",
+        drive(
+            nodes={"prime": housing, "pinion": {"type": "shaft"}},
+            links={"gear": gear, "pump": geared},
+        ),
+    )
+    two = {
+        "drum": {"type": "shaft", "inertia": "3000 kg cm2", "initial_speed": 0.0},
+        "other": {"type": "shaft", "inertia": 0.2},
+    }
+    yield (
+        "shaft in two halves",
+        drive(
+            nodes=two, links={"join": {"type": "gear", "from": "other", "to": "drum", "ratio": 1.0}}
+        ),
+    )
     outside = {k: v for k, v in motor.items() if k not in ("viscous_friction", "friction_torque")}
-    bearing = {"type": "bearing", "from": "drum", "to": "frame", "damping": 0.52, "friction_torque": T}
+    bearing = {
+        "type": "bearing",
+        "from": "drum",
+        "to": "frame",
+        "damping": 0.52,
+        "friction_torque": T,
+    }
     yield "losses as a bearing", drive(links={"motor": outside, "load": bearing})
     formula = {"setting": "min(max((t - 0.1)/0.5, 0), 1)"}
     yield "setting as a formula", drive(links={"pump": pump | formula})
-    block = {"x": {"type": "function", "inputs": {"p": "high.pressure"}, "unit": "-",
-                   "formula": "min(max((t - 0.1)/0.5, 0), 1) + 0*p", "limits": [0.0, 1.0]}}  # fmt: skip
-    yield "setting by a control", drive(links={"pump": pump | {"setting": {"control": "x"}}}, controls=block)
-    speed = {"w": {"type": "function", "inputs": {"p": "high.pressure"}, "unit": "rad/s", "limits": [0.0, 200.0],
-                   "formula": f"{W1!r}*min(max((t - 0.1)/0.5, 0), 1) + 0*p"}}  # fmt: skip
+    block = {
+        "x": {
+            "type": "function",
+            "inputs": {"p": "high.pressure"},
+            "unit": "-",
+            "formula": "min(max((t - 0.1)/0.5, 0), 1) + 0*p",
+            "limits": [0.0, 1.0],
+        }
+    }
+    yield (
+        "setting by a control",
+        drive(links={"pump": pump | {"setting": {"control": "x"}}}, controls=block),
+    )
+    speed = {
+        "w": {
+            "type": "function",
+            "inputs": {"p": "high.pressure"},
+            "unit": "rad/s",
+            "limits": [0.0, 200.0],
+            "formula": f"{W1!r}*min(max((t - 0.1)/0.5, 0), 1) + 0*p",
+        }
+    }
     by_speed = {k: v for k, v in pump.items() if k != "setting"} | {"speed": {"control": "w"}}
     yield "speed by a control", drive(links={"pump": by_speed}, controls=speed)
     by_housing = {k: v for k, v in by_speed.items() if k != "speed"} | {"ports": {"shaft": "prime"}}
@@ -165,7 +269,9 @@ def restatements():
     yield "housing by a control", drive(nodes=prime, links={"pump": by_housing}, controls=speed)
 
 
-@pytest.mark.parametrize("name, case", list(restatements()), ids=[name for name, _ in restatements()])
+@pytest.mark.parametrize(
+    "name, case", list(restatements()), ids=[name for name, _ in restatements()]
+)
 def test_restated_drives_have_the_same_end(name, case):
     reference = runs(drive())
     for method in ("dormand-prince", "rodas-5p"):
@@ -174,7 +280,9 @@ def test_restated_drives_have_the_same_end(name, case):
             assert run[probe][-1] == pytest.approx(reference[probe][-1], rel=1e-9), method
 
 
-@pytest.mark.parametrize("fluid", [{"law": "log"}, {"law": "mixture", "air_fraction": 1e-6, "vapor_pressure": 100.0}])
+@pytest.mark.parametrize(
+    "fluid", [{"law": "log"}, {"law": "mixture", "air_fraction": 1e-6, "vapor_pressure": 100.0}]
+)
 def test_other_density_laws_change_a_drive_by_the_compressibility_alone(fluid):
     reference, ends = runs(drive()), []
     for method in ("dormand-prince", "radau-iia-5", "rodas-5p"):
@@ -189,12 +297,30 @@ def test_a_controller_drives_a_setting_that_lags(method):
     """0.02 s dx/dt = u - x, with the PI output u of the pressure p0 + rho / 2 (x D w / A)^2 before an orifice."""
     flow, area, gain = 20.0 * CC * W1, 0.61 * pi * 0.003**2 / 4.0, 1e-8
     size = {"type": "orifice", "from": "high", "to": "tank", "diameter": "3 mm"}
-    pump = machine("pump", "tank", "high", speed="1500 rpm", displacement="20 cc/rev", setting_time="20 ms",
-                   setting={"control": "k"})  # fmt: skip
-    block = {"type": "pi", "input": "high.pressure", "setpoint": ramp(0.1, 0.0, 5e6, 8e6), "gain": gain,
-             "integral_time": "0.1 s", "limits": [0.0, 1.0]}  # fmt: skip
-    case = scene({"high": {"type": "junction"}}, {"pump": pump, "orifice": size}, 0.5,
-                 ["high.pressure", "pump.setting"], controls={"k": block})  # fmt: skip
+    pump = machine(
+        "pump",
+        "tank",
+        "high",
+        speed="1500 rpm",
+        displacement="20 cc/rev",
+        setting_time="20 ms",
+        setting={"control": "k"},
+    )
+    block = {
+        "type": "pi",
+        "input": "high.pressure",
+        "setpoint": ramp(0.1, 0.0, 5e6, 8e6),
+        "gain": gain,
+        "integral_time": "0.1 s",
+        "limits": [0.0, 1.0],
+    }
+    case = scene(
+        {"high": {"type": "junction"}},
+        {"pump": pump, "orifice": size},
+        0.5,
+        ["high.pressure", "pump.setting"],
+        controls={"k": block},
+    )
 
     def rates(t, y):
         error = 8e6 - P0 - RHO / 2.0 * (y[0] * flow / area) ** 2
@@ -203,7 +329,9 @@ def test_a_controller_drives_a_setting_that_lags(method):
         return [(output - y[0]) / 0.02, (gain * error + output - wanted) / 0.1]
 
     run, first = runs(case, method), sqrt(2.0 * (5e6 - P0) / RHO) * area / flow
-    exact = solve_ivp(rates, (0.1, 0.5), [first, first], "DOP853", dense_output=True, rtol=1e-12, atol=1e-13).sol
+    exact = solve_ivp(
+        rates, (0.1, 0.5), [first, first], "DOP853", dense_output=True, rtol=1e-12, atol=1e-13
+    ).sol
     assert run["pump.setting"] == pytest.approx(exact(np.maximum(run.t, 0.1))[0], abs=1e-8)
 
 
@@ -211,9 +339,13 @@ def test_a_controller_drives_a_setting_that_lags(method):
 def test_swept_flow_has_the_density_of_the_inlet_and_leakage_that_upstream(turns):
     """Two chambers under the law `log`, rho = RHO exp((p - P0) / BETA), beside SciPy."""
     q, leak, high, low = 20e-6 * turns, 0.5e-3 / 60.0 / 1e5, 300e5, 10e5
-    nodes = {"low": {"type": "chamber", "volume": "2 l", "initial_pressure": low},
-             "high": {"type": "chamber", "volume": "1 l", "initial_pressure": high}}  # fmt: skip
-    pump = machine("pump", "low", "high", speed=f"{60.0 * turns} rpm", displacement="20 cc/rev", leakage=leak)
+    nodes = {
+        "low": {"type": "chamber", "volume": "2 l", "initial_pressure": low},
+        "high": {"type": "chamber", "volume": "1 l", "initial_pressure": high},
+    }
+    pump = machine(
+        "pump", "low", "high", speed=f"{60.0 * turns} rpm", displacement="20 cc/rev", leakage=leak
+    )
     case = scene(nodes, {"pump": pump}, 0.02, ["high.pressure", "pump.flow"], fluid={"law": "log"})
     del case["nodes"]["tank"]
     run = runs(case)
@@ -224,7 +356,9 @@ def test_swept_flow_has_the_density_of_the_inlet_and_leakage_that_upstream(turns
         m = mass_flow(*p)
         return [-m * BETA / 2e-3 / density(p[0]), m * BETA / 1e-3 / density(p[1])]
 
-    exact = solve_ivp(rates, (0.0, 0.02), [low, high], "DOP853", run.t.clip(0.0, 0.02), rtol=1e-12, atol=1e-3)
+    exact = solve_ivp(
+        rates, (0.0, 0.02), [low, high], "DOP853", run.t.clip(0.0, 0.02), rtol=1e-12, atol=1e-3
+    )
     assert run["high.pressure"] == pytest.approx(exact.y[1], rel=EXACT)
     assert run["pump.flow"][0] == pytest.approx(mass_flow(low, high) / density(high), rel=1e-12)
 
@@ -263,7 +397,9 @@ def test_the_linear_system_of_a_drive_is_that_of_its_equations():
     transfer = np.array([0.0, 1.0]) @ np.linalg.solve(-a, np.array([stiff * D1 * W1, 0.0]))
     gain = found.c @ np.linalg.solve(-found.a, found.b) + found.d
     assert gain.item() == pytest.approx(transfer, rel=1e-6)
-    assert np.sort_complex(np.linalg.eigvals(found.a)) == pytest.approx(np.sort_complex(np.linalg.eigvals(a)), rel=1e-6)
+    assert np.sort_complex(np.linalg.eigvals(found.a)) == pytest.approx(
+        np.sort_complex(np.linalg.eigvals(a)), rel=1e-6
+    )
 
 
 # compensators -------------------------------------------------------------------------------------------------------
@@ -276,17 +412,40 @@ LS_TIMES = [0.0, 0.1, 0.2, 0.6, 0.7], [0.0, 0.8, 0.9]
 
 def load_sensing(compensator=None, **more):
     """Pump whose compensator keeps the drop over a metering valve, with a load pressure that rises to its limit."""
-    nodes = {"high": {"type": "chamber", "volume": "1 l"}, "load": {"type": "chamber", "volume": "0.5 l"}}
+    nodes = {
+        "high": {"type": "chamber", "volume": "1 l"},
+        "load": {"type": "chamber", "volume": "0.5 l"},
+    }
     own = {"set_pressure": 210e5 + P0, "range": "5 bar", "senses": "load", "margin": "20 bar"}
     links = {
-        "pump": machine("pump", "tank", "high", speed="1500 rpm", displacement="45 cc/rev", leakage=LEAK,
-                        setting_time=LAG, compensator=compensator or own),
-        "metering": {"type": "valve", "from": "high", "to": "load", "diameter": "6 mm",
-                     "opening": {"time": LS_TIMES[0], "value": LS_OPENINGS[0]}},
-        "work": {"type": "valve", "from": "load", "to": "tank", "diameter": "4 mm",
-                 "opening": {"time": LS_TIMES[1], "value": LS_OPENINGS[1]}},
-    }  # fmt: skip
-    return scene(nodes, links, 1.4, ["high.pressure", "load.pressure", "pump.setting", "pump.flow"], **more)
+        "pump": machine(
+            "pump",
+            "tank",
+            "high",
+            speed="1500 rpm",
+            displacement="45 cc/rev",
+            leakage=LEAK,
+            setting_time=LAG,
+            compensator=compensator or own,
+        ),
+        "metering": {
+            "type": "valve",
+            "from": "high",
+            "to": "load",
+            "diameter": "6 mm",
+            "opening": {"time": LS_TIMES[0], "value": LS_OPENINGS[0]},
+        },
+        "work": {
+            "type": "valve",
+            "from": "load",
+            "to": "tank",
+            "diameter": "4 mm",
+            "opening": {"time": LS_TIMES[1], "value": LS_OPENINGS[1]},
+        },
+    }
+    return scene(
+        nodes, links, 1.4, ["high.pressure", "load.pressure", "pump.setting", "pump.flow"], **more
+    )
 
 
 def load_sensing_by_scipy(start, limit=True, sense=True):
@@ -302,15 +461,26 @@ def load_sensing_by_scipy(start, limit=True, sense=True):
         pumped = D * W1 * x - LEAK * (high - P0)
         goal = min(210e5 + P0 if limit else 1e99, load + 20e5 if sense else 1e99)
         target = min(max((goal - high) / RANGE, 0.0), 1.0)
-        return [BETA / V * (pumped - metered), BETA / (0.5 * V) * (metered - drawn), (target - x) / LAG]
+        return [
+            BETA / V * (pumped - metered),
+            BETA / (0.5 * V) * (metered - drawn),
+            (target - x) / LAG,
+        ]
 
     y, breaks = start, sorted({*LS_TIMES[0], *LS_TIMES[1], 1.4})
     for first, last in zip(breaks, breaks[1:], strict=False):
         ends = [np.interp((first, last), *pair) for pair in zip(LS_TIMES, LS_OPENINGS, strict=True)]
         slopes = [float(b - a) / (last - first) for a, b in ends]
         openings = [float(a) - slope * first for (a, _), slope in zip(ends, slopes, strict=True)]
-        y = solve_ivp(rhs, (first, last), y, method="DOP853", rtol=1e-12, atol=[1e-3, 1e-3, 1e-10],
-                      args=(openings, slopes)).y[:, -1]  # fmt: skip
+        y = solve_ivp(
+            rhs,
+            (first, last),
+            y,
+            method="DOP853",
+            rtol=1e-12,
+            atol=[1e-3, 1e-3, 1e-10],
+            args=(openings, slopes),
+        ).y[:, -1]
     return y
 
 
@@ -336,7 +506,8 @@ def test_a_load_sensing_pump_starts_at_rest_with_its_margin(law):
         run = runs(case, method)
         for probe in case["output"]["probes"]:
             moved = np.ptp(run[probe]) / run[probe][0]
-            assert moved == 0.0 if law == "linear" else moved < 1e-12, method  # valves alone move by rounding there
+            # valves alone move by rounding there
+            assert moved == 0.0 if law == "linear" else moved < 1e-12, method
         drop, setting = run["high.pressure"][0] - run["load.pressure"][0], run["pump.setting"][0]
         assert drop == pytest.approx(20e5 - setting * RANGE, rel=1e-9)
         assert 0.0 < setting < 1.0
@@ -355,8 +526,18 @@ def test_a_pump_at_its_set_pressure_starts_without_displacement():
 def test_a_setting_with_a_lag_is_a_transfer_function_of_its_schedule():
     pump = drive()["links"]["pump"]
     lagged = runs(drive(links={"pump": pump | {"setting_time": "80 ms"}}))
-    ideal = {"type": "function", "inputs": {}, "formula": "min(max((t - 0.1)/0.5, 0), 1)", "unit": "-"}
-    lag = {"type": "transfer-function", "input": "controls.u", "numerator": [1.0], "denominator": [0.08, 1.0]}
+    ideal = {
+        "type": "function",
+        "inputs": {},
+        "formula": "min(max((t - 0.1)/0.5, 0), 1)",
+        "unit": "-",
+    }
+    lag = {
+        "type": "transfer-function",
+        "input": "controls.u",
+        "numerator": [1.0],
+        "denominator": [0.08, 1.0],
+    }
     block = {"x": lag, "u": ideal}
     other = runs(drive(links={"pump": pump | {"setting": {"control": "x"}}}, controls=block))
     for probe in ("high.pressure", "drum.speed"):
@@ -396,12 +577,18 @@ def test_a_run_with_a_compensator_resumes_to_the_bit(tmp_path):
     ],
 )  # fmt: skip
 def test_faults_of_displacement_machines_are_named(link, keys, place, text):
-    case = drive(nodes={"axle": {"type": "shaft"}}, links={"more": {
-        "type": "gear", "from": "axle", "to": "drum", "ratio": 2.0}} if "axle" not in str(keys) else {})  # fmt: skip
+    case = drive(
+        nodes={"axle": {"type": "shaft"}},
+        links={"more": {"type": "gear", "from": "axle", "to": "drum", "ratio": 2.0}}
+        if "axle" not in str(keys)
+        else {},
+    )
     case["links"][link] = case["links"][link] | keys
     with pytest.raises(CaseError) as caught:
         fvsolve.build(fvsolve.load(case))
-    assert any(fault.place == place and text in fault.message for fault in caught.value.faults), str(caught.value)
+    assert any(fault.place == place and text in fault.message for fault in caught.value.faults), (
+        str(caught.value)
+    )
 
 
 # shipped cases ------------------------------------------------------------------------------------------------------
@@ -430,8 +617,14 @@ class Hose:
         nodes = np.cos(pi * (np.arange(14) + 0.5) / 14)
         times = 0.5 * (begin + end) + 0.5 * (end - begin) * nodes
         waves, pressures = np.array([self.arriving(t) for t in times]).T, found.sol(times)[3:]
-        self.pieces.append((begin, end, chebfit(nodes, 2.0 * pressures[1] - waves[1], 13),
-                            chebfit(nodes, 2.0 * pressures[0] - waves[0], 13)))  # fmt: skip
+        self.pieces.append(
+            (
+                begin,
+                end,
+                chebfit(nodes, 2.0 * pressures[1] - waves[1], 13),
+                chebfit(nodes, 2.0 * pressures[0] - waves[0], 13),
+            )
+        )
 
     def forget(self, t):
         self.pieces = [piece for piece in self.pieces if piece[1] > t - self.delay - 1e-9]
@@ -452,9 +645,13 @@ def drive_through_a_hose(end):
         volt = 48.0 * min(max((t - 0.1) / 0.5, 0.0), 1.0)
         up = (k * current - d1 * (p1 - P0) - dry1 / w1 * pump - dry1) / j1 if turns[0] else 0.0
         down = (d2 * (p2 - P0) - (dry2 / w2 + 1.5) * drum - dry2 - 6.0) / j2 if turns[1] else 0.0
-        return [up, down, (volt - ohm * current - k * pump) / henry,
-                BETA / volume * (d1 * pump - leak1 * (p1 - P0) - q1),
-                BETA / volume * (q2 - d2 * drum - leak2 * (p2 - P0))]  # fmt: skip
+        return [
+            up,
+            down,
+            (volt - ohm * current - k * pump) / henry,
+            BETA / volume * (d1 * pump - leak1 * (p1 - P0) - q1),
+            BETA / volume * (q2 - d2 * drum - leak2 * (p2 - P0)),
+        ]
 
     def pump_torn(t, y, turns):
         return -1.0 if turns[0] else k * y[2] - d1 * (y[3] - P0) - dry1
@@ -470,8 +667,17 @@ def drive_through_a_hose(end):
         ends = [kink + n * hose.delay for kink in kinks for n in range(5)]
         ends += [end, t + hose.delay, *(piece[1] + hose.delay for piece in hose.pieces)]
         stop = min(x for x in ends if x > t + 1e-12)
-        found = solve_ivp(rhs, (t, stop), y, "DOP853", rtol=1e-11, atol=[1e-9, 1e-9, 1e-9, 1e-3, 1e-3],
-                          events=(pump_torn, drum_torn), dense_output=True, args=(turns,))  # fmt: skip
+        found = solve_ivp(
+            rhs,
+            (t, stop),
+            y,
+            "DOP853",
+            rtol=1e-11,
+            atol=[1e-9, 1e-9, 1e-9, 1e-3, 1e-3],
+            events=(pump_torn, drum_torn),
+            dense_output=True,
+            args=(turns,),
+        )
         hose.add(t, found.t[-1], found)
         t, y = found.t[-1], found.y[:, -1]
         if found.status == 1:
@@ -480,16 +686,29 @@ def drive_through_a_hose(end):
     return times, y
 
 
-DRIVE = ("coupling.speed", "drum.speed", "electric-motor.current", "outlet.pressure", "inlet.pressure")
+DRIVE = (
+    "coupling.speed",
+    "drum.speed",
+    "electric-motor.current",
+    "outlet.pressure",
+    "inlet.pressure",
+)
 
 
 def test_the_shipped_drive_is_that_of_dalemberts_waves():
     times, exact = drive_through_a_hose(0.8)
     units = np.array([30.0 / pi, 30.0 / pi, 1.0, 1e-5, 1e-5])
     settings = {"numerics.end": 0.8, "numerics.rtol": 1e-10, "numerics.delay_tolerance": 1e-9}
-    for model, tolerance, numbers in (("delay-line", 2e-7, {}), ("finite-volume", 2e-6, {"links.hose.cells": 60})):
-        run = runs(CASES / "hydrostatic-drive.toml", **settings | numbers | {"numerics.pipe_model": model})
-        assert [run[probe][-1] for probe in DRIVE] == pytest.approx(exact * units, rel=tolerance), model
+    for model, tolerance, numbers in (
+        ("delay-line", 2e-7, {}),
+        ("finite-volume", 2e-6, {"links.hose.cells": 60}),
+    ):
+        run = runs(
+            CASES / "hydrostatic-drive.toml", **settings | numbers | {"numerics.pipe_model": model}
+        )
+        assert [run[probe][-1] for probe in DRIVE] == pytest.approx(exact * units, rel=tolerance), (
+            model
+        )
         torn = [run.summary["events"][k]["time"] for k in (0, -1)]
         assert torn == pytest.approx(times, abs=2e-7)
 
@@ -503,19 +722,34 @@ def winch_by_scipy(start, end):
 
     def rhs(t, y, first, slopes):
         supply, load, x, w = y
-        metered = area * (first[0] + slopes[0] * t) * copysign(sqrt(2.0 * abs(supply - load) / RHO), supply - load)
+        metered = (
+            area
+            * (first[0] + slopes[0] * t)
+            * copysign(sqrt(2.0 * abs(supply - load) / RHO), supply - load)
+        )
         share = min(max((min(180e5 + P0, load + 18e5) - supply) / 6e5, 0.0), 1.0)
         torque = d2 * (load - P0) - 0.55 * w - (first[1] + slopes[1] * t)
-        return [BETA / 1e-3 * (d1 * W1 * x - leak1 * (supply - P0) - metered),
-                BETA / 0.5e-3 * (metered - d2 * w - leak2 * (load - P0)), (share - x) / 0.04, torque / 0.2]  # fmt: skip
+        return [
+            BETA / 1e-3 * (d1 * W1 * x - leak1 * (supply - P0) - metered),
+            BETA / 0.5e-3 * (metered - d2 * w - leak2 * (load - P0)),
+            (share - x) / 0.04,
+            torque / 0.2,
+        ]
 
     y, breaks = start, sorted({0.0, end, *(t for t in steps if t < end)})
     for t, stop in zip(breaks, breaks[1:], strict=False):
         ends = [np.interp((t, stop), *pair) for pair in (opening, load)]
         slopes = [float(b - a) / (stop - t) for a, b in ends]
         first = [float(a) - slope * t for (a, _), slope in zip(ends, slopes, strict=True)]
-        y = solve_ivp(rhs, (t, stop), y, "DOP853", rtol=1e-12, atol=[1e-3, 1e-3, 1e-10, 1e-8],
-                      args=(first, slopes)).y[:, -1]  # fmt: skip
+        y = solve_ivp(
+            rhs,
+            (t, stop),
+            y,
+            "DOP853",
+            rtol=1e-12,
+            atol=[1e-3, 1e-3, 1e-10, 1e-8],
+            args=(first, slopes),
+        ).y[:, -1]
     return y
 
 

@@ -30,7 +30,9 @@ RIGHT = {
     "arctan2(y, x)": lambda x, y: math.atan2(y, x),
     "-x^2 + 2**-1 - .5e1*(+y)": lambda x, y: -(x**2) + 0.5 - 5.0 * y,
     "2^x^2": lambda x, y: 2.0 ** (x**2),
-    "where(0 < x < 2, sin(x), cos(x)/2.)": lambda x, y: math.sin(x) if 0 < x < 2 else math.cos(x) / 2,
+    "where(0 < x < 2, sin(x), cos(x)/2.)": lambda x, y: (
+        math.sin(x) if 0 < x < 2 else math.cos(x) / 2
+    ),
     "(x >= 1)*(y != 1) + (x == y)": lambda x, y: float(x >= 1 and y != 1) + float(x == y),
     "where(x > 0, log(x), -1) + where(y < 0, 0, sqrt(y))": lambda x, y: (
         (math.log(x) if x > 0 else -1.0) + (0.0 if y < 0 else math.sqrt(y))
@@ -74,7 +76,9 @@ REFUSED = {
     "x.real*2": "expected numbers",
     "[x][0]*2": "expected numbers",
     "(lambda: x)()": "is unknown; known are",
-    "+".join(["x"] * 100_000): "is not a formula of x and y: it has 199999 characters; expected at most 4000",
+    "+".join(
+        ["x"] * 100_000
+    ): "is not a formula of x and y: it has 199999 characters; expected at most 4000",
     "+".join(["0.1*x"] * 3000): "it has 17999 characters; expected at most 4000",
     "(" * 500 + "x" + ")" * 500: "is not a formula",
     "x**" * 1300 + "1": "brackets or powers are nested too deep",
@@ -94,7 +98,9 @@ def test_unknown_functions_of_formulas_are_refused_with_the_nearest_form(text):
 def test_a_long_formula_is_read(text, rule):
     """A formula of 1200 terms is read, more than the 1000 calls within calls that Python allows."""
     x = np.array([1.0, 2.0, 0.5])
-    assert SpatialFieldKey("length").read(text, ReadContext()).at(x, x) == approx(rule(x), rel=1e-13)
+    assert SpatialFieldKey("length").read(text, ReadContext()).at(x, x) == approx(
+        rule(x), rel=1e-13
+    )
 
 
 NOWHERE = {
@@ -118,7 +124,8 @@ def test_overflow_division_by_zero_and_no_number_are_named_with_part_and_place(t
         values(text)
 
 
-WAYS = {  # every key that takes formulas, with a fault only at the points of this key: cells, corners or face middles
+# every key that takes formulas, with a fault only at the points of this key: cells, corners or face middles
+WAYS = {
     "bed": {"bed": "1/(x - 0.125)"},
     "start.level": {"start": {"level": "max(1, 2, 1/(x - 0.125))"}},
     "start.u": {"start": {"u": "1/(x - 0.125)"}},
@@ -132,5 +139,7 @@ WAYS = {  # every key that takes formulas, with a fault only at the points of th
 def test_a_fault_of_any_formula_is_a_fault_of_the_case(way):
     given = {"physics": "transport"} if "velocity" in WAYS[way] else {"level": 1.0}
     pool = {"type": "basin", "size": [1.0, 1.0], "cells": [4, 4], **given, **WAYS[way]}
-    case = scene({"pool": pool}, {}, 1.0, {"method": "ssp-rk2", "courant": 0.5}, [], 0.1) | {"scalars": {"dye": {}}}
+    case = scene({"pool": pool}, {}, 1.0, {"method": "ssp-rk2", "courant": 0.5}, [], 0.1) | {
+        "scalars": {"dye": {}}
+    }
     assert len(refused(case, f"nodes.pool.{way}.*zero at x = 0").faults) == 1

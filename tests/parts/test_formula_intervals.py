@@ -12,15 +12,36 @@ from fvsolve.parts.formula_intervals import find_pole, find_pulses
 from fvsolve.parts.formula_program import Program
 
 POLES = {
-    "0.01/(t-4)": 4.0, "1/(t-pi)": math.pi, "1/(t-4)^2": 4.0, "tan(t/2)": math.pi, "log(abs(t-4))": 4.0,
-    "(t-4)^-3": 4.0, "1/(sin(t)-0.5)": math.pi / 6, "exp(t)/(exp(t)-20)": math.log(20), "2 - 3/(t^2-2*t+1)": 1.0,
-    "where(t < 3, 0, 1/(t-7.123))": 7.123, "1/min(t-4, 5)": 4.0, "1/(tanh(t-2.7))": 2.7,
-}  # fmt: skip
+    "0.01/(t-4)": 4.0,
+    "1/(t-pi)": math.pi,
+    "1/(t-4)^2": 4.0,
+    "tan(t/2)": math.pi,
+    "log(abs(t-4))": 4.0,
+    "(t-4)^-3": 4.0,
+    "1/(sin(t)-0.5)": math.pi / 6,
+    "exp(t)/(exp(t)-20)": math.log(20),
+    "2 - 3/(t^2-2*t+1)": 1.0,
+    "where(t < 3, 0, 1/(t-7.123))": 7.123,
+    "1/min(t-4, 5)": 4.0,
+    "1/(tanh(t-2.7))": 2.7,
+}
 REGULAR = [
-    "where(t < 5, 1/(10-t), 0)", "where(abs(t-4) > 0.1, 1/(t-4), 10)", "sqrt(t^2-8*t+16)", "0.5+0.5*sin(2*pi*t/11)",
-    "1/(t^2-2*t+1.0001)", "t^0.5", "1/(1.5+sin(40*t))", "arctan2(t-5, t-4)", "sin(t)/(1+t)", "tanh((t-5)/1e-4)",
-    "exp(-t)*t^3", "hypot(t-3, t)", "max(t-3, 1)^-2", "abs(t-5)", "1/(where(t < 5, 1, 2))",
-]  # fmt: skip
+    "where(t < 5, 1/(10-t), 0)",
+    "where(abs(t-4) > 0.1, 1/(t-4), 10)",
+    "sqrt(t^2-8*t+16)",
+    "0.5+0.5*sin(2*pi*t/11)",
+    "1/(t^2-2*t+1.0001)",
+    "t^0.5",
+    "1/(1.5+sin(40*t))",
+    "arctan2(t-5, t-4)",
+    "sin(t)/(1+t)",
+    "tanh((t-5)/1e-4)",
+    "exp(-t)*t^3",
+    "hypot(t-3, t)",
+    "max(t-3, 1)^-2",
+    "abs(t-5)",
+    "1/(where(t < 5, 1, 2))",
+]
 
 
 def sampled(text):
@@ -33,9 +54,9 @@ def test_a_pole_between_samples_is_located_at_its_time(text):
     with np.errstate(all="ignore"):
         found = find_pole(*sampled(text))
     places = [POLES[text] + 2 * math.pi * k for k in range(3)] + [math.pi - POLES[text]]
-    assert min(abs(found - place) for place in [POLES[text], *(places if "(t" in text else [])]) < 1e-5 or (
-        text == "1/(sin(t)-0.5)" and abs(math.sin(found) - 0.5) < 1e-5
-    )
+    assert min(
+        abs(found - place) for place in [POLES[text], *(places if "(t" in text else [])]
+    ) < 1e-5 or (text == "1/(sin(t)-0.5)" and abs(math.sin(found) - 0.5) < 1e-5)
 
 
 @pytest.mark.parametrize("text", REGULAR)
@@ -44,7 +65,9 @@ def test_formulas_without_poles_pass(text):
     assert find_pulses(*sampled(text)) == []
 
 
-@pytest.mark.parametrize("text", [*POLES, *REGULAR, "t^(t-1)", "(t-5)^2", "cos(3*t)*tan(t)", "min(t, 3, 10-t)"])
+@pytest.mark.parametrize(
+    "text", [*POLES, *REGULAR, "t^(t-1)", "(t-5)^2", "cos(3*t)*tan(t)", "min(t, 3, 10-t)"]
+)
 def test_values_lie_within_their_bounds(text):
     """Random intervals of all widths contain the values at random times within them."""
     random = np.random.default_rng(5)
@@ -58,7 +81,9 @@ def test_values_lie_within_their_bounds(text):
             values = np.array([program.value(t) for t in (begin + share * width).tolist()])
         slack = 1e-9 * (1.0 + np.abs(values))
         inside = (values >= found.low - slack) & (values <= found.high + slack)
-        cut = np.array([any((a <= t <= b) for t in breaks) for a, b in zip(begin, begin + width, strict=True)])
+        cut = np.array(
+            [any((a <= t <= b) for t in breaks) for a, b in zip(begin, begin + width, strict=True)]
+        )
         assert np.all(inside | found.doubt | cut)
 
 
@@ -79,7 +104,13 @@ def test_a_narrow_pulse_gets_ends_of_steps_on_both_sides(text, place):
 def filled(flow, numerics):
     """Level of a tank of 2 m2 that is filled from 1 m by a flow, after 10 s."""
     nodes = {"feed": {"type": "inflow", "flow": flow}, "tank": tank(2.0, 1.0)}
-    pipe = {"type": "orifice", "from": "feed", "to": "tank", "area": 0.02, "discharge_coefficient": 1.0}
+    pipe = {
+        "type": "orifice",
+        "from": "feed",
+        "to": "tank",
+        "area": 0.02,
+        "discharge_coefficient": 1.0,
+    }
     return scene(nodes, {"pipe": pipe}, 10.0, numerics, ["tank.level"], every=10.0)
 
 
@@ -122,7 +153,13 @@ def test_a_pole_in_a_block_is_a_fault_with_its_time():
 
 def test_a_narrow_excess_of_a_range_is_a_fault_with_its_time():
     case = filled(0.0, {"method": "dormand-prince", "rtol": 1e-6})
-    valve = {"type": "valve", "from": "feed", "to": "tank", "area": 1e-3, "opening": "0.5 + exp(-((t-5.0003)/1e-4)^2)"}
+    valve = {
+        "type": "valve",
+        "from": "feed",
+        "to": "tank",
+        "area": 1e-3,
+        "opening": "0.5 + exp(-((t-5.0003)/1e-4)^2)",
+    }
     with pytest.raises(FvsolveError) as caught:
         fvsolve.load(case | {"links": {"pipe": valve}})
     assert "out of range" in str(caught.value) and "at t = 5.000" in str(caught.value)

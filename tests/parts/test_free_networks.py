@@ -17,16 +17,26 @@ from fvsolve.errors import CaseError
 from fvsolve.features.motion.kernels.tables import motion_of
 from fvsolve.studies.energy_balance import energy
 
-MASS, LOW, TURN = 60e3, 0.8, 4e5  # hull: mass [kg], depth of its centre [m], inertia about it [kg m2]
+# hull: mass [kg], depth of its centre [m], inertia about it [kg m2]
+MASS, LOW, TURN = 60e3, 0.8, 4e5
 START = 0.15  # angle [rad]
-BODY = {"type": "body", "mass": MASS, "inertia": [TURN, 2 * TURN, 2 * TURN], "centre_of_mass": [0, 0, -LOW]}
+BODY = {
+    "type": "body",
+    "mass": MASS,
+    "inertia": [TURN, 2 * TURN, 2 * TURN],
+    "centre_of_mass": [0, 0, -LOW],
+}
 
 
 def free(**drawn):
     """Return a case of the U-tube on a hull that rolls freely."""
     case = u_tube(**{"minor_loss": 0.0, **drawn})
     axis = case["nodes"]["hull"]["joint"]["axis"]
-    case["nodes"]["hull"] = {**BODY, "inertia": [TURN] * 3, "joint": {"kind": "revolute", "axis": axis, "angle": START}}
+    case["nodes"]["hull"] = {
+        **BODY,
+        "inertia": [TURN] * 3,
+        "joint": {"kind": "revolute", "axis": axis, "angle": START},
+    }
     case["output"]["probes"] += ["hull.angle"]
     return case
 
@@ -50,10 +60,19 @@ def hull_and_water():
         where = turn * sp.Matrix(place)
         drag, slide = where.diff(t), turn * sp.Matrix(tangent) * TANK * z.diff(t) / size
         square = drag.dot(drag) + 2 * drag.dot(slide) + own * slide.dot(slide)
-        action += RHO * size * sp.integrate(sp.expand(square / 2 - GRAVITY * where[1]), (s, low, high))
+        action += (
+            RHO * size * sp.integrate(sp.expand(square / 2 - GRAVITY * where[1]), (s, low, high))
+        )
     left = [action.diff(one.diff(t)).diff(t).doit() - action.diff(one) for one in (angle, z)]
     a, b, c, x, v, w = sp.symbols("a b c x v w")
-    derivatives = ((angle.diff(t, 2), c), (z.diff(t, 2), w), (angle.diff(t), b), (z.diff(t), v), (angle, a), (z, x))
+    derivatives = (
+        (angle.diff(t, 2), c),
+        (z.diff(t, 2), w),
+        (angle.diff(t), b),
+        (z.diff(t), v),
+        (angle, a),
+        (z, x),
+    )
     for old, new in derivatives:
         left = [one.subs(old, new) for one in left]
     matrix = sp.Matrix(2, 2, lambda i, j: left[i].diff((c, w)[j]))
@@ -62,8 +81,12 @@ def hull_and_water():
     return lambda *now: np.linalg.solve(*(np.array(one, dtype=float) for one in both(*now))).ravel()
 
 
-WAYS = {"as drawn": ({}, {}), "the duct to starboard": ({"swap": True}, {}), "bow along y": ({"turned": True}, {}),
-        "implicit": ({}, {"method": "radau-iia-5", "rtol": 1e-8})}  # fmt: skip
+WAYS = {
+    "as drawn": ({}, {}),
+    "the duct to starboard": ({"swap": True}, {}),
+    "bow along y": ({"turned": True}, {}),
+    "implicit": ({}, {"method": "radau-iia-5", "rtol": 1e-8}),
+}
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +97,9 @@ def truth():
         c, w = rates(*y)
         return [y[1], c, y[3], w]
 
-    return solve_ivp(rhs, (0, 20), [START, 0, 0, 0], rtol=1e-11, atol=1e-12, method="DOP853", dense_output=True).sol
+    return solve_ivp(
+        rhs, (0, 20), [START, 0, 0, 0], rtol=1e-11, atol=1e-12, method="DOP853", dense_output=True
+    ).sol
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -90,7 +115,9 @@ def test_a_free_hull_and_the_water_in_its_u_tube_obey_lagrange(way, truth):
 
 
 def test_a_cart_with_a_u_tube_on_rails_conserves_the_total_momentum():
-    case = u_tube(minor_loss=0.0, route=[[0, HALF, -DEPTH - 0.5], [0, -HALF, -DEPTH - 0.5]], length=9.5)
+    case = u_tube(
+        minor_loss=0.0, route=[[0, HALF, -DEPTH - 0.5], [0, -HALF, -DEPTH - 0.5]], length=9.5
+    )
     slides = {"kind": "prismatic", "axis": [0, 1, 0], "travel": 0.0, "rate": 0.3}
     case["links"]["duct"]["length"] = 9.5
     case["links"]["duct"] |= {"from": "port", "to": "starboard"}
@@ -99,7 +126,8 @@ def test_a_cart_with_a_u_tube_on_rails_conserves_the_total_momentum():
     case["output"]["probes"] += ["hull.vy"]
     run = fv.run(case)
     water = RHO * (TANK * (2 * LEVEL + 0.3) + area(BORE) * 9.5)
-    momentum = (MASS + water) * run["hull.vy"] - RHO * run["duct.flow"] * 2 * HALF  # the duct runs towards -y
+    # the duct runs towards -y
+    momentum = (MASS + water) * run["hull.vy"] - RHO * run["duct.flow"] * 2 * HALF
     assert np.ptp(run["hull.vy"]) > 1e-3
     assert momentum == pytest.approx(momentum[0], rel=1e-8)
 
@@ -125,13 +153,22 @@ def oblique(joint, **body):
     for name, at in OBLIQUE.items():
         case["nodes"][name] |= {"at": at, "area": 3.0, "level": 2.0}
     what = ["eta", "eps_x", "eps_y", "eps_z", "wx", "wy", "wz"]
-    case["output"]["probes"] = ["duct.flow", "port.level", "starboard.level", *(f"hull.{one}" for one in what)]
+    case["output"]["probes"] = [
+        "duct.flow",
+        "port.level",
+        "starboard.level",
+        *(f"hull.{one}" for one in what),
+    ]
     case["numerics"]["end"] = 6.0  # before the tank starboard is empty
     return case
 
 
 WIDE, OWN = 1.0, np.diag([4e5, 6e5, 5e5])
-BALL = {"kind": "ball", "attitude": {"roll": 0.1, "pitch": -0.05, "yaw": 0.4}, "rate": [0.1, -0.05, 0.15]}
+BALL = {
+    "kind": "ball",
+    "attitude": {"roll": 0.1, "pitch": -0.05, "yaw": 0.4},
+    "rate": [0.1, -0.05, 0.15],
+}
 
 
 def of_all(case, run):
@@ -140,7 +177,11 @@ def of_all(case, run):
     Angular momentum and torque are about the origin; each row has 12 numbers.
     """
     duct, foot = case["links"]["duct"], {name: np.array(at) for name, at in OBLIQUE.items()}
-    way = [foot[duct["from"]], *map(np.array, ROUTE if duct["from"] == "port" else ROUTE[::-1]), foot[duct["to"]]]
+    way = [
+        foot[duct["from"]],
+        *map(np.array, ROUTE if duct["from"] == "port" else ROUTE[::-1]),
+        foot[duct["to"]],
+    ]
     lengths = [float(np.linalg.norm(b - a)) for a, b in zip(way, way[1:], strict=False)]
     low, found = np.array([0, 0, -LOW]), []
     for k in range(len(run.t)):
@@ -152,17 +193,37 @@ def of_all(case, run):
         swept, moved, total = np.zeros(3), np.zeros(3), MASS
         for a, b, length in zip(way, way[1:], lengths, strict=False):
             mass = RHO * area(WIDE) * 9.0 * length / sum(lengths)
-            whole, first, total = whole + line_inertia(mass, a, b), first + 0.5 * mass * (a + b), total + mass
+            whole, first, total = (
+                whole + line_inertia(mass, a, b),
+                first + 0.5 * mass * (a + b),
+                total + mass,
+            )
             swept, moved = swept + np.cross(a, b), moved + b - a
         for name, sign in ((duct["from"], -1.0), (duct["to"], 1.0)):
             a, up = foot[name], run[f"{name}.level"][k] * np.array([0, 0, 1.0])
             mass = RHO * 3.0 * up[2]
-            whole, first, total = whole + line_inertia(mass, a, a + up), first + mass * (a + 0.5 * up), total + mass
+            whole, first, total = (
+                whole + line_inertia(mass, a, a + up),
+                first + mass * (a + 0.5 * up),
+                total + mass,
+            )
             swept, moved = swept + sign * np.cross(a, up), moved + sign * up
-        kinetic = 0.5 * spin @ whole @ spin + flow * spin @ swept + 0.5 * flow**2 * 9.0 / (RHO * area(WIDE))
+        kinetic = (
+            0.5 * spin @ whole @ spin
+            + flow * spin @ swept
+            + 0.5 * flow**2 * 9.0 / (RHO * area(WIDE))
+        )
         high, weight = turn @ first, GRAVITY * total
-        found.append([kinetic, kinetic + GRAVITY * high[2], *(turn @ (np.cross(spin, first) + flow * moved)),
-                      *(turn @ (whole @ spin + flow * swept)), weight, *np.cross(high, [0, 0, GRAVITY])])  # fmt: skip
+        found.append(
+            [
+                kinetic,
+                kinetic + GRAVITY * high[2],
+                *(turn @ (np.cross(spin, first) + flow * moved)),
+                *(turn @ (whole @ spin + flow * swept)),
+                weight,
+                *np.cross(high, [0, 0, GRAVITY]),
+            ]
+        )
     return np.array(found)
 
 
@@ -186,7 +247,8 @@ def test_force_in_a_joint_is_the_rate_of_all_momentum_less_the_weight(joint):
     case["output"]["every"] = step = 0.02
     run = fv.run(case)
     found = of_all(case, run)
-    rate = (8 * (found[3:-1] - found[1:-3]) - (found[4:] - found[:-4]))[:, 2:8] / (12 * step)  # fourth order
+    # fourth order
+    rate = (8 * (found[3:-1] - found[1:-3]) - (found[4:] - found[:-4]))[:, 2:8] / (12 * step)
     rate[:, 2] += found[2:-2, 8]
     rate[:, 3:] += found[2:-2, 9:]
     size = np.max(np.abs(rate))
@@ -217,21 +279,52 @@ def cart(law="linear", cells=20, mass=CART, **numerics):
     """Return a case of a moving cart on a spring that carries a pipe between two chambers."""
 
     def chamber(x):
-        return {"type": "chamber", "volume": VOLUME, "initial_pressure": AMBIENT, "on": "cart", "at": [x, 0, 0]}
+        return {
+            "type": "chamber",
+            "volume": VOLUME,
+            "initial_pressure": AMBIENT,
+            "on": "cart",
+            "at": [x, 0, 0],
+        }
 
     nodes = {
-        "cart": {"type": "body", "mass": mass, "inertia": [1.0] * 3, "points": {"eye": [0, 0, 0]},
-                 "joint": {"kind": "prismatic", "axis": [1, 0, 0], "travel": 0.0, "rate": 0.1}},
+        "cart": {
+            "type": "body",
+            "mass": mass,
+            "inertia": [1.0] * 3,
+            "points": {"eye": [0, 0, 0]},
+            "joint": {"kind": "prismatic", "axis": [1, 0, 0], "travel": 0.0, "rate": 0.1},
+        },
         "ground": {"type": "frame", "points": {"eye": [-5.0, 0, 0]}},
-        "a": chamber(-LONG / 2), "b": chamber(LONG / 2),
-    }  # fmt: skip
+        "a": chamber(-LONG / 2),
+        "b": chamber(LONG / 2),
+    }
     links = {
-        "pipe": {"type": "pipe", "from": "a", "to": "b", "length": LONG, "diameter": 0.1, "wave_speed": FAST,
-                 "cells": cells},
-        "spring": {"type": "spring", "from": "ground.eye", "to": "cart.eye", "stiffness": STIFF, "free_length": 5.0},
-    }  # fmt: skip
-    case = scene(nodes, links, 0.5, {"scheme": "upwind5", "method": "rk4", "courant": 0.8, **numerics}, ["cart.vx"],
-                 every=1e-3)  # fmt: skip
+        "pipe": {
+            "type": "pipe",
+            "from": "a",
+            "to": "b",
+            "length": LONG,
+            "diameter": 0.1,
+            "wave_speed": FAST,
+            "cells": cells,
+        },
+        "spring": {
+            "type": "spring",
+            "from": "ground.eye",
+            "to": "cart.eye",
+            "stiffness": STIFF,
+            "free_length": 5.0,
+        },
+    }
+    case = scene(
+        nodes,
+        links,
+        0.5,
+        {"scheme": "upwind5", "method": "rk4", "courant": 0.8, **numerics},
+        ["cart.vx"],
+        every=1e-3,
+    )
     case["fluid"] = {**WATER, "law": law}
     return case
 
@@ -262,7 +355,12 @@ def test_a_sprung_cart_swings_with_the_waves_in_its_pipe(law):
     assert found == pytest.approx(first, rel=5e-5)
 
 
-RIG = {"type": "body", "mass": 60.0, "inertia": [40.0, 90.0, 100.0], "centre_of_mass": [0.1, 0.05, -0.2]}
+RIG = {
+    "type": "body",
+    "mass": 60.0,
+    "inertia": [40.0, 90.0, 100.0],
+    "centre_of_mass": [0.1, 0.05, -0.2],
+}
 FLIES = {"kind": "free", "rate": [0.3, -0.2, 0.4], "velocity": [0.1, 0.2, 0.0]}
 RAILS = {"kind": "prismatic", "axis": [1, 0, 0], "travel": 0.0, "rate": 0.2}
 
@@ -276,12 +374,22 @@ def rig(joint, law="linear", tanks=False, cells=8, gravity=1e-12, **numerics):
     def store(at, level, pressure):
         if tanks:
             return {"type": "tank", "on": "rig", "at": at, "area": 0.5, "level": level}
-        return {"type": "chamber", "on": "rig", "at": at, "volume": 0.05, "initial_pressure": pressure}
+        return {
+            "type": "chamber",
+            "on": "rig",
+            "at": at,
+            "volume": 0.05,
+            "initial_pressure": pressure,
+        }
 
     places = {"l": [-2, 0.5, 0], "m": [0, 0.5, 0.3], "n": [0, 0.5, 0.3], "r": [2, 1.0, 0]}
-    nodes = {"rig": {**RIG, "joint": joint}, "left": store([-3, 0, 0], 2.5, 9e5), "right": store([3, 1, 0.5], 0.6, 3e5),
-             "pot": {"type": "chamber", "on": "rig", "at": places["n"], "volume": 0.01},
-             **{name: {"type": "junction", "on": "rig", "at": at} for name, at in places.items()}}  # fmt: skip
+    nodes = {
+        "rig": {**RIG, "joint": joint},
+        "left": store([-3, 0, 0], 2.5, 9e5),
+        "right": store([3, 1, 0.5], 0.6, 3e5),
+        "pot": {"type": "chamber", "on": "rig", "at": places["n"], "volume": 0.01},
+        **{name: {"type": "junction", "on": "rig", "at": at} for name, at in places.items()},
+    }
     pipe = {"type": "pipe", "diameter": 0.1, "wave_speed": 1000.0, "cells": cells}
     column = {"type": "rigid-column", "diameter": 0.1}
     shuts = {"time": [0.05, 0.15], "value": [1.0, 0.0]}
@@ -289,14 +397,32 @@ def rig(joint, law="linear", tanks=False, cells=8, gravity=1e-12, **numerics):
         "in": {**column, "from": "left", "to": "l", "length": 1.2},
         "first": {**pipe, "from": "l", "to": "m", "length": 2.05},
         "gate": {
-            "type": "valve", "from": "m", "to": "n", "area": 0.004, "opening": shuts, "discharge_coefficient": 0.6,
+            "type": "valve",
+            "from": "m",
+            "to": "n",
+            "area": 0.004,
+            "opening": shuts,
+            "discharge_coefficient": 0.6,
         },
-        "drip": {"type": "orifice", "from": "n", "to": "pot", "area": 1e-4, "discharge_coefficient": 0.6},
+        "drip": {
+            "type": "orifice",
+            "from": "n",
+            "to": "pot",
+            "area": 1e-4,
+            "discharge_coefficient": 0.6,
+        },
         "second": {**pipe, "from": "r", "to": "n", "length": 2.4},
         "out": {**column, "from": "r", "to": "right", "length": 1.3},
-    }  # fmt: skip
-    case = scene(nodes, links, 0.3, {"scheme": "upwind5", "method": "rk4", "step": 2e-4, "initial": "rest", **numerics},
-                 ["rig.vx", "gate.flow"], every=1e-3, gravity=gravity)  # fmt: skip
+    }
+    case = scene(
+        nodes,
+        links,
+        0.3,
+        {"scheme": "upwind5", "method": "rk4", "step": 2e-4, "initial": "rest", **numerics},
+        ["rig.vx", "gate.flow"],
+        every=1e-3,
+        gravity=gravity,
+    )
     case["fluid"] = {**WATER, "law": law}
     return case
 
@@ -305,7 +431,8 @@ def momenta(model, t, y):
     """Momentum and angular momentum about the origin of the world, of a body with its network : float64[6]."""
     out, tables, found = model.evaluate(t, y)[1], model.tables, np.zeros(6)
     row, linear = out[int(model.layout["body"]) :], model.case.law.linear
-    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]  # see `kernels.moving_frames`
+    # see `kernels.moving_frames`
+    turn, place, speed, spin = row[:9].reshape(3, 3), row[9:12], row[12:15], row[15:18]
 
     def add(momentum, r, own=0.0):
         found[:3] += momentum
@@ -323,13 +450,17 @@ def momenta(model, t, y):
     for i, node in enumerate(tables.nodes):
         r = segments[node["forcing"]]["start"]
         mass = node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0)
-        levels[i] = np.array([0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0])
+        levels[i] = np.array(
+            [0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0]
+        )
         line(mass, r, r + levels[i])
     for pipe in tables.pipes:
         for k in range(n := int(pipe["cells"])):
             forth, back, ride = (
-                y[pipe["y"] + k], y[pipe["y"] + n + k], segments[pipe["forcing"] + k],
-            )  # fmt: skip
+                y[pipe["y"] + k],
+                y[pipe["y"] + n + k],
+                segments[pipe["forcing"] + k],
+            )
             per = RHO * pipe["area"] if linear else tables.profile[pipe["center"] + k]
             mass = (per + (forth + back) / pipe["speed"]) * pipe["dx"]
             line(mass, ride["start"], ride["end"], pipe["flow"] + forth - back)
@@ -366,19 +497,27 @@ def test_a_rig_on_rails_conserves_its_momentum_while_a_valve_shuts_between_its_p
 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_rig_in_free_flight_conserves_all_momenta_to_the_order_of_steps_and_cells(law):
-    found = [drift(rig(FLIES, law, cells=cells, step=step)) for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))]
-    straight, spun = ([np.max(most[part]) for most, _ in found] for part in (slice(0, 3), slice(3, 6)))
+    found = [
+        drift(rig(FLIES, law, cells=cells, step=step))
+        for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))
+    ]
+    straight, spun = (
+        [np.max(most[part]) for most, _ in found] for part in (slice(0, 3), slice(3, 6))
+    )
     size = np.linalg.norm(found[0][1][3:])
     assert straight[1] < 0.1 * straight[0] < 1e-8 * np.linalg.norm(found[0][1][:3])
-    assert spun[2] < 0.4 * spun[1] < 1e-8 * size  # fluxes of faces equal momenta of cells to second order
+    # fluxes of faces equal momenta of cells to second order
+    assert spun[2] < 0.4 * spun[1] < 1e-8 * size
 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("tanks", [False, True])
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_the_energy_of_a_rig_in_free_flight_closes_but_for_steps_cells_and_valves(law, tanks):
-    found = [energy(fv.load(rig(FLIES, law, tanks, cells, GRAVITY, step=step, end=0.15)))
-             for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))]  # fmt: skip
+    found = [
+        energy(fv.load(rig(FLIES, law, tanks, cells, GRAVITY, step=step, end=0.15)))
+        for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))
+    ]
     through = found[0].throughput
     assert abs(found[1].step[-1]) < 0.15 * abs(found[0].step[-1]) < 1e-4 * through
     lost = [sum(abs(one[-1]) for one in ledger.scheme.values()) for ledger in found]
@@ -392,7 +531,13 @@ def test_a_light_body_with_a_pipe_is_stepped_as_its_waves_brake_it():
     for name in ("a", "b"):
         case["nodes"][name] = {"type": "junction", "on": "cart", "at": case["nodes"][name]["at"]}
     case["nodes"]["still"] = {**case["nodes"]["a"], "type": "reservoir", "pressure": AMBIENT}
-    case["links"]["leak"] = {"type": "orifice", "from": "still", "to": "a", "area": 1e-6, "discharge_coefficient": 0.6}
+    case["links"]["leak"] = {
+        "type": "orifice",
+        "from": "still",
+        "to": "a",
+        "area": 1e-6,
+        "discharge_coefficient": 0.6,
+    }
     brakes = 2 * RHO * FAST * area(0.1) / 2.0  # rho c A of both ends over the mass [1/s]
     model = build(fv.load(case))
     assert model.evaluate(0.0, model.start)[1][rec.RATE] == pytest.approx(brakes, rel=0.2)
@@ -408,10 +553,22 @@ def test_a_duct_that_is_mostly_a_pipe_is_the_former_rigid_column(truth):
     for name, y in ends.items():
         at = [0, y * 0.75, -DEPTH]
         case["nodes"][f"{name}_mouth"] = {"type": "junction", "on": "hull", "at": at}
-        case["links"][f"{name}_way"] = {"type": "rigid-column", "from": name, "to": f"{name}_mouth",
-                                        "length": HALF / 4, "diameter": BORE}  # fmt: skip
-    case["links"]["duct"] = {"type": "pipe", "from": "port_mouth", "to": "starboard_mouth", "length": 1.5 * HALF,
-                             "diameter": BORE, "wave_speed": 1000.0, "cells": 4}  # fmt: skip
+        case["links"][f"{name}_way"] = {
+            "type": "rigid-column",
+            "from": name,
+            "to": f"{name}_mouth",
+            "length": HALF / 4,
+            "diameter": BORE,
+        }
+    case["links"]["duct"] = {
+        "type": "pipe",
+        "from": "port_mouth",
+        "to": "starboard_mouth",
+        "length": 1.5 * HALF,
+        "diameter": BORE,
+        "wave_speed": 1000.0,
+        "cells": 4,
+    }
     case["numerics"] = {"end": 10.0, "scheme": "upwind5", "method": "rk4", "courant": 0.9}
     case["output"]["probes"].remove("duct.flow")
     run = fv.run(case)
@@ -438,8 +595,16 @@ def test_a_pipe_at_a_tank_of_a_free_body_and_a_column_controlled_by_a_valve_are_
     assert "expected a rigid-column at the tank" in messages_of(case)["links.duct"]
     case = free()
     case["nodes"]["mouth"] = {"type": "junction", "on": "hull", "at": [0, HALF, -DEPTH]}
-    case["links"]["duct"][next(key for key in ("from", "to") if case["links"]["duct"][key] == "port")] = "mouth"
-    case["links"]["gate"] = {"type": "valve", "from": "port", "to": "mouth", "area": 0.1, "discharge_coefficient": 1.0}
+    case["links"]["duct"][
+        next(key for key in ("from", "to") if case["links"]["duct"][key] == "port")
+    ] = "mouth"
+    case["links"]["gate"] = {
+        "type": "valve",
+        "from": "port",
+        "to": "mouth",
+        "area": 0.1,
+        "discharge_coefficient": 1.0,
+    }
     found = messages_of(case)
     assert "neither the flow of a valve nor the tank has inertia" in found["links.gate"]
     assert "at mouth this column joins only valves and columns" in found["links.duct"]
@@ -454,7 +619,9 @@ def test_couplings_of_bodies_and_pipes_are_in_the_pattern(law):
 @pytest.mark.parametrize("joint", ["revolute", "ball"])
 def test_couplings_of_bodies_and_columns_are_in_the_pattern(joint):
     case = free(minor_loss=2.0)
-    case["nodes"]["hull"]["joint"] = {"kind": joint} | ({"axis": [1, 0, 0]} if joint == "revolute" else {})
+    case["nodes"]["hull"]["joint"] = {"kind": joint} | (
+        {"axis": [1, 0, 0]} if joint == "revolute" else {}
+    )
     case["output"]["probes"].remove("hull.angle")
     case["nodes"]["wheel"] = {**BODY, "joint": {"kind": "revolute", "axis": [0, 0, 1]}}
     model, rng = build(fv.load(case)), np.random.default_rng(1)

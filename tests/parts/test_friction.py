@@ -57,13 +57,22 @@ def wylie(opening, cells: int, friction=None, end: float = 4.3, **numerics) -> d
         "valve": valve("gate", "air", FLOW_AREA, opening),
     }
     settings = {"scheme": "upwind5", "method": "rk4", "courant": 0.8, **numerics}
-    return scene(nodes, links, end, settings, ["gate.pressure", "gate.head", "valve.flow", "main.flow"], 0.01)
+    return scene(
+        nodes, links, end, settings, ["gate.pressure", "gate.head", "valve.flow", "main.flow"], 0.01
+    )
 
 
 def reference(opening, gradient=None) -> ValvePipe:
     gradient = gradient or darcy(FACTOR, DIAMETER, RHO)
     return ValvePipe(
-        LENGTH, DIAMETER, SPEED, RHO, gradient, AMBIENT + STATIC, AMBIENT, lambda t: FLOW_AREA * opening(t)
+        LENGTH,
+        DIAMETER,
+        SPEED,
+        RHO,
+        gradient,
+        AMBIENT + STATIC,
+        AMBIENT,
+        lambda t: FLOW_AREA * opening(t),
     )
 
 
@@ -92,7 +101,9 @@ def test_steady_pressure_falls_in_a_straight_line():
     result = fvsolve.run(case)
     lost = FACTOR * LENGTH / DIAMETER * RHO * steady_velocity() ** 2 / 2
     for x in places:
-        assert result[f"main.pressure@{x}"] == pytest.approx(AMBIENT + STATIC - x * lost, abs=1e-9 * STATIC)
+        assert result[f"main.pressure@{x}"] == pytest.approx(
+            AMBIENT + STATIC - x * lost, abs=1e-9 * STATIC
+        )
 
 
 @pytest.mark.parametrize("reynolds", [500.0, 1900.0, 1e4, 1e5, 3e6])
@@ -117,7 +128,11 @@ def test_hazen_williams_loss_is_the_textbook_value():
     friction = {"model": "hazen-williams", "coefficient": coefficient}
     links = {"main": pipe("lake", "gate", length, diameter, 1200.0, 10, friction=friction)}
     result = fvsolve.run(scene(nodes, links, 0.5, scenes.SMOOTH, ["gate.head"]))
-    lost = length * float(hazen_williams(coefficient, diameter, RHO)(np.float64(RHO * q))) / (RHO * GRAVITY)
+    lost = (
+        length
+        * float(hazen_williams(coefficient, diameter, RHO)(np.float64(RHO * q)))
+        / (RHO * GRAVITY)
+    )
     assert 100.0 - result["gate.head"][0] == pytest.approx(lost, rel=5e-3)
 
 
@@ -235,7 +250,9 @@ def test_flow_from_quasi_steady_friction_settles_on_the_colebrook_flow():
         factor = friction_factor(Re=RHO * v * 0.1 / 1e-3, eD=0.01)
         return 20 * GRAVITY - v**2 / 2 * (factor * 2000.0 + (area / 0.004) ** 2)
 
-    assert result["main.flow"][-1] == pytest.approx(area * brentq(gap, 0.01, 10.0, xtol=1e-14), rel=1e-6)
+    assert result["main.flow"][-1] == pytest.approx(
+        area * brentq(gap, 0.01, 10.0, xtol=1e-14), rel=1e-6
+    )
 
 
 NINE = [  # Streeter and Wylie 1967: from, to, length [m], diameter [mm], Hazen-Williams coefficient
@@ -265,13 +282,21 @@ def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
     nodes = {n: junction() for n in pressures} | {"R1": lake(191.0), "air": reservoir(AMBIENT)}
     links = {
         f"{a}-{b}": pipe(
-            a, b, float(x), d / 1000, 1200.0, round(x / 6), friction={"model": "hazen-williams", "coefficient": c}
+            a,
+            b,
+            float(x),
+            d / 1000,
+            1200.0,
+            round(x / 6),
+            friction={"model": "hazen-williams", "coefficient": c},
         )
         for a, b, x, d, c in NINE
     }
     flow_area = 0.1 / math.sqrt(2 * (pressures["N7"] - AMBIENT) / RHO)
     links["valve"] = valve("N7", "air", flow_area, ramp(shut, 1.0, 1.0, 0.0, 2.0))
-    result = fvsolve.run(scene(nodes, links, 4.0, scenes.SMOOTH, ["N7.pressure", "valve.flow"], 0.01))
+    result = fvsolve.run(
+        scene(nodes, links, 4.0, scenes.SMOOTH, ["N7.pressure", "valve.flow"], 0.01)
+    )
     assert result["valve.flow"][0] == pytest.approx(0.1, rel=1e-3)
 
     t, exact = net.gate_pressure(100.0, lambda s: max(0.0, 1 - max(s - shut, 0.0)) ** 2, 1.0, 4.0)
@@ -287,7 +312,9 @@ def test_a_friction_factor_is_that_of_the_wall_alone():
         for loss in (1.5, 0.0) if friction["model"] != "none" else (1.5,):
             links = {"p": pipe("a", "b", 50.0, 0.1, 1000.0, 5, friction=friction, minor_loss=loss)}
             found.append(
-                fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}))).checks["pipes"]["p"]["friction_factor"]
+                fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}))).checks["pipes"]["p"][
+                    "friction_factor"
+                ]
             )
     assert found[0] is None and found[1:] == pytest.approx([0.02, 0.02], rel=1e-9)
 
@@ -297,7 +324,14 @@ NUMBERS = (0.005, 0.05)  # nu L / (a R^2)
 START, DURATION = 0.1, 0.4  # smooth closure, in travel times of the line [s]
 
 
-def line(number: float, cells: int, kind: str = "smooth", end: float = 4.0, reynolds: float = 500.0, **more) -> dict:
+def line(
+    number: float,
+    cells: int,
+    kind: str = "smooth",
+    end: float = 4.0,
+    reynolds: float = 500.0,
+    **more,
+) -> dict:
     """Return a case of a line with a travel time of 1 s between a reservoir and a demand that stops.
 
     number : nu L / (a R^2); reynolds : Reynolds number at the start
@@ -307,13 +341,28 @@ def line(number: float, cells: int, kind: str = "smooth", end: float = 4.0, reyn
     flow = area(d) * reynolds * mu / (rho * d)
     s = np.linspace(0.0, 1.0, 400)
     stop = 1.0 - s**5 * (126 - 420 * s + 540 * s**2 - 315 * s**3 + 70 * s**4)
-    demand = {"time": (START + DURATION * s).tolist(), "value": (flow * stop).tolist(), "kind": "smooth"}
+    demand = {
+        "time": (START + DURATION * s).tolist(),
+        "value": (flow * stop).tolist(),
+        "kind": "smooth",
+    }
     if kind == "step":
         demand = {"time": [0.0, START], "value": [flow, 0.0], "kind": "step"}
-    pipe = {"type": "pipe", "from": "lake", "to": "gate", "length": 1000.0, "diameter": d, "wave_speed": 1000.0,
-            "cells": cells, "friction": {"model": "unsteady", "roughness": 0.0}}  # fmt: skip
+    pipe = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "gate",
+        "length": 1000.0,
+        "diameter": d,
+        "wave_speed": 1000.0,
+        "cells": cells,
+        "friction": {"model": "unsteady", "roughness": 0.0},
+    }
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
-    nodes, probes = {"lake": reservoir(1e6), "gate": junction(demand)}, ["gate.pressure", "main.flow@0.3"]
+    nodes, probes = (
+        {"lake": reservoir(1e6), "gate": junction(demand)},
+        ["gate.pressure", "main.flow@0.3"],
+    )
     case = scene(nodes, {"main": pipe}, end, numerics, probes, 0.02)
     case["fluid"] = {**WATER, "viscosity": mu}
     return {**case, **more}
@@ -343,7 +392,9 @@ def errors(number: float, cells: int, kind: str):
 
 def test_the_transform_of_zielkes_function_is_his_sum_over_the_zeros_of_a_bessel_function():
     s = np.array([0.3, 20.0, 5.0 + 40.0j, 2000.0j])
-    assert unsteady_terms.zielke(s) == approx((stopped_lines.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8)
+    assert unsteady_terms.zielke(s) == approx(
+        (stopped_lines.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8
+    )
 
 
 def printed(weighting: str, tau: np.ndarray, reynolds: float, roughness: float) -> np.ndarray:
@@ -396,7 +447,10 @@ def test_the_weighting_function_follows_the_initial_flow_unless_the_case_states_
         return fvsolve.build(fvsolve.load(case)).checks["pipes"]["main"]["unsteady"]["weighting"]
 
     assert taken(1900.0) == "zielke" and taken(1e5) == "vardy-brown"
-    assert taken(1900.0, weighting="vardy-brown") == "vardy-brown" and taken(1e5, weighting="zielke") == "zielke"
+    assert (
+        taken(1900.0, weighting="vardy-brown") == "vardy-brown"
+        and taken(1e5, weighting="zielke") == "zielke"
+    )
 
 
 # the exact laminar line ---------------------------------------------------------------------------------------------
@@ -427,7 +481,10 @@ def test_pressure_and_flow_along_the_exact_line_obey_conservation_of_mass():
     truth = solved(line(0.05, 40, end=2.3))[2]
     edges = np.linspace(0.0, 1000.0, 11)
     p = [truth.averages("main", edges, t)[0] for t in (2.29, 2.3)]
-    t, h = 2.295 + 0.005 * np.polynomial.legendre.leggauss(4)[0], 0.5 * np.polynomial.legendre.leggauss(4)[1]
+    t, h = (
+        2.295 + 0.005 * np.polynomial.legendre.leggauss(4)[0],
+        0.5 * np.polynomial.legendre.leggauss(4)[1],
+    )
     q = np.array([truth.pipe("main", edges, np.full(11, when))[1] for when in t])
     left = (p[1] - p[0]) / 0.01 / (WATER["density"] * 1e6) * 100.0 * area(0.02)
     assert left == approx(-np.diff(h @ q), abs=1e-7 * np.max(np.abs(left)))
@@ -448,7 +505,9 @@ def test_a_sudden_closure_is_within_1e_4_of_the_jump_away_from_fronts(number):
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_heads_come_nearer_with_every_doubling_of_cells(number):
-    found = [float(np.max(np.abs(errors(number, cells, "smooth")[1]))) for cells in (25, 50, 100, 200)]
+    found = [
+        float(np.max(np.abs(errors(number, cells, "smooth")[1]))) for cells in (25, 50, 100, 200)
+    ]
     assert all(finer < coarser / 4.0 for coarser, finer in zip(found, found[1:], strict=False))
 
 
@@ -507,7 +566,10 @@ def test_a_main_stays_at_the_first_plateau_and_converges_from_a_single_side():
     """
     heads = []
     for cells in (25, 50, 100, 200):
-        keys = {"links.main.cells": cells, "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"}}
+        keys = {
+            "links.main.cells": cells,
+            "links.main.friction": {"model": "unsteady", "roughness": "0.26 mm"},
+        }
         run = fvsolve.run(CASES / "valve-closure.toml", keys)
         head = np.array(run["gate.head"]) / FOOT
         assert head.max() < 1.01 * 326.0
@@ -587,7 +649,11 @@ def test_faults(friction, kind, words):
 def test_a_weighting_by_reynolds_number_requires_a_reynolds_number():
     case = line(0.02, 9)
     case["nodes"]["gate"]["demand"] = 0.0
-    case["links"]["main"]["friction"] = {"model": "unsteady", "roughness": 1e-5, "weighting": "vardy-brown"}
+    case["links"]["main"]["friction"] = {
+        "model": "unsteady",
+        "roughness": 1e-5,
+        "weighting": "vardy-brown",
+    }
     with pytest.raises(CaseError, match="friction.weighting: vardy-brown .* there is no flow"):
         fvsolve.build(fvsolve.load(case))
 

@@ -30,7 +30,9 @@ def refusal(path, text, encoding="utf-8"):
     return str(refused.value)
 
 
-@pytest.mark.parametrize("mark, point", [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+@pytest.mark.parametrize(
+    "mark, point", [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]
+)
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 def test_numbers_are_read_whatever_parts_them(mark, point, ending, tmp_path):
     rows = [f"{a}{mark}{b}".replace(".", point) for a, b in zip(T, H, strict=True)]
@@ -99,7 +101,9 @@ def test_ambiguous_files_are_refused_with_their_line(text, words, tmp_path):
 
 
 def test_bytes_that_are_no_text_are_named(tmp_path):
-    assert "rig.csv is not UTF-8 or UTF-16 text" in refusal(tmp_path / "rig.csv", "t,Hö\n0,1\n", "latin-1")
+    assert "rig.csv is not UTF-8 or UTF-16 text" in refusal(
+        tmp_path / "rig.csv", "t,Hö\n0,1\n", "latin-1"
+    )
     (tmp_path / "rig.csv").write_bytes(b"PK\x03\x04\x00\x00\x00\x00\x12\x00\x00\x00\n1\n")
     with pytest.raises(ValueError, match="not UTF-8 or UTF-16 text"):
         read_columns(tmp_path / "rig.csv", None, None, "head", ReadContext())
@@ -108,8 +112,14 @@ def test_bytes_that_are_no_text_are_named(tmp_path):
 def test_a_measured_series_with_decimal_commas_is_compared_as_measured(tmp_path):
     (tmp_path / "rig.csv").write_text("t [s];H [m]\n0,0;5,25\n0,5;5,25\n1,0;5,25\n")
     nodes = {"lake": lake(5.0), "pond": tank(1.0, 5.0)}
-    case = scene(nodes, {"gate": valve("lake", "pond", 0.01)}, 1.0, {"rtol": 1e-6}, ["lake.head"],
-                 compare={"lake.head": {"file": str(tmp_path / "rig.csv")}})  # fmt: skip
+    case = scene(
+        nodes,
+        {"gate": valve("lake", "pond", 0.01)},
+        1.0,
+        {"rtol": 1e-6},
+        ["lake.head"],
+        compare={"lake.head": {"file": str(tmp_path / "rig.csv")}},
+    )
     (found,) = fvsolve.run(case).comparisons
     assert found.points == 3 and found.rms == approx(0.25, rel=1e-12)
     (tmp_path / "rig.csv").write_text("t [s],H [m]\n0,0,5,25\n0,5,5,25\n")
@@ -130,23 +140,38 @@ def test_points_of_a_bed_are_read_in_their_units(text, tmp_path):
 
 
 @pytest.mark.parametrize("order", ["by rows", "by columns", "mixed"])
-def test_points_on_a_rectangular_grid_are_interpolated_bilinearly_and_others_in_triangles(order, tmp_path):
+def test_points_on_a_rectangular_grid_are_interpolated_bilinearly_and_others_in_triangles(
+    order, tmp_path
+):
     def shape(x, y):
         return 1.0 + 0.5 * x - y + 0.25 * x * y
 
     x, y = (q.ravel() for q in np.meshgrid([0.0, 1.0, 3.0], [-1.0, 0.0, 0.5, 2.0]))
-    at = {"by rows": np.arange(12), "by columns": np.lexsort((y, x)), "mixed": np.random.default_rng(3).permutation(12)}
+    at = {
+        "by rows": np.arange(12),
+        "by columns": np.lexsort((y, x)),
+        "mixed": np.random.default_rng(3).permutation(12),
+    }
     table = np.column_stack([x, y, shape(x, y)])[at[order]]
     places = np.array([0.3, 2.9, 1.0, -5.0, 9.0, 0.5]), np.array([-0.9, 1.7, 0.5, 0.25, -3.0, 7.0])
 
     def read(rows):
-        np.savetxt(tmp_path / "bed.csv", rows, delimiter=",", header="x [m],y [m],bed [m]", comments="")
-        return SpatialFieldKey("length").read({"file": "bed.csv"}, ReadContext(folder=tmp_path)).at(*places)
+        np.savetxt(
+            tmp_path / "bed.csv", rows, delimiter=",", header="x [m],y [m],bed [m]", comments=""
+        )
+        return (
+            SpatialFieldKey("length")
+            .read({"file": "bed.csv"}, ReadContext(folder=tmp_path))
+            .at(*places)
+        )
 
     inside = np.clip(places[0], 0.0, 3.0), np.clip(places[1], -1.0, 2.0)
     assert read(table) == approx(shape(*inside), rel=1e-14)
     scattered = read(table[table[:, 2] != table[5, 2]])  # without one point they form no grid
-    assert scattered[0] != approx(shape(0.3, -0.9), rel=1e-3) and np.isin(scattered[3:], table[:, 2]).all()
+    assert (
+        scattered[0] != approx(shape(0.3, -0.9), rel=1e-3)
+        and np.isin(scattered[3:], table[:, 2]).all()
+    )
 
 
 @pytest.mark.parametrize("text", [
@@ -156,7 +181,9 @@ def test_points_on_a_rectangular_grid_are_interpolated_bilinearly_and_others_in_
 def test_velocities_are_read_alike(text, tmp_path):
     mesh = rectangle((1.0, 1.0), (2, 2))
     (tmp_path / "v.csv").write_text(text)
-    assert face_flows(mesh, {"file": tmp_path / "v.csv"}) == approx(0.5 * mesh.normal[:, 0] * mesh.length, abs=1e-15)
+    assert face_flows(mesh, {"file": tmp_path / "v.csv"}) == approx(
+        0.5 * mesh.normal[:, 0] * mesh.length, abs=1e-15
+    )
     (tmp_path / "v.csv").write_text("x,y,u,v\n0,0,0,5,0,0\n")
     with pytest.raises(MeshError, match="line 2: 6 cells under 4 headers; with decimal commas"):
         face_flows(mesh, {"file": tmp_path / "v.csv"})
@@ -176,4 +203,6 @@ def test_a_megabyte_of_equal_characters_is_read_or_refused_in_bounded_time(sign,
 
 
 def test_a_file_of_too_large_a_number_of_columns_is_refused(tmp_path):
-    assert "has 10001 columns; expected at most 4096" in refusal(tmp_path / "rig.csv", "a," * 10**4 + "b\n" * 2)
+    assert "has 10001 columns; expected at most 4096" in refusal(
+        tmp_path / "rig.csv", "a," * 10**4 + "b\n" * 2
+    )

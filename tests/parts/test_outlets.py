@@ -33,15 +33,35 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.parts.outlet.law_outlet import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step
+from fvsolve.parts.outlet.law_outlet import (
+    FREE,
+    LEAST_DROP,
+    emitter_drop,
+    emitter_flow,
+    emitter_slope,
+    emitter_step,
+)
 from fvsolve.studies import sweep
 from fvsolve.studies.energy_balance import energy
 
-ADAPTIVE = ("auto", "rodas-5p", "rodas-4", "radau-iia-5", "esdirk-4", "tr-bdf2", "dormand-prince", "bogacki-shampine")
+ADAPTIVE = (
+    "auto",
+    "rodas-5p",
+    "rodas-4",
+    "radau-iia-5",
+    "esdirk-4",
+    "tr-bdf2",
+    "dormand-prince",
+    "bogacki-shampine",
+)
 FIXED = ("rk4", "implicit-euler", "trapezoid", "implicit-midpoint")
 FOOT = 10.0  # the law is a power above this drop and a cubic polynomial below [Pa]
 GAP = 0.01  # Cd A of the valve before a demand [m2]
-NEED = {"minimum_pressure": AMBIENT + 2e4, "required_pressure": AMBIENT + 4e4, "demand_exponent": 0.5}
+NEED = {
+    "minimum_pressure": AMBIENT + 2e4,
+    "required_pressure": AMBIENT + 4e4,
+    "demand_exponent": 0.5,
+}
 
 
 def power(x: float, n: float, span: float) -> float:
@@ -56,7 +76,13 @@ def behind(gauge: float, law, least: float) -> float:
     """Flow [m3/s] from a place at `gauge` [Pa] through a valve to an outlet that opens at `least` [Pa]."""
     if gauge <= least:
         return 0.0
-    p = brentq(lambda p: GAP * np.sqrt(2 * (gauge - p) / RHO) - law(p), least, gauge, xtol=1e-13, rtol=1e-15)
+    p = brentq(
+        lambda p: GAP * np.sqrt(2 * (gauge - p) / RHO) - law(p),
+        least,
+        gauge,
+        xtol=1e-13,
+        rtol=1e-15,
+    )
     return law(p)
 
 
@@ -86,8 +112,14 @@ def left(outlet: str) -> float:
     """Outflow [kg] of a soft chamber of 1 m3 with the inflow FILLS: dp/dt = K / V (inflow - outflow)."""
     law, y = LAWS[outlet], [5e4, 0.0]
     for start, end, fill in zip(TURNS, TURNS[1:], FILLS, strict=False):
-        found = solve_ivp(lambda t, y, fill=fill: [3e5 * (fill - law(y[0])), law(y[0])], (start, end), y,
-                          "DOP853", rtol=1e-11, atol=1e-10)  # fmt: skip
+        found = solve_ivp(
+            lambda t, y, fill=fill: [3e5 * (fill - law(y[0])), law(y[0])],
+            (start, end),
+            y,
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-10,
+        )
         y = found.y[:, -1]
     return RHO * float(y[1])
 
@@ -96,8 +128,9 @@ def ball(outlet: str, numerics: dict, law: str = "linear") -> dict:
     """Return a case of the chamber of `left`."""
     nodes = {
         "mouth": inflow({"time": TURNS[:-1], "value": FILLS, "kind": "step"}),
-        "ball": chamber(1.0, AMBIENT + 5e4), "town": junction(0.02, **NEED),
-    }  # fmt: skip
+        "ball": chamber(1.0, AMBIENT + 5e4),
+        "town": junction(0.02, **NEED),
+    }
     links = {"in": valve("mouth", "ball", 0.05), "way": valve("ball", "town", GAP)}
     if outlet == "leak":
         del nodes["town"], links["way"]
@@ -106,9 +139,12 @@ def ball(outlet: str, numerics: dict, law: str = "linear") -> dict:
 
 
 PAIRS = [
-    (outlet, method) for outlet in LAWS for method in (*ADAPTIVE, *FIXED)
-    if outlet == "leak" or method not in ("dormand-prince", "bogacki-shampine")  # limited by the node behind the valve
-]  # fmt: skip
+    (outlet, method)
+    for outlet in LAWS
+    for method in (*ADAPTIVE, *FIXED)
+    if outlet == "leak"
+    or method not in ("dormand-prince", "bogacki-shampine")  # limited by the node behind the valve
+]
 
 
 @pytest.mark.parametrize("outlet, method", PAIRS)
@@ -119,7 +155,8 @@ def test_an_outlet_at_a_compliant_node_lets_nothing_in_and_discharges_by_its_law
     near = 1e-4 if method == "implicit-euler" else 3e-5  # accuracy of the pressure
     assert way["outflow"] == pytest.approx(left(outlet), rel=near)
     assert way.get("inflow", 0.0) == 0.0
-    assert abs(result.ledger["mass"]["relative"]) < 1e-10  # bound of Rosenbrock methods, with slopes by differences
+    # bound of Rosenbrock methods, with slopes by differences
+    assert abs(result.ledger["mass"]["relative"]) < 1e-10
 
 
 @pytest.mark.in_turn
@@ -139,11 +176,13 @@ def test_its_energy_ledger_closes_over_steps_that_end_at_a_bend(method):
     assert relative < 1e-5
 
 
-SWINGS = [0.0, 10.0, 20.0, 30.0], [1e5, -0.5e5, 0.7e5, -0.2e5]  # of a source: times [s], gauge pressures [Pa]
+# of a source: times [s], gauge pressures [Pa]
+SWINGS = [0.0, 10.0, 20.0, 30.0], [1e5, -0.5e5, 0.7e5, -0.2e5]
 TINY = 1e-6
 STATELESS = {
-    "leak": (lambda gauge: leaks(gauge, TINY), 0.0, (0.0, FOOT)), "demand": (takes, 2e4, (2e4, 2e4 + FOOT, 4e4)),
-}  # fmt: skip
+    "leak": (lambda gauge: leaks(gauge, TINY), 0.0, (0.0, FOOT)),
+    "demand": (takes, 2e4, (2e4, 2e4 + FOOT, 4e4)),
+}
 
 
 @functools.cache
@@ -153,10 +192,18 @@ def passed(outlet: str) -> float:
     edges = [p + RHO / 2 * (law(p) / GAP) ** 2 for p in bends]
     total = 0.0
     for a, b, p, r in zip(*(part for row in SWINGS for part in (row, row[1:])), strict=False):
-        met = [a + (b - a) * (edge - p) / (r - p) for edge in edges if (edge - p) * (edge - r) < 0.0]
+        met = [
+            a + (b - a) * (edge - p) / (r - p) for edge in edges if (edge - p) * (edge - r) < 0.0
+        ]
         for start, end in itertools.pairwise(sorted([a, *met, b])):
-            total += quad(lambda t, a=a, b=b, p=p, r=r: behind(p + (r - p) * (t - a) / (b - a), law, least), start, end,
-                          epsabs=1e-12, epsrel=1e-11, limit=200)[0]  # fmt: skip
+            total += quad(
+                lambda t, a=a, b=b, p=p, r=r: behind(p + (r - p) * (t - a) / (b - a), law, least),
+                start,
+                end,
+                epsabs=1e-12,
+                epsrel=1e-11,
+                limit=200,
+            )[0]
     return RHO * total
 
 
@@ -173,7 +220,9 @@ def test_outflow_without_a_state_follows_its_law(outlet, method):
         links |= {"hole": {"type": "leak", "from": "town", "coefficient": TINY}}
     numerics = {"method": method, "step": 0.005} if method in FIXED else {"method": method}
     result = fvsolve.run(scene(nodes, links, 30.0, numerics, ["in.flow"], 1.0))
-    way = result.ledger["mass"]["nodes"]["hole.outside" if outlet == "leak" else "town.demand.outside"]
+    way = result.ledger["mass"]["nodes"][
+        "hole.outside" if outlet == "leak" else "town.demand.outside"
+    ]
     near = 3e-4 if method == "implicit-euler" else 1e-5 if method in (*FIXED, "tr-bdf2") else 2e-6
     assert way["outflow"] == pytest.approx(passed(outlet), rel=near) and way["inflow"] == 0.0
     assert result.ledger["mass"]["nodes"]["lake"].get("outflow", 0.0) == 0.0
@@ -192,9 +241,15 @@ def test_a_tank_drains_by_the_power_of_its_level(n):
     section, level, end = 2.0, 3.0, 60.0
     c = 0.02 / (RHO * GRAVITY * level) ** n
     nodes = {"t": tank(section, level)}
-    result = fvsolve.run(scene(nodes, {"hole": leak("t", c, n)}, end, TIGHT, ["t.level", "hole.flow"], 1.0))
+    result = fvsolve.run(
+        scene(nodes, {"hole": leak("t", c, n)}, end, TIGHT, ["t.level", "hole.flow"], 1.0)
+    )
     k, t = c * (RHO * GRAVITY) ** n / section, np.asarray(result.t)
-    exact = level * np.exp(-k * t) if n == 1.0 else (level ** (1 - n) - (1 - n) * k * t) ** (1 / (1 - n))
+    exact = (
+        level * np.exp(-k * t)
+        if n == 1.0
+        else (level ** (1 - n) - (1 - n) * k * t) ** (1 / (1 - n))
+    )
     assert result["t.level"] == pytest.approx(exact, rel=1e-9)
     assert result["hole.flow"] == pytest.approx(c * (RHO * GRAVITY * exact) ** n, rel=1e-8)
     assert abs(result.ledger["mass"]["relative"]) < 1e-13
@@ -205,8 +260,19 @@ def test_the_steady_state_in_a_line_is_that_of_both_laws(law):
     """The flow of a valve into a dead end equals the leakage there, with the elevation of the place."""
     nodes = {"lake": lake(60.0), "a": junction(elevation=10.0), "b": junction(elevation=12.0)}
     nodes["lake"]["elevation"] = 10.0
-    links = {"gap": valve("lake", "a", 1e-3), "line": pipe("a", "b", 100.0, 0.1, 1000.0, 10), "hole": leak("b", 2e-6)}
-    case = scene(nodes, links, 0.5, {"scheme": "muscl"}, ["hole.flow", "gap.flow"], fluid=WATER | {"law": law})
+    links = {
+        "gap": valve("lake", "a", 1e-3),
+        "line": pipe("a", "b", 100.0, 0.1, 1000.0, 10),
+        "hole": leak("b", 2e-6),
+    }
+    case = scene(
+        nodes,
+        links,
+        0.5,
+        {"scheme": "muscl"},
+        ["hole.flow", "gap.flow"],
+        fluid=WATER | {"law": law},
+    )
     model = fvsolve.build(fvsolve.load(case))
     assert not model.rhs(0.0, np.zeros(model.y_size)).any()
 
@@ -214,7 +280,9 @@ def test_the_steady_state_in_a_line_is_that_of_both_laws(law):
         return RHO * GRAVITY * (60.0 - 12.0) - RHO * (q / 1e-3) ** 2 / 2 - (q / 2e-6) ** 2
 
     q = brentq(drop, 0.0, 1.0, xtol=1e-16)
-    assert model.observe(0.0, np.zeros(model.y_size)) == pytest.approx([q, q], rel=1e-8 if law == "linear" else 1e-3)
+    assert model.observe(0.0, np.zeros(model.y_size)) == pytest.approx(
+        [q, q], rel=1e-8 if law == "linear" else 1e-3
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -238,7 +306,10 @@ def test_its_slope_is_bounded_without_a_jump_and_that_of_its_flow(n):
     drops = np.concatenate([np.linspace(-5.0, 3 * LEAST_DROP, 1001), np.geomspace(50.0, 1e6, 50)])
     slope = np.array([emitter_slope(law, 0, 1e-4, d, FREE) for d in drops])
     ends = ((d - 1e-4, d + 1e-4) for d in drops)
-    rise = [(emitter_flow(law, 0, 1e-4, b, FREE) - emitter_flow(law, 0, 1e-4, a, FREE)) / 2e-4 for a, b in ends]
+    rise = [
+        (emitter_flow(law, 0, 1e-4, b, FREE) - emitter_flow(law, 0, 1e-4, a, FREE)) / 2e-4
+        for a, b in ends
+    ]
     assert slope == pytest.approx(rise, rel=1e-4, abs=1e-3 * slope.max())
     assert (slope >= 0.0).all() and slope[drops <= 0.0].max() == 0.0
     assert np.abs(np.diff(slope[:1001])).max() < 0.02 * slope.max()
@@ -249,7 +320,11 @@ def test_newton_finds_its_balance_with_a_line_from_anywhere(n):
     """Newton's method finds the known root of c - Y p = M(p) from any start, and `emitter_drop` inverts the flow."""
     law, rng = np.array([n, 0.0, 1e5, 1e300]), np.random.default_rng(0)
     for _ in range(300):
-        g, y, root = 10.0 ** rng.uniform(-9, -2), 10.0 ** rng.uniform(-7, -2), rng.choice([-3.0, 0.5, 7.0, 12.0, 4e4])
+        g, y, root = (
+            10.0 ** rng.uniform(-9, -2),
+            10.0 ** rng.uniform(-7, -2),
+            rng.choice([-3.0, 0.5, 7.0, 12.0, 4e4]),
+        )
         c = y * root + emitter_flow(law, 0, g, root, FREE)
         p, m, moved = rng.choice([-500.0, 3.0, 300.0, 1e6]), rng.choice([0.0, 1e-4, 1.0]), np.inf
         for _ in range(60):
@@ -260,7 +335,9 @@ def test_newton_finds_its_balance_with_a_line_from_anywhere(n):
                 break
         assert p == pytest.approx(root, rel=1e-9, abs=1e-7)
         if root > 0.0:
-            assert emitter_drop(law, 0, g, emitter_flow(law, 0, g, root, FREE), FREE) == pytest.approx(root, rel=1e-9)
+            assert emitter_drop(
+                law, 0, g, emitter_flow(law, 0, g, root, FREE), FREE
+            ) == pytest.approx(root, rel=1e-9)
 
 
 def test_a_line_sucks_at_a_leak_and_the_run_goes_on():
@@ -283,7 +360,9 @@ def test_two_leaks_on_a_junction_share_the_flow_of_a_valve():
     """Pressure of a junction at which only a valve and two leaks balance."""
     nodes = {"lake": reservoir(AMBIENT + 4e5), "a": junction()}
     links = {"gap": valve("lake", "a", 1e-4), "one": leak("a", 1e-6), "two": leak("a", 1e-9, 1.2)}
-    model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {"step": 0.1}, ["a.pressure", "gap.flow"])))
+    model = fvsolve.build(
+        fvsolve.load(scene(nodes, links, 1.0, {"step": 0.1}, ["a.pressure", "gap.flow"]))
+    )
 
     def short(p):
         return 1e-4 * math.sqrt(2 * (4e5 - p) / RHO) - 1e-6 * math.sqrt(p) - 1e-9 * p**1.2
@@ -296,7 +375,9 @@ def test_two_leaks_on_a_junction_share_the_flow_of_a_valve():
 def test_leakage_is_dissipated_and_the_ledger_closes(law):
     nodes = {"t": tank(0.5, 4.0), "g": junction()}
     links = {"line": pipe("t", "g", 10.0, 0.05, 1000.0, 10), "hole": leak("g", 1e-6)}
-    one = energy(scene(nodes, links, 0.3, {"method": "rk4", "scheme": "upwind5"}, fluid=WATER | {"law": law}))
+    one = energy(
+        scene(nodes, links, 0.3, {"method": "rk4", "scheme": "upwind5"}, fluid=WATER | {"law": law})
+    )
     assert set(one.dissipated) >= {"hole"} and one.dissipated["hole"][-1] > 0.0 and not one.supplied
     assert one.relative < 1e-6
 
@@ -322,8 +403,10 @@ def test_a_leak_is_drawn_where_it_drains(stated, tmp_path):
     """Fields are written although no other part names the outlet of the leak."""
     nodes = {"a": lake(40.0, **stated), "j": junction(**stated)}
     links = {"main": pipe("a", "j", 100.0, 0.1, 1000.0, 5), "hole": leak("j", 1e-6)}
-    result = fvsolve.run(scene(nodes, links, 0.5, {}, ["hole.flow"], 0.1, output={"every": 0.1, "fields": 2}),
-                         out=tmp_path / "run")  # fmt: skip
+    result = fvsolve.run(
+        scene(nodes, links, 0.5, {}, ["hole.flow"], 0.1, output={"every": 0.1, "fields": 2}),
+        out=tmp_path / "run",
+    )
     assert result.ok and (tmp_path / "run" / "fields.pvd").is_file()
 
 
@@ -331,8 +414,14 @@ CDA, BURST, SECTION, FILL = 2e-3, 3.5e4, 0.5, 0.05
 
 
 def disc(start: str, burst: float = BURST, **more) -> dict:
-    return {"type": "rupture-disc", "from": start, "area": CDA, "discharge_coefficient": 1.0, "burst_pressure": burst,
-            **more}  # fmt: skip
+    return {
+        "type": "rupture-disc",
+        "from": start,
+        "area": CDA,
+        "discharge_coefficient": 1.0,
+        "burst_pressure": burst,
+        **more,
+    }
 
 
 def filled(numerics: dict, law: str = "linear", **more) -> dict:
@@ -342,7 +431,13 @@ def filled(numerics: dict, law: str = "linear", **more) -> dict:
     if "to" in more:
         nodes[more["to"]] = reservoir(AMBIENT)
     return scene(
-        nodes, links, 20.0, numerics, ["t.level", "disc.flow", "disc.opening"], 0.5, fluid=WATER | {"law": law}
+        nodes,
+        links,
+        20.0,
+        numerics,
+        ["t.level", "disc.flow", "disc.opening"],
+        0.5,
+        fluid=WATER | {"law": law},
     )
 
 
@@ -356,8 +451,12 @@ def emptied(level: float) -> float:
     return past(math.sqrt(level)) - past(math.sqrt(BURST / (RHO * GRAVITY)))
 
 
-METHODS = [{"method": "dormand-prince", "rtol": 1e-10}, {"method": "radau-iia-5", "rtol": 1e-10},
-           {"method": "rodas-5p", "rtol": 1e-9}, {"method": "rk4", "step": 0.1}]  # fmt: skip
+METHODS = [
+    {"method": "dormand-prince", "rtol": 1e-10},
+    {"method": "radau-iia-5", "rtol": 1e-10},
+    {"method": "rodas-5p", "rtol": 1e-9},
+    {"method": "rk4", "step": 0.1},
+]
 
 
 @pytest.mark.in_turn
@@ -388,17 +487,33 @@ def test_a_wave_bursts_it_on_arrival_and_the_line_supplies_by_its_impedance(law,
     """The jump rho a v arrives after L / a; then p = 5e5 + rho a v - Z q / 2 = ambient + rho / 2 (q / CdA)^2."""
     v, speed, bore = 1.0, 1000.0, 0.2
     ends = ("gate", "far") if turned else ("far", "gate")
-    nodes = {"lake": reservoir(5e5), "far": junction(), "gate": junction({"time": [0.0, 0.1],
-             "value": [v * area(bore), 0.0], "kind": "step"})}  # fmt: skip
-    links = {"up": pipe("lake", "far", 1000.0, bore, speed, 200), "main": pipe(*ends, 100.0, bore, speed, 20),
-             "disc": disc("far", 8e5)}  # fmt: skip
+    nodes = {
+        "lake": reservoir(5e5),
+        "far": junction(),
+        "gate": junction({"time": [0.0, 0.1], "value": [v * area(bore), 0.0], "kind": "step"}),
+    }
+    links = {
+        "up": pipe("lake", "far", 1000.0, bore, speed, 200),
+        "main": pipe(*ends, 100.0, bore, speed, 20),
+        "disc": disc("far", 8e5),
+    }
     fluid = WATER | {"law": law} | ({"air_fraction": 0.0} if law == "mixture" else {})
-    result = fvsolve.run(scene(nodes, links, 0.4, {"scheme": "upwind", "method": "euler", "courant": 1.0},
-                               ["far.pressure", "disc.flow"], 0.01, fluid=fluid))  # fmt: skip
+    result = fvsolve.run(
+        scene(
+            nodes,
+            links,
+            0.4,
+            {"scheme": "upwind", "method": "euler", "courant": 1.0},
+            ["far.pressure", "disc.flow"],
+            0.01,
+            fluid=fluid,
+        )
+    )
     (event,) = result.summary["events"]
     assert event["time"] == pytest.approx(0.2, abs=6e-3)
     jump, z = RHO * speed * v, RHO * speed / area(bore)
-    k, head = RHO / (2.0 * CDA**2), 5e5 + jump - AMBIENT  # pipes on both sides: p = 5e5 + jump - Z q / 2
+    # pipes on both sides: p = 5e5 + jump - Z q / 2
+    k, head = RHO / (2.0 * CDA**2), 5e5 + jump - AMBIENT
     q = (-0.5 * z + math.sqrt(0.25 * z**2 + 4.0 * k * head)) / (2.0 * k)
     near = 1e-9 if law == "linear" else 0.03
     after = (np.asarray(result.t) > 0.22) & (np.asarray(result.t) < 0.36)
@@ -409,9 +524,14 @@ def test_a_wave_bursts_it_on_arrival_and_the_line_supplies_by_its_impedance(law,
 
 def test_nothing_comes_back_from_ambient_and_its_energy_closes():
     """The pressure of a lake bursts the disc and then falls below ambient."""
-    nodes = {"lake": reservoir({"time": [0.0, 1.0, 3.0, 4.0], "value": [1.2e5, 2e5, 0.6e5, 1.5e5]}), "b": junction()}
+    nodes = {
+        "lake": reservoir({"time": [0.0, 1.0, 3.0, 4.0], "value": [1.2e5, 2e5, 0.6e5, 1.5e5]}),
+        "b": junction(),
+    }
     links = {"line": pipe("lake", "b", 10.0, 0.1, 1000.0, 10), "disc": disc("b", 5e4)}
-    case = scene(nodes, links, 4.0, {"method": "dormand-prince", "rtol": 1e-7}, ["disc.flow", "b.pressure"])
+    case = scene(
+        nodes, links, 4.0, {"method": "dormand-prince", "rtol": 1e-7}, ["disc.flow", "b.pressure"]
+    )
     result = fvsolve.run(case)
     flow, gauge = result["disc.flow"], result["b.pressure"] - AMBIENT
     assert [event["what"] for event in result.summary["events"]] == ["bursts"]
@@ -428,14 +548,27 @@ def test_resumed_before_and_after_it_burst_it_is_the_unbroken_run(tmp_path, end)
     fvsolve.run(case, set={"numerics.end": end}, out=tmp_path / "run", pictures=False)
     result = fvsolve.run(case, out=tmp_path / "run", resume=True, pictures=False)
     whole = fvsolve.run(case)
-    assert np.array_equal(result["t.level"], whole["t.level"]) and result.summary["events"] == whole.summary["events"]
+    assert (
+        np.array_equal(result["t.level"], whole["t.level"])
+        and result.summary["events"] == whole.summary["events"]
+    )
 
 
 def test_placed_by_chainage_it_stands_off_the_pipe():
-    nodes, links = {"a": reservoir(2e5), "b": junction()}, {"main": pipe("a", "b", 100.0, 0.2, 1000.0, 10)}
-    links["disc"] = {key: value for key, value in disc("", 2e5).items() if key != "from"} | {"on": "main", "at": 50.0}
+    nodes, links = (
+        {"a": reservoir(2e5), "b": junction()},
+        {"main": pipe("a", "b", 100.0, 0.2, 1000.0, 10)},
+    )
+    links["disc"] = {key: value for key, value in disc("", 2e5).items() if key != "from"} | {
+        "on": "main",
+        "at": 50.0,
+    }
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 0.1, {"scheme": "upwind"})))
-    assert model.valve_names == ["disc"] and "disc.outside" in model.node_names and len(model.tables.pipes) == 2
+    assert (
+        model.valve_names == ["disc"]
+        and "disc.outside" in model.node_names
+        and len(model.tables.pipes) == 2
+    )
 
 
 @pytest.mark.parametrize(
@@ -460,10 +593,24 @@ QUASI = {"numerics.pipe_model": "quasi-steady", "numerics.end": 1.0}
 def street(**keys):
     """Scene of a hydrant at the end of a quasi-steady pipe from a lake at 50 m, with a demand of 5 l/s there."""
     nodes = {"lake": lake(50.0, elevation=40.0), "end": junction(5e-3, elevation=10.0)}
-    main = {"type": "pipe", "from": "lake", "to": "end", "length": 800.0, "diameter": 0.15,
-            "friction": {"model": "steady", "factor": 0.02}, "pipe_model": "quasi-steady"}  # fmt: skip
+    main = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "end",
+        "length": 800.0,
+        "diameter": 0.15,
+        "friction": {"model": "steady", "factor": 0.02},
+        "pipe_model": "quasi-steady",
+    }
     fire = {"type": "hydrant", "from": "end", **keys}
-    return scene(nodes, {"main": main, "fire": fire}, 1.0, {"rtol": 1e-9}, ["fire.flow", "fire.gauge_pressure"], 0.5)
+    return scene(
+        nodes,
+        {"main": main, "fire": fire},
+        1.0,
+        {"rtol": 1e-9},
+        ["fire.flow", "fire.gauge_pressure"],
+        0.5,
+    )
 
 
 def gauge_with(flow: float) -> float:
@@ -478,25 +625,33 @@ def test_a_hydrant_draws_its_flow_or_the_flow_at_its_residual_pressure():
     assert run["fire.gauge_pressure"] == pytest.approx(gauge_with(0.02), rel=1e-9)
     for least in (1.4e5, 0.0):
         run = fvsolve.run(street(flow=0.5, residual_pressure=AMBIENT + least))
-        q = brentq(lambda q, least=least: gauge_with(q) - least - 100.0 * (q / 0.5) ** 2, 0.0, 0.1, xtol=1e-15)
+        q = brentq(
+            lambda q, least=least: gauge_with(q) - least - 100.0 * (q / 0.5) ** 2,
+            0.0,
+            0.1,
+            xtol=1e-15,
+        )
         assert run["fire.flow"] == pytest.approx(q, rel=1e-4)  # a cubic below 10 Pa
         assert least < run["fire.gauge_pressure"][-1] < least + 100.0
-    run = fvsolve.run(street(flow=0.02, residual_pressure=AMBIENT + 5e5))  # above that without the hydrant
+    # above that without the hydrant
+    run = fvsolve.run(street(flow=0.02, residual_pressure=AMBIENT + 5e5))
     assert run["fire.flow"] == pytest.approx(0.0, abs=1e-12)
     assert run["fire.gauge_pressure"] == pytest.approx(gauge_with(0.0), rel=1e-9)
 
 
 def test_a_residual_pressure_below_ambient_is_a_fault():
     text = refused(street(flow=0.02, residual_pressure=0.9 * AMBIENT))
-    assert "links.fire.residual_pressure: 91192.5 Pa is below ambient pressure, at which nothing can flow out" in str(
-        text
+    assert (
+        "links.fire.residual_pressure: 91192.5 Pa is below ambient pressure, at which nothing can flow out"
+        in str(text)
     )
 
 
 def test_a_name_of_digits_is_a_name_where_it_replaces_a_name():
     case = street(flow=0.02)
-    case["nodes"] = {name.replace("end", "22"): node for name, node in case["nodes"].items()} | {"31": junction(
-        elevation=20.0)}  # fmt: skip
+    case["nodes"] = {name.replace("end", "22"): node for name, node in case["nodes"].items()} | {
+        "31": junction(elevation=20.0)
+    }
     case["links"]["main"]["to"] = case["links"]["fire"]["from"] = "22"
     case["links"]["rest"] = {**case["links"]["main"], "from": "22", "to": "31", "length": 31.0}
     rows = sweep(case, {"links.fire.from": [22, "31"]}, {"links.rest.length": 22}).rows
@@ -528,7 +683,11 @@ def test_fire_flows_of_net1_are_those_of_epanet(tmp_path):
     from fvsolve.exchange.epanet import import_network
 
     source = Path(wntr.__file__).parent / "library" / "networks" / "Net1.inp"
-    text = source.read_text().replace("[OPTIONS]", "[OPTIONS]\n Demand Multiplier 1.0").replace("0.001", "1e-6")
+    text = (
+        source.read_text()
+        .replace("[OPTIONS]", "[OPTIONS]\n Demand Multiplier 1.0")
+        .replace("0.001", "1e-6")
+    )
     (tmp_path / "net.inp").write_text(text)
     (tmp_path / "net.toml").write_text(
         import_network(tmp_path / "net.inp").text
@@ -539,7 +698,10 @@ from = "22"
 flow = "50 l/s"
 """
     )
-    nodes, case = ["22", "23", "31", "32", "13"], fvsolve.load(tmp_path / "net.toml", {"output.units": {}})
+    nodes, case = (
+        ["22", "23", "31", "32", "13"],
+        fvsolve.load(tmp_path / "net.toml", {"output.units": {}}),
+    )
     elevations = {name: case.nodes[name].elevation for name in nodes}
     weight = case.properties.density * case.gravity
     keys = QUASI | {"output.probes": ["fire.gauge_pressure", "fire.flow"], "output.units": {}}
@@ -547,10 +709,15 @@ flow = "50 l/s"
     for row in rows:
         node = row["links.fire.from"]
         head = row["min(fire.gauge_pressure) [Pa]"] / weight + elevations[node]
-        assert head == pytest.approx(epanet_heads(tmp_path / "net.inp", tmp_path, node, 0.05), abs=1e-3), node
+        assert head == pytest.approx(
+            epanet_heads(tmp_path / "net.inp", tmp_path, node, 0.05), abs=1e-3
+        ), node
     least = AMBIENT + 14.0 * weight
-    rows = sweep(case, {"links.fire.from": nodes}, keys | {
-        "links.fire.flow": 1.0, "links.fire.residual_pressure": least}).rows  # fmt: skip
+    rows = sweep(
+        case,
+        {"links.fire.from": nodes},
+        keys | {"links.fire.flow": 1.0, "links.fire.residual_pressure": least},
+    ).rows
     for row in rows:
         node, q = row["links.fire.from"], row["min(fire.flow) [m3/s]"]
         gauge = row["min(fire.gauge_pressure) [Pa]"]

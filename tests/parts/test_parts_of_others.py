@@ -16,7 +16,9 @@ from scipy.integrate import solve_ivp
 
 import fvsolve
 
-PAGE = (Path(fvsolve.__file__).parents[1] / "docs" / "a-part-from-nothing.md").read_text(encoding="utf-8")
+PAGE = (Path(fvsolve.__file__).parents[1] / "docs" / "a-part-from-nothing.md").read_text(
+    encoding="utf-8"
+)
 BLOCKS = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", PAGE, re.DOTALL))
 BLOCKS |= dict(re.findall(r"`(test_runner\.py)`.*?```python\n(.*?)```", PAGE, re.DOTALL))
 RESISTANCE, LOSS, AREA, LEVEL = 2e6, 4e8, 2.0, 20.0
@@ -37,17 +39,30 @@ def home(tmp_path_factory) -> Path:
     offered = tomllib.loads(re.search(r"```toml\n(\[project\.entry.*?)```", PAGE, re.DOTALL)[1])
     facts = top / "mill-1.0.dist-info"
     facts.mkdir()
-    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: mill\nVersion: 1.0\n", encoding="utf-8")
-    rows = [f"{name} = {place}" for name, place in offered["project"]["entry-points"]["fvsolve.parts"].items()]
-    (facts / "entry_points.txt").write_text("\n".join(["[fvsolve.parts]", *rows, ""]), encoding="utf-8")
+    (facts / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: mill\nVersion: 1.0\n", encoding="utf-8"
+    )
+    rows = [
+        f"{name} = {place}"
+        for name, place in offered["project"]["entry-points"]["fvsolve.parts"].items()
+    ]
+    (facts / "entry_points.txt").write_text(
+        "\n".join(["[fvsolve.parts]", *rows, ""]), encoding="utf-8"
+    )
     return top
 
 
 def python(home: Path, *arguments: str, **environment: str) -> str:
     """Standard output of a Python process that can import the package; the process must succeed."""
-    paths = [str(home), str(Path(fvsolve.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = [
+        str(home),
+        str(Path(fvsolve.__file__).parents[1]),
+        *filter(None, [os.environ.get("PYTHONPATH")]),
+    ]
     known = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "MPLBACKEND": "Agg"} | environment
-    done = subprocess.run([sys.executable, *arguments], cwd=home, env=known, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=home, env=known, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -62,7 +77,9 @@ def flow(level: float, weight: float) -> float:
 
 
 def test_its_own_test_passes(home):
-    assert "1 passed" in python(home, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_runner.py")
+    assert "1 passed" in python(
+        home, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_runner.py"
+    )
 
 
 COMMANDS = """
@@ -89,10 +106,14 @@ def test_commands_know_it_like_any_other(home):
         "| `efficiency` | -, between 0 and 1 | 0.8 | profile | share of its blades that the shaft gets |",
     ]
     several = [["schema"], ["check", "mill.toml"]]
-    several += [["check", "mill.toml", "--set", wrong] for wrong in ("links.wheel.efficiency=2",
-                                                                     'links.wheel.loss="3 m"')]  # fmt: skip
+    several += [
+        ["check", "mill.toml", "--set", wrong]
+        for wrong in ("links.wheel.efficiency=2", 'links.wheel.loss="3 m"')
+    ]
     schema, right, *wrong = json.loads(python(home, "-c", COMMANDS, json.dumps(several)))
-    assert schema[0] == 0 and "share of its blades that the shaft gets" in schema[1] and right[0] == 0
+    assert (
+        schema[0] == 0 and "share of its blades that the shaft gets" in schema[1] and right[0] == 0
+    )
     assert all(code == 2 for code, _ in wrong)
     assert "links.wheel.efficiency" in wrong[0][1] and "links.wheel.loss" in wrong[1][1]
 
@@ -103,10 +124,18 @@ def test_its_pole_is_that_of_its_law(home):
     case = fvsolve.load({**tomllib.loads(BLOCKS["mill.toml"]), "links": {"wheel": VALVE}})
     weight = case.properties.density * case.gravity
     (pole,) = np.linalg.eigvals(np.load(home / "linear" / "linear.npz")["A"])
-    assert pole == pytest.approx(-weight / np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * LEVEL) / AREA, rel=1e-6)
+    assert pole == pytest.approx(
+        -weight / np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * LEVEL) / AREA, rel=1e-6
+    )
 
 
-VALVE = {"type": "valve", "from": "upper", "to": "lower", "discharge_coefficient": 1.0, "area": 1e-3}
+VALVE = {
+    "type": "valve",
+    "from": "upper",
+    "to": "lower",
+    "discharge_coefficient": 1.0,
+    "area": 1e-3,
+}
 
 
 def test_its_shaft_takes_its_share(home):
@@ -122,7 +151,16 @@ def test_its_shaft_takes_its_share(home):
 
 def test_its_order_is_that_of_methods(home):
     told = json.loads(
-        command(home, "order", "mill.toml", "--json", "--levels", "4", "--method", "euler,improved-euler")
+        command(
+            home,
+            "order",
+            "mill.toml",
+            "--json",
+            "--levels",
+            "4",
+            "--method",
+            "euler,improved-euler",
+        )
     )
     orders = [one["fits"]["upper.level"]["L2"]["order"] for one in told["studies"]]
     assert orders == pytest.approx([1.0, 2.0], abs=0.05)
@@ -167,7 +205,9 @@ def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
     def least() -> tuple[float, bool]:
         """Least level in a new process, and True if it imports numba, without which nothing is compiled."""
         code = "level = fvsolve.run('mill.toml').summary['extremes']['upper.level']['minimum']"
-        code = f"import json, sys, fvsolve; {code}; print(json.dumps([level, 'numba' in sys.modules]))"
+        code = (
+            f"import json, sys, fvsolve; {code}; print(json.dumps([level, 'numba' in sys.modules]))"
+        )
         return tuple(json.loads(python(home, "-c", code)))
 
     (first, _), law = least(), home / "mill" / "runner" / "law.py"
@@ -192,8 +232,15 @@ def test_a_folder_can_be_named(home):
     shutil.copytree(home / "mill" / "runner", folder)
     named = 'import fvsolve; fvsolve.register_part("runner"); print(fvsolve.run("mill.toml").ok)'
     paths = {"PYTHONPATH": str(Path(fvsolve.__file__).parents[1])}
-    for words, more in ((["-c", named], {}), (["-m", "fvsolve", "check", "mill.toml"], {"FVSOLVE_PARTS": str(folder)})):
+    for words, more in (
+        (["-c", named], {}),
+        (["-m", "fvsolve", "check", "mill.toml"], {"FVSOLVE_PARTS": str(folder)}),
+    ):
         done = subprocess.run(
-            [sys.executable, *words], cwd=bare, env=os.environ | paths | more, capture_output=True, text=True
+            [sys.executable, *words],
+            cwd=bare,
+            env=os.environ | paths | more,
+            capture_output=True,
+            text=True,
         )
         assert done.returncode == 0, done.stdout + done.stderr

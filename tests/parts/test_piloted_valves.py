@@ -52,7 +52,9 @@ def pieces(rates, modes, mode, start, kinks, t):
         watch = [leaving for _, leaving in modes[mode]]
         for one in watch:
             one.terminal, one.direction = True, 1
-        step = solve_ivp(lambda s, z, m=mode: rates(s, z, m), (now, end), y, events=watch, **lifted_valves.TIGHT)
+        step = solve_ivp(
+            lambda s, z, m=mode: rates(s, z, m), (now, end), y, events=watch, **lifted_valves.TIGHT
+        )
         here = (t >= now - 1e-12) & (t <= step.t[-1] + 1e-12)
         if here.any():
             found[:, here] = step.sol(t[here])
@@ -66,19 +68,40 @@ def pieces(rates, modes, mode, start, kinks, t):
 # counterbalance valve -------------------------------------------------------------------------------------------
 
 SET, SPAN, RATIO = 2e7, 3e6, 3.0
-DRAIN = 1e5  # pressure behind the valves that keep flows from coming to rest, where a square root has no slope
+# pressure behind the valves that keep flows from coming to rest, where a square root has no slope
+DRAIN = 1e5
 LINE = {"time": [0.0, 0.05, 0.25, 0.35, 0.5], "value": [1.9e6, 1.9e6, 3e7, 3e7, 1.9e6]}
 PILOT = {"time": [0.0, 1.0, 1.05, 1.1, 1.15], "value": [1.9e6, 1.9e6, 1.3e7, 1.3e7, 1.9e6]}
 
 
 def held(numerics=TIGHT, **more):
     """Case of a load that its line raises through a counterbalance valve, that is held, and lowered by the pilot."""
-    nodes = {"load": chamber(VOLUME, 1.2e6), "line": chamber(VOLUME, 1e6), "pilot": chamber(VOLUME, 1e6),
-             "supply": reservoir(LINE), "signal": reservoir(PILOT), "drain": reservoir(DRAIN)}  # fmt: skip
-    links = {"hold": sized("counterbalance", **{"from": "load", "to": "line", "pilot": "pilot", "pilot_ratio": RATIO,
-                                                "set_pressure": SET, "overpressure": SPAN, **more}),
-             "feed": valve("supply", "line", 2e-6), "sense": valve("signal", "pilot", 2e-6),
-             "spill": valve("line", "drain", 2e-6), "bleed": valve("pilot", "drain", 2e-6)}  # fmt: skip
+    nodes = {
+        "load": chamber(VOLUME, 1.2e6),
+        "line": chamber(VOLUME, 1e6),
+        "pilot": chamber(VOLUME, 1e6),
+        "supply": reservoir(LINE),
+        "signal": reservoir(PILOT),
+        "drain": reservoir(DRAIN),
+    }
+    links = {
+        "hold": sized(
+            "counterbalance",
+            **{
+                "from": "load",
+                "to": "line",
+                "pilot": "pilot",
+                "pilot_ratio": RATIO,
+                "set_pressure": SET,
+                "overpressure": SPAN,
+                **more,
+            },
+        ),
+        "feed": valve("supply", "line", 2e-6),
+        "sense": valve("signal", "pilot", 2e-6),
+        "spill": valve("line", "drain", 2e-6),
+        "bleed": valve("pilot", "drain", 2e-6),
+    }
     probes = ["load.pressure", "line.pressure", "pilot.pressure", "hold.flow", "hold.opening"]
     return scene(nodes, links, 1.4, numerics, probes, 0.02, fluid=OIL)
 
@@ -110,14 +133,27 @@ def test_a_counterbalance_valve_is_that_of_scipy():
     lift = lambda s, z: lifting(z[0], z[2])  # noqa: E731
     modes = {
         "shut": [("lifted", lift), ("back", lambda s, z: -forward(s, z))],
-        "lifted": [("shut", lambda s, z: -lift(s, z)), ("open", lambda s, z: lift(s, z) - 1.0),
-                   ("back", lambda s, z: -forward(s, z))],
+        "lifted": [
+            ("shut", lambda s, z: -lift(s, z)),
+            ("open", lambda s, z: lift(s, z) - 1.0),
+            ("back", lambda s, z: -forward(s, z)),
+        ],
         "open": [("lifted", lambda s, z: 1.0 - lift(s, z)), ("back", lambda s, z: -forward(s, z))],
         "back": [("shut", forward)],
-    }  # fmt: skip
-    opening = {"shut": lambda z: -1.0, "open": lambda z: 1.0, "back": lambda z: 1.0, "lifted": lambda z: lift(0.0, z)}
+    }
+    opening = {
+        "shut": lambda z: -1.0,
+        "open": lambda z: 1.0,
+        "back": lambda z: 1.0,
+        "lifted": lambda z: lift(0.0, z),
+    }
     exact, switches = pieces(
-        lambda t, z, mode: held_rates(t, *z, opening[mode](z)), modes, "shut", START, KINKS, result.t
+        lambda t, z, mode: held_rates(t, *z, opening[mode](z)),
+        modes,
+        "shut",
+        START,
+        KINKS,
+        result.t,
     )
     assert result.ok and [mode for _, mode in switches][:3] == ["back", "shut", "lifted"]
     for name, values in zip(("load", "line", "pilot"), exact, strict=True):
@@ -137,7 +173,12 @@ def test_a_counterbalance_valve_with_a_disc_is_that_of_scipy(disc):
         drive = lifting(y[0], y[4]) - y[1]
         if disc == "lag":
             return [load, 0.0 if stopped else drive / 0.02, 0.0, line, pilot]
-        return [load, *((0.0, 0.0) if stopped else (y[2], w * w * drive - 2.0 * zeta * w * y[2])), line, pilot]
+        return [
+            load,
+            *((0.0, 0.0) if stopped else (y[2], w * w * drive - 2.0 * zeta * w * y[2])),
+            line,
+            pilot,
+        ]
 
     result = fvsolve.run(held(**DISCS[disc]))
     push = lambda t, y: lifting(y[0], y[4]) - y[1]  # noqa: E731
@@ -146,7 +187,9 @@ def test_a_counterbalance_valve_with_a_disc_is_that_of_scipy(disc):
     for name, values in (("load", exact[0]), ("line", exact[3]), ("pilot", exact[4])):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=2e-9 * 2e7)
     forward = exact[0] > exact[3]
-    assert result["hold.opening"][forward] == pytest.approx(np.clip(exact[1], 0.0, 1.0)[forward], abs=1e-8)
+    assert result["hold.opening"][forward] == pytest.approx(
+        np.clip(exact[1], 0.0, 1.0)[forward], abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("more", [{}, *DISCS.values()], ids=["none", *DISCS])
@@ -160,16 +203,32 @@ def test_it_raises_holds_and_lowers_a_load(more):
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 4.5])
 def test_the_pilot_pressure_that_opens_it_falls_with_the_ratio(ratio):
-    nodes = {"load": reservoir(1.7e7), "tank": reservoir(AMBIENT),
-             "pilot": reservoir({"time": [0.0, 1.0], "value": [AMBIENT, AMBIENT + 1e7]})}  # fmt: skip
-    hold = sized("counterbalance", **{"from": "load", "to": "tank", "pilot": "pilot", "pilot_ratio": ratio,
-                                      "set_pressure": SET, "overpressure": SPAN})  # fmt: skip
+    nodes = {
+        "load": reservoir(1.7e7),
+        "tank": reservoir(AMBIENT),
+        "pilot": reservoir({"time": [0.0, 1.0], "value": [AMBIENT, AMBIENT + 1e7]}),
+    }
+    hold = sized(
+        "counterbalance",
+        **{
+            "from": "load",
+            "to": "tank",
+            "pilot": "pilot",
+            "pilot_ratio": ratio,
+            "set_pressure": SET,
+            "overpressure": SPAN,
+        },
+    )
     nodes["end"] = chamber(VOLUME, AMBIENT)
     links = {"hold": hold, "on": valve("tank", "end", SMALL)}
-    result = fvsolve.run(scene(nodes, links, 1.0, {"rtol": 1e-9}, ["hold.opening"], 0.01, fluid=OIL))
+    result = fvsolve.run(
+        scene(nodes, links, 1.0, {"rtol": 1e-9}, ["hold.opening"], 0.01, fluid=OIL)
+    )
     opened = next(event["time"] for event in result.summary["events"] if event["what"] == "opens")
     assert opened == pytest.approx((SET - 1.7e7) / ratio / 1e7, rel=1e-9)
-    assert result["hold.opening"][-1] == pytest.approx(min((ratio * 1e7 - (SET - 1.7e7)) / SPAN, 1.0), abs=1e-9)
+    assert result["hold.opening"][-1] == pytest.approx(
+        min((ratio * 1e7 - (SET - 1.7e7)) / SPAN, 1.0), abs=1e-9
+    )
 
 
 # pilot check valve ----------------------------------------------------------------------------------------------
@@ -180,8 +239,17 @@ CRACKING = 3e5
 def locked(numerics=TIGHT, **more):
     """Case of a load that is raised through a pilot check valve, held, and released by the pilot."""
     case = held(numerics)
-    case["links"]["hold"] = sized("pilot-check", **{"from": "line", "to": "load", "pilot": "pilot", "pilot_ratio": 3.0,
-                                                    "cracking_pressure": CRACKING, **more})  # fmt: skip
+    case["links"]["hold"] = sized(
+        "pilot-check",
+        **{
+            "from": "line",
+            "to": "load",
+            "pilot": "pilot",
+            "pilot_ratio": 3.0,
+            "cracking_pressure": CRACKING,
+            **more,
+        },
+    )
     return case
 
 
@@ -195,15 +263,19 @@ def test_a_pilot_check_valve_is_that_of_scipy():
         return [STIFF * q, STIFF * (line - q), STIFF * pilot]
 
     pilot = lambda s, z: RATIO * (z[2] - z[1]) - (z[0] - z[1] + CRACKING)  # noqa: E731
-    modes = {"shut": [("open", lambda s, z: max(z[1] - z[0] - CRACKING, pilot(s, z)))],
-             "open": [("shut", lambda s, z: -max((z[1] - z[0]) / 1e5, pilot(s, z) / 1e5))]}  # fmt: skip
+    modes = {
+        "shut": [("open", lambda s, z: max(z[1] - z[0] - CRACKING, pilot(s, z)))],
+        "open": [("shut", lambda s, z: -max((z[1] - z[0]) / 1e5, pilot(s, z) / 1e5))],
+    }
     exact, switches = pieces(rates, modes, "shut", START, KINKS, result.t)
     assert result.ok and [mode for _, mode in switches] == ["open", "shut", "open", "shut"]
     for name, values in zip(("load", "line", "pilot"), exact, strict=True):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=1e-9 * 2e7)
     events = [event for event in result.summary["events"] if event["time"] > 0.0]
     assert [event["what"] for event in events] == ["opens", "shuts", "opens", "shuts"]
-    assert [event["time"] for event in events] == pytest.approx([time for time, _ in switches], abs=1e-9 * 2.0)
+    assert [event["time"] for event in events] == pytest.approx(
+        [time for time, _ in switches], abs=1e-9 * 2.0
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -219,22 +291,32 @@ def test_a_pilot_check_valve_without_a_pilot_is_a_check_valve():
     case = locked()
     case["nodes"]["pilot"], case["links"]["sense"] = reservoir(1e4), valve("signal", "line", 1e-12)
     twin = fvsolve.run(case)
-    case["links"]["hold"] = sized("check-valve", **{"from": "line", "to": "load", "cracking_pressure": CRACKING})
+    case["links"]["hold"] = sized(
+        "check-valve", **{"from": "line", "to": "load", "cracking_pressure": CRACKING}
+    )
     plain = fvsolve.run(case)
     assert twin["load.pressure"] == pytest.approx(plain["load.pressure"], abs=100.0)
 
 
 # shuttle valve --------------------------------------------------------------------------------------------------
 
-SIDES = {"a": {"time": [0.0, 0.5, 1.0, 2.0], "value": [5e6, 5e6, 1e6, 9e6]},
-         "b": {"time": [0.0, 0.4, 1.2, 2.0], "value": [1e6, 3e6, 3e6, 2e6]}}  # fmt: skip
+SIDES = {
+    "a": {"time": [0.0, 0.5, 1.0, 2.0], "value": [5e6, 5e6, 1e6, 9e6]},
+    "b": {"time": [0.0, 0.4, 1.2, 2.0], "value": [1e6, 3e6, 3e6, 2e6]},
+}
 
 
 def shuttle(numerics=TIGHT, **more):
-    nodes = {"a": reservoir(SIDES["a"]), "b": reservoir(SIDES["b"]), "signal": chamber(VOLUME, 3e6),
-             "drain": reservoir(DRAIN)}  # fmt: skip
-    links = {"select": sized("shuttle", ports={"A": "a", "B": "b", "out": "signal"}, **more),
-             "bleed": valve("signal", "drain", 1e-7)}  # fmt: skip
+    nodes = {
+        "a": reservoir(SIDES["a"]),
+        "b": reservoir(SIDES["b"]),
+        "signal": chamber(VOLUME, 3e6),
+        "drain": reservoir(DRAIN),
+    }
+    links = {
+        "select": sized("shuttle", ports={"A": "a", "B": "b", "out": "signal"}, **more),
+        "bleed": valve("signal", "drain", 1e-7),
+    }
     probes = [f"{place}.pressure" for place in ("a", "b", "signal")]
     probes += [f"select.{one}" for one in ("flow_A", "flow_B", "flow_out", "position")]
     return scene(nodes, links, 2.0, numerics, probes, 0.02, fluid=OIL)
@@ -256,7 +338,9 @@ def test_a_shuttle_valve_is_that_of_scipy():
     assert result["signal.pressure"] == pytest.approx(exact[0], abs=1e-9 * 1e7)
     events = result.summary["events"]
     assert [event["what"] for event in events] == ["switches to B", "switches to A"]
-    assert [event["time"] for event in events] == pytest.approx([time for time, _ in switches], abs=1e-9 * 2.0)
+    assert [event["time"] for event in events] == pytest.approx(
+        [time for time, _ in switches], abs=1e-9 * 2.0
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -285,20 +369,43 @@ def test_a_shuttle_valve_drawn_with_exchanged_sides_is_the_same_valve():
 
 # pressure compensator -------------------------------------------------------------------------------------------
 
-SPOOLS = {"lag": {"time_constant": 0.005}, "swing": {"natural_frequency": 60.0, "damping_ratio": 1.0}}
+SPOOLS = {
+    "lag": {"time_constant": 0.005},
+    "swing": {"natural_frequency": 60.0, "damping_ratio": 1.0},
+}
 DROP = 1e6  # set drop [Pa]; the valve shuts over 5 % of it
 LOAD = {"time": [0.0, 0.3, 1.0, 1.5, 1.8, 2.0], "value": [2e6, 2e6, 6e6, 6e6, 1.4e7, 1.2e7]}
 
 
 def compensated(numerics=TIGHT, **more):
     """Case of a compensator before a metering orifice, whose load pressure triples and rises further."""
-    nodes = {"pump": reservoir(2e7), "in": chamber(VOLUME, 2e7), "mid": chamber(VOLUME, 3e6),
-             "load": chamber(VOLUME, 2e6), "far": reservoir(LOAD), "drain": reservoir(DRAIN)}  # fmt: skip
-    links = {"pipe": valve("pump", "in", 4e-6), "spill": valve("in", "drain", 1e-6),
-             "meter": valve("mid", "load", 1e-6), "out": valve("load", "far", 4e-6),
-             "hold": sized("pressure-compensator", 2e-6, **{"from": "in", "to": "mid", "senses": ["mid", "load"],
-                                                            "set_drop": DROP, **more})}  # fmt: skip
-    probes = ["in.pressure", "mid.pressure", "load.pressure", "hold.flow", "hold.opening", "meter.flow"]
+    nodes = {
+        "pump": reservoir(2e7),
+        "in": chamber(VOLUME, 2e7),
+        "mid": chamber(VOLUME, 3e6),
+        "load": chamber(VOLUME, 2e6),
+        "far": reservoir(LOAD),
+        "drain": reservoir(DRAIN),
+    }
+    links = {
+        "pipe": valve("pump", "in", 4e-6),
+        "spill": valve("in", "drain", 1e-6),
+        "meter": valve("mid", "load", 1e-6),
+        "out": valve("load", "far", 4e-6),
+        "hold": sized(
+            "pressure-compensator",
+            2e-6,
+            **{"from": "in", "to": "mid", "senses": ["mid", "load"], "set_drop": DROP, **more},
+        ),
+    }
+    probes = [
+        "in.pressure",
+        "mid.pressure",
+        "load.pressure",
+        "hold.flow",
+        "hold.opening",
+        "meter.flow",
+    ]
     return scene(nodes, links, 2.0, numerics, probes, 0.02, fluid=OIL)
 
 
@@ -320,12 +427,21 @@ KINKS_OF_LOAD = LOAD["time"][1:]
 def test_a_compensator_is_that_of_scipy():
     result = fvsolve.run(compensated())
     lift = lambda s, z: share(z[1], z[2])  # noqa: E731
-    modes = {"shut": [("lifted", lift)], "open": [("lifted", lambda s, z: 1.0 - lift(s, z))],
-             "lifted": [("shut", lambda s, z: -lift(s, z)), ("open", lambda s, z: lift(s, z) - 1.0)]}  # fmt: skip
+    modes = {
+        "shut": [("lifted", lift)],
+        "open": [("lifted", lambda s, z: 1.0 - lift(s, z))],
+        "lifted": [("shut", lambda s, z: -lift(s, z)), ("open", lambda s, z: lift(s, z) - 1.0)],
+    }
     exact, switches = pieces(
-        lambda t, z, mode: compensated_rates(t, *z, {"shut": 0.0, "open": 1.0}.get(mode, share(z[1], z[2]))),
-        modes, "lifted", [2e7, 3e6, 2e6], KINKS_OF_LOAD, result.t,
-    )  # fmt: skip
+        lambda t, z, mode: compensated_rates(
+            t, *z, {"shut": 0.0, "open": 1.0}.get(mode, share(z[1], z[2]))
+        ),
+        modes,
+        "lifted",
+        [2e7, 3e6, 2e6],
+        KINKS_OF_LOAD,
+        result.t,
+    )
     assert result.ok
     for name, values in zip(("in", "mid", "load"), exact, strict=True):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=1e-9 * 2.4e7)
@@ -337,7 +453,8 @@ def test_a_compensator_with_a_spool_is_that_of_scipy(disc):
     w, zeta = 2.0 * math.pi * 60.0, 1.0
 
     case = compensated(overpressure=5e5, **SPOOLS[disc])
-    case["numerics"]["end"], begins = 1.4, {"in": 1.815e7, "mid": 3.5e6, "load": 2.09e6}  # away from both stops
+    # away from both stops
+    case["numerics"]["end"], begins = 1.4, {"in": 1.815e7, "mid": 3.5e6, "load": 2.09e6}
     for name, pressure in begins.items():
         case["nodes"][name]["initial_pressure"] = pressure
     wide_share = lambda mid, load: 1.0 - (mid - load - DROP) / 5e5  # noqa: E731
@@ -347,14 +464,22 @@ def test_a_compensator_with_a_spool_is_that_of_scipy(disc):
         drive = wide_share(y[3], y[4]) - y[1]
         if disc == "lag":
             return [inlet, 0.0 if stopped else drive / 0.005, 0.0, mid, load]
-        return [inlet, *((0.0, 0.0) if stopped else (y[2], w * w * drive - 2.0 * zeta * w * y[2])), mid, load]
+        return [
+            inlet,
+            *((0.0, 0.0) if stopped else (y[2], w * w * drive - 2.0 * zeta * w * y[2])),
+            mid,
+            load,
+        ]
 
     result = fvsolve.run(case)
     x = result["hold.opening"][0]
     exact, _ = lifted_valves.stopped(
-        spooled, lambda t, y: wide_share(y[3], y[4]) - y[1], [begins["in"], x, 0.0, begins["mid"], begins["load"]],
-        [time for time in KINKS_OF_LOAD if time < 1.4], result.t,
-    )  # fmt: skip
+        spooled,
+        lambda t, y: wide_share(y[3], y[4]) - y[1],
+        [begins["in"], x, 0.0, begins["mid"], begins["load"]],
+        [time for time in KINKS_OF_LOAD if time < 1.4],
+        result.t,
+    )
     assert result.ok and len(result.summary["events"]) <= 40
     for name, values in (("in", exact[0]), ("mid", exact[3]), ("load", exact[4])):
         assert result[f"{name}.pressure"] == pytest.approx(values, abs=2e-9 * 2.4e7)
@@ -362,11 +487,30 @@ def test_a_compensator_with_a_spool_is_that_of_scipy(disc):
 
 def metered(**more):
     """Case of a compensator and an orifice that a junction joins, between given pressures."""
-    nodes = {"pump": reservoir(2e7), "mid": junction(), "load": reservoir(LOAD), "pot": chamber(VOLUME, 2e6)}
-    links = {"meter": valve("mid", "load", 1e-6), "on": valve("load", "pot", 1e-6),
-             "hold": sized("pressure-compensator", 2e-6, **{"from": "pump", "to": "mid", "senses": ["mid", "load"],
-                                                            "set_drop": DROP, **more})}  # fmt: skip
-    return scene(nodes, links, 1.4, {"rtol": 1e-9}, ["mid.pressure", "hold.flow", "hold.opening"], 0.05, fluid=OIL)
+    nodes = {
+        "pump": reservoir(2e7),
+        "mid": junction(),
+        "load": reservoir(LOAD),
+        "pot": chamber(VOLUME, 2e6),
+    }
+    links = {
+        "meter": valve("mid", "load", 1e-6),
+        "on": valve("load", "pot", 1e-6),
+        "hold": sized(
+            "pressure-compensator",
+            2e-6,
+            **{"from": "pump", "to": "mid", "senses": ["mid", "load"], "set_drop": DROP, **more},
+        ),
+    }
+    return scene(
+        nodes,
+        links,
+        1.4,
+        {"rtol": 1e-9},
+        ["mid.pressure", "hold.flow", "hold.opening"],
+        0.05,
+        fluid=OIL,
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -379,22 +523,49 @@ def test_its_flow_hardly_changes_while_the_load_triples(law):
     assert result.ok and np.ptp(flow) < 0.03 * flow[0]
     if law == "linear":
         for p, q in zip(np.interp(result.t, LOAD["time"], LOAD["value"]), flow, strict=True):
-            balance = lambda mid, p=p: share(mid, p) * through(2e7 - mid, 2e-6) - through(mid - p, 1e-6)  # noqa: E731
+
+            def balance(mid, p=p):
+                return share(mid, p) * through(2e7 - mid, 2e-6) - through(mid - p, 1e-6)
+
             mid = brentq(balance, p + DROP, p + 1.05 * DROP, xtol=1e-9)
             assert q == pytest.approx(through(mid - p, 1e-6), rel=1e-9)
 
 
-@pytest.mark.parametrize("ends", [("pump", "mid"), ("mid", "pump")], ids=["drawn forward", "drawn the other way"])
+@pytest.mark.parametrize(
+    "ends", [("pump", "mid"), ("mid", "pump")], ids=["drawn forward", "drawn the other way"]
+)
 @pytest.mark.parametrize("spool", [{}, *SPOOLS.values()], ids=["at once", *SPOOLS])
 @pytest.mark.parametrize("set_drop", [8e5, 4e6])
 def test_its_steady_start_follows_its_closed_form(ends, spool, set_drop):
     """Two metering orifices with the drop d each; the valve passes x A(2 d) and is fully open under 40 bar."""
-    nodes = {"pump": reservoir(6e6), "drain": reservoir(DRAIN), "mid": chamber(VOLUME), "load": chamber(VOLUME)}
-    links = {"meter": valve("mid", "load", 2e-6), "out": valve("load", "drain", 2e-6),
-             "hold": sized("pressure-compensator", 8e-6, **dict(zip(("from", "to"), ends, strict=True)),
-                           senses=["mid", "load"], set_drop=set_drop, **spool)}  # fmt: skip
+    nodes = {
+        "pump": reservoir(6e6),
+        "drain": reservoir(DRAIN),
+        "mid": chamber(VOLUME),
+        "load": chamber(VOLUME),
+    }
+    links = {
+        "meter": valve("mid", "load", 2e-6),
+        "out": valve("load", "drain", 2e-6),
+        "hold": sized(
+            "pressure-compensator",
+            8e-6,
+            **dict(zip(("from", "to"), ends, strict=True)),
+            senses=["mid", "load"],
+            set_drop=set_drop,
+            **spool,
+        ),
+    }
     result = fvsolve.run(
-        scene(nodes, links, 0.1, {"rtol": 1e-9}, ["mid.pressure", "load.pressure", "hold.opening"], 0.05, fluid=OIL)
+        scene(
+            nodes,
+            links,
+            0.1,
+            {"rtol": 1e-9},
+            ["mid.pressure", "load.pressure", "hold.opening"],
+            0.05,
+            fluid=OIL,
+        )
     )
     opening = lambda d: min(max(1.0 - (d - set_drop) / (0.05 * set_drop), 0.0), 1.0)  # noqa: E731
     balance = lambda d: opening(d) * through(6e6 - DRAIN - 2.0 * d, 8e-6) - through(d, 2e-6)  # noqa: E731
@@ -408,10 +579,14 @@ def test_its_steady_start_follows_its_closed_form(ends, spool, set_drop):
 # all of them ----------------------------------------------------------------------------------------------------
 
 SCENES = {
-    "counterbalance": (held, {}), "counterbalance lag": (held, DISCS["lag"]),
-    "counterbalance swing": (held, DISCS["swing"]), "pilot-check": (locked, {}), "shuttle": (shuttle, {}),
-    "compensator": (compensated, {}), "compensator lag": (compensated, {"overpressure": 5e5, **SPOOLS["lag"]}),
-}  # fmt: skip
+    "counterbalance": (held, {}),
+    "counterbalance lag": (held, DISCS["lag"]),
+    "counterbalance swing": (held, DISCS["swing"]),
+    "pilot-check": (locked, {}),
+    "shuttle": (shuttle, {}),
+    "compensator": (compensated, {}),
+    "compensator lag": (compensated, {"overpressure": 5e5, **SPOOLS["lag"]}),
+}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -429,7 +604,9 @@ def test_it_dissipates_only_and_the_ledgers_close(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_methods_agree(name, method):
     make, more = SCENES[name]
-    first, other = (fvsolve.run(make({"method": one, "rtol": 1e-9}, **more)) for one in (METHODS[0], method))
+    first, other = (
+        fvsolve.run(make({"method": one, "rtol": 1e-9}, **more)) for one in (METHODS[0], method)
+    )
     assert other.ok and len(other.summary["events"]) == len(first.summary["events"])
     for probe in first.probes:
         if probe.endswith("pressure"):
@@ -444,7 +621,13 @@ def test_the_pattern_of_the_jacobian_is_complete(name, law):
     case, rng = make(**more), np.random.default_rng(1)
     case["fluid"]["law"] = law
     model = fvsolve.build(fvsolve.load(case))
-    assert max(stray(model, t, model.scale * rng.normal(scale=0.1, size=model.y_size)) for t in (0.0, 1.0)) < 1e-7
+    assert (
+        max(
+            stray(model, t, model.scale * rng.normal(scale=0.1, size=model.y_size))
+            for t in (0.0, 1.0)
+        )
+        < 1e-7
+    )
 
 
 @pytest.mark.in_turn
@@ -464,7 +647,9 @@ def test_at_rest_it_does_not_move_by_a_bit(name, law, method):
 
 def test_a_killed_and_resumed_run_is_the_unbroken_run(tmp_path):
     fvsolve.run(
-        held({"method": "dormand-prince", "rtol": 1e-9}, **DISCS["lag"]), out=tmp_path / "whole", pictures=False
+        held({"method": "dormand-prince", "rtol": 1e-9}, **DISCS["lag"]),
+        out=tmp_path / "whole",
+        pictures=False,
     )
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.5))
 
@@ -479,7 +664,14 @@ def test_a_pilot_at_a_junction_of_a_pipe_opens_it():
         case["links"]["sense"] = pipe("signal", "pilot", 5.0, 0.01, 1200.0, 4, friction=friction)
         case["links"]["leak"] = valve("pilot", "end", 1e-8)
         result = fvsolve.run(case)
-        lift = np.clip([lifting(*p) for p in zip(result["load.pressure"], result["pilot.pressure"], strict=True)], 0, 1)
+        lift = np.clip(
+            [
+                lifting(*p)
+                for p in zip(result["load.pressure"], result["pilot.pressure"], strict=True)
+            ],
+            0,
+            1,
+        )
         forward = result["load.pressure"] > result["line.pressure"]
         assert result.ok and np.max(lift[forward]) > 0.1
         assert result["hold.opening"][forward] == pytest.approx(lift[forward], abs=1e-9)
@@ -493,7 +685,9 @@ def junction_pilot(**more):
 
 
 def test_a_junction_that_its_flow_reaches_needs_a_time_constant():
-    with pytest.raises(fvsolve.CaseError, match="senses pilot, a junction .* give the valve a time_constant"):
+    with pytest.raises(
+        fvsolve.CaseError, match="senses pilot, a junction .* give the valve a time_constant"
+    ):
         fvsolve.build(fvsolve.load(junction_pilot()))
     assert fvsolve.run(junction_pilot(**DISCS["lag"])).ok
 
@@ -535,7 +729,11 @@ def test_a_pilot_of_another_domain_is_refused():
 
 PAGE = (TOP / "docs/fluid-power-circuits.md").read_text(encoding="utf-8")
 SECTIONS = (section.partition("\n") for section in re.split(r"^##+ ", PAGE, flags=re.MULTILINE)[1:])
-CIRCUITS = {title: text.split("```")[1].removeprefix("toml") for title, _, text in SECTIONS if "```toml" in text}
+CIRCUITS = {
+    title: text.split("```")[1].removeprefix("toml")
+    for title, _, text in SECTIONS
+    if "```toml" in text
+}
 
 
 def circuit(heading):
@@ -560,7 +758,9 @@ def test_the_page_holds_and_lowers_a_load(heading):
 
 def test_the_page_selects_the_higher_pressure():
     result = circuit("Shuttle valve")
-    higher = np.maximum(np.interp(result.t, [0, 1], [100e5, 20e5]), np.interp(result.t, [0, 1], [10e5, 80e5]))
+    higher = np.maximum(
+        np.interp(result.t, [0, 1], [100e5, 20e5]), np.interp(result.t, [0, 1], [10e5, 80e5])
+    )
     assert result["signal.pressure"] == pytest.approx(higher, rel=0.02)
     assert (result["select.position"][0], result["select.position"][-1]) == (0.0, 1.0)
 
@@ -573,7 +773,11 @@ def test_flow_of_the_page_stays_while_the_load_triples():
 def test_the_page_has_a_sequence_valve():
     result = circuit("Sequence valve")
     first, second = result["first.pressure"], result["second.pressure"]
-    assert np.ptp(second[first < 80e5][: np.argmax(first >= 80e5)]) < 1.0 and second.max() > 100e5 and second[-1] < 20e5
+    assert (
+        np.ptp(second[first < 80e5][: np.argmax(first >= 80e5)]) < 1.0
+        and second.max() > 100e5
+        and second[-1] < 20e5
+    )
 
 
 def test_the_page_has_a_filter_with_bypass():
@@ -594,14 +798,18 @@ def test_the_page_has_a_brake_valve():
     assert result["brake.flow"][-1] == 0.0 and 160e5 < result["return.pressure"].max() < 185e5
 
 
-@pytest.mark.parametrize("disc", [{}, {"time_constant": 0.01}, {"natural_frequency": 20.0, "damping_ratio": 0.7}])
+@pytest.mark.parametrize(
+    "disc", [{}, {"time_constant": 0.01}, {"natural_frequency": 20.0, "damping_ratio": 0.7}]
+)
 @pytest.mark.parametrize("method", [
     {"method": "ssp-rk3", "courant": 0.5},
     {"method": "euler", "courant": 0.2},
     {"method": "tr-bdf2", "rtol": 1e-6},
     {"method": "dormand-prince", "rtol": 1e-6},
 ])  # fmt: skip
-def test_a_counterbalance_valve_with_reversing_flow_at_half_lift_changes_its_mode_once_each_time(disc, method):
+def test_a_counterbalance_valve_with_reversing_flow_at_half_lift_changes_its_mode_once_each_time(
+    disc, method
+):
     """At a drop of zero the flow changes with the last digits of the pressures, and so does its sign in each mode."""
     heads = {"time": [0.0, 0.3, 0.5, 0.8], "value": [30.0, 30.0, 12.0, 35.0]}
     nodes = {"up": lake(heads), "down": lake(20.0), "a": junction(), "b": junction()}
@@ -610,11 +818,25 @@ def test_a_counterbalance_valve_with_reversing_flow_at_half_lift_changes_its_mod
         "in": pipe("up", "a", 60.0, 0.1, 1000.0, 4, friction=friction),
         "out": pipe("down", "b", 60.0, 0.1, 1000.0, 4, friction=friction),
         "hold": {
-            "type": "counterbalance", "from": "a", "to": "b", "area": 1e-4, "set_pressure": 3e5, "overpressure": 2e4,
-            "pilot": "up", "pilot_ratio": 0.5, **disc,
+            "type": "counterbalance",
+            "from": "a",
+            "to": "b",
+            "area": 1e-4,
+            "set_pressure": 3e5,
+            "overpressure": 2e4,
+            "pilot": "up",
+            "pilot_ratio": 0.5,
+            **disc,
         },
-    }  # fmt: skip
-    case = scene(nodes, links, 1.0, {"scheme": "muscl", **method}, ["links.hold.flow", "links.hold.opening"], 1e-3)
+    }
+    case = scene(
+        nodes,
+        links,
+        1.0,
+        {"scheme": "muscl", **method},
+        ["links.hold.flow", "links.hold.opening"],
+        1e-3,
+    )
     result = fvsolve.run(case | {"ambient_pressure": AMBIENT})
     assert result.reason.startswith("finished")
     assert result["links.hold.flow"].min() < -1e-4

@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from fluids.friction import friction_factor
 from reference.refusals import refused
-from reference.scenes import AMBIENT, RHO, area, junction, lake, pipe, ramp, reservoir, scene, step, valve
+from reference.scenes import (
+    AMBIENT,
+    RHO,
+    area,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    step,
+    valve,
+)
 
 import fvsolve
 from fvsolve.core.model.build import build
@@ -44,20 +56,39 @@ def test_joukowskys_force_on_a_bend_is_exact(turned: bool) -> None:
 
 def throttled(law: str, friction: dict, **numerics) -> dict:
     nodes = {
-        "lake": lake(60.0, elevation=0.0), "gate": junction(elevation=15.0), "air": reservoir(AMBIENT, elevation=15.0),
-    }  # fmt: skip
-    one = pipe("lake", "gate", 500.0, DIAMETER, SPEED, 25, friction=friction, bends=[300.0],
-               profile={"chainage": [0, 300, 400, 500], "elevation": [0.0, 5.0, 30.0, 15.0]})  # fmt: skip
+        "lake": lake(60.0, elevation=0.0),
+        "gate": junction(elevation=15.0),
+        "air": reservoir(AMBIENT, elevation=15.0),
+    }
+    one = pipe(
+        "lake",
+        "gate",
+        500.0,
+        DIAMETER,
+        SPEED,
+        25,
+        friction=friction,
+        bends=[300.0],
+        profile={"chainage": [0, 300, 400, 500], "elevation": [0.0, 5.0, 30.0, 15.0]},
+    )
     tap = valve("gate", "air", 0.03 * area(DIAMETER), ramp(0.1, 0.4, 1.0, 0.2))
-    case = scene(nodes, {"main": one, "tap": tap}, 1.5, {"scheme": "weno5", "method": "rk4", "step": 0.01} | numerics,
-                 ["main-1.force", "main-2.force"], every=0.05)  # fmt: skip
+    case = scene(
+        nodes,
+        {"main": one, "tap": tap},
+        1.5,
+        {"scheme": "weno5", "method": "rk4", "step": 0.01} | numerics,
+        ["main-1.force", "main-2.force"],
+        every=0.05,
+    )
     case["fluid"] |= {"law": law}
     return case
 
 
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", ["rk4", "gauss-4", "rodas-4"])
-@pytest.mark.parametrize(("law", "friction"), [("linear", ROUGH), ("linear", UNSTEADY), ("log", ROUGH)])
+@pytest.mark.parametrize(
+    ("law", "friction"), [("linear", ROUGH), ("linear", UNSTEADY), ("log", ROUGH)]
+)
 def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) -> None:
     """The probe equals minus the rate of the momentum in the cells, from the rates of the model."""
     case = fvsolve.load(throttled(law, friction, method=method))
@@ -75,7 +106,9 @@ def test_the_ledger_of_momentum_closes(law: str, friction: dict, method: str) ->
 def test_ends_and_wall_carry_the_lost_momentum() -> None:
     """Under the law `linear` the force is the change of A (p_to - p_from) plus wall friction since the start."""
     case, cells = throttled("linear", ROUGH), [(k + 0.5) / 10 for k in range(10)]
-    case["output"]["probes"] += [f"main-2.pressure@{x}" for x in (0, 1)] + [f"main-2.flow@{x}" for x in cells]
+    case["output"]["probes"] += [f"main-2.pressure@{x}" for x in (0, 1)] + [
+        f"main-2.flow@{x}" for x in cells
+    ]
     found = fvsolve.run(case)
 
     def pull(q):
@@ -93,10 +126,15 @@ def test_ends_and_wall_carry_the_lost_momentum() -> None:
 def test_a_limit_on_force_is_held_against_every_step_and_leg() -> None:
     case = shut(limits={"anchor": {"on": "main", "quantity": "force", "maximum": "50 kN"}})
     one = fvsolve.run(case).verdicts[0]
-    assert not one.ok and one.value == pytest.approx(FORCE) and one.unit == "N" and one.place in ("main-1", "main-2")
-    back = fvsolve.run(shut(True, limits={"anchor": {"on": "main", "quantity": "force", "maximum": "90 kN"}})).verdicts[
-        0
-    ]
+    assert (
+        not one.ok
+        and one.value == pytest.approx(FORCE)
+        and one.unit == "N"
+        and one.place in ("main-1", "main-2")
+    )
+    back = fvsolve.run(
+        shut(True, limits={"anchor": {"on": "main", "quantity": "force", "maximum": "90 kN"}})
+    ).verdicts[0]
     assert back.ok == (FORCE < 9e4) and back.value == pytest.approx(FORCE)
 
 

@@ -3,20 +3,39 @@
 import numpy as np
 import pytest
 from reference.refusals import refused
-from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    RHO,
+    area,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    step,
+    valve,
+)
 
 import fvsolve
 
 LENGTH, DIAMETER, SPEED, CELLS = 3000.0, 0.4, 1000.0, 60
 STEEL = {"model": "quasi-steady", "roughness": 2e-4}
-HILL = {"chainage": [1200.0, 1950.0, 2400.0, 2500.0, 4200.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
+HILL = {
+    "chainage": [1200.0, 1950.0, 2400.0, 2500.0, 4200.0],
+    "elevation": [30.0, 42.0, 65.0, 31.0, 20.0],
+}
 LAWS = {"linear": {}, "log": {"law": "log"}, "mixture": {"law": "mixture", "air_fraction": 1e-3}}
 
 
 def line(links: dict, nodes: dict | None = None, law: str = "linear", **numerics) -> dict:
     """Return a case of a lake, `links` from there to the gate, and a valve that throttles."""
-    nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0), **(nodes or {}),
-             "sea": reservoir(2e5, elevation=20.0)}  # fmt: skip
+    nodes = {
+        "lake": lake(110.0, elevation=30.0),
+        "gate": junction(elevation=20.0),
+        **(nodes or {}),
+        "sea": reservoir(2e5, elevation=20.0),
+    }
     links = {**links, "valve": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
     given = {"scheme": "weno5", "method": "rk4", "step": 0.02, **numerics}
     case = scene(nodes, links, 8.0, given, ["gate.pressure", "valve.flow"], every=0.1)
@@ -25,7 +44,9 @@ def line(links: dict, nodes: dict | None = None, law: str = "linear", **numerics
 
 
 def profiled(profile=HILL, cells: int = CELLS, turned: bool = False, **more) -> dict:
-    one = pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells, friction=STEEL, profile=profile, **more)
+    one = pipe(
+        "lake", "gate", LENGTH, DIAMETER, SPEED, cells, friction=STEEL, profile=profile, **more
+    )
     if turned:
         one |= {"from": "gate", "to": "lake", "profile": mirrored(profile)}
     return {"main": one}
@@ -33,7 +54,10 @@ def profiled(profile=HILL, cells: int = CELLS, turned: bool = False, **more) -> 
 
 def mirrored(profile: dict) -> dict:
     chainage = np.array(profile["chainage"])
-    return {"chainage": (chainage[0] + chainage[-1] - chainage[::-1]).tolist(), "elevation": profile["elevation"][::-1]}
+    return {
+        "chainage": (chainage[0] + chainage[-1] - chainage[::-1]).tolist(),
+        "elevation": profile["elevation"][::-1],
+    }
 
 
 def height(distance: np.ndarray) -> np.ndarray:
@@ -62,8 +86,13 @@ def off_chain(law: str, scheme: str, heights: np.ndarray) -> float:
     """Greatest difference of a pipe along a profile from a chain of one-cell pipes, over the range."""
     n = heights.size - 1
     names = ["lake", *(f"n{k}" for k in range(1, n)), "gate"]
-    nodes = {name: junction(elevation=z) for name, z in zip(names[1:-1], heights[1:-1], strict=True)}
-    links = {f"p{k}": pipe(*names[k : k + 2], LENGTH / n, DIAMETER, SPEED, 1, friction=STEEL) for k in range(n)}
+    nodes = {
+        name: junction(elevation=z) for name, z in zip(names[1:-1], heights[1:-1], strict=True)
+    }
+    links = {
+        f"p{k}": pipe(*names[k : k + 2], LENGTH / n, DIAMETER, SPEED, 1, friction=STEEL)
+        for k in range(n)
+    }
     points = {"chainage": np.linspace(0.0, LENGTH, n + 1).tolist(), "elevation": heights.tolist()}
     numerics = {"scheme": scheme, "step": 1.2 / n, "method": "rk4", "end": 2.0}
     one = fvsolve.run(line(profiled(points, cells=n), law=law, **numerics))["gate.pressure"]
@@ -72,7 +101,8 @@ def off_chain(law: str, scheme: str, heights: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(
-    ("law", "scheme"), [("linear", "upwind"), ("linear", "weno5"), ("log", "upwind"), ("mixture", "weno5")]
+    ("law", "scheme"),
+    [("linear", "upwind"), ("linear", "weno5"), ("log", "upwind"), ("mixture", "weno5")],
 )
 def test_it_is_the_chain_of_300_pipes(law: str, scheme: str) -> None:
     """Equal to rounding for `linear` and `upwind`; otherwise at most 1.5 times the difference of straight pipes."""
@@ -97,7 +127,9 @@ def test_nothing_moves_that_is_left_alone(law: str, scheme: str, method: str) ->
     found = fvsolve.run(case, set={"numerics.end": 1.0})
     for probe in found.probes:
         assert np.ptp(found[probe]) == 0.0
-    assert np.array_equal(found.envelope["main"]["min_pressure"], found.envelope["main"]["max_pressure"])
+    assert np.array_equal(
+        found.envelope["main"]["min_pressure"], found.envelope["main"]["max_pressure"]
+    )
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -106,7 +138,9 @@ def test_drawn_the_other_way_it_is_the_same(law: str) -> None:
     for probe in one.probes:
         assert np.allclose(one[probe], other[probe], rtol=1e-10, atol=1e-6)
     for key in ("min_pressure", "max_pressure", "initial_head", "elevation"):
-        assert np.allclose(one.envelope["main"][key], other.envelope["main"][key][::-1], rtol=1e-9, atol=1e-6)
+        assert np.allclose(
+            one.envelope["main"][key], other.envelope["main"][key][::-1], rtol=1e-9, atol=1e-6
+        )
 
 
 def test_a_closed_line_rests_at_equal_heads_under_every_law() -> None:
@@ -120,7 +154,8 @@ def test_a_closed_line_rests_at_equal_heads_under_every_law() -> None:
 
 
 def test_every_point_is_in_the_envelope_and_the_summit_is_the_lowest_pressure() -> None:
-    found = fvsolve.run(line(profiled(cells=4)))  # cells of 750 m, of which no centre is near the summit at 1200 m
+    # cells of 750 m, of which no centre is near the summit at 1200 m
+    found = fvsolve.run(line(profiled(cells=4)))
     one = found.envelope["main"]
     points = np.array(HILL["chainage"]) - HILL["chainage"][0]
     assert set(points) <= set(one["distance"])
@@ -129,7 +164,10 @@ def test_every_point_is_in_the_envelope_and_the_summit_is_the_lowest_pressure() 
 
 
 def test_a_summit_boils_where_no_cell_does() -> None:
-    peak = {"chainage": [0.0, 1400.0, 1500.0, 1600.0, 3000.0], "elevation": [30.0, 30.0, 121.0, 30.0, 20.0]}
+    peak = {
+        "chainage": [0.0, 1400.0, 1500.0, 1600.0, 3000.0],
+        "elevation": [30.0, 30.0, 121.0, 30.0, 20.0],
+    }
     case = line(profiled(peak, cells=2))
     case["links"]["valve"]["opening"] = 1.0
     found = fvsolve.run(case, set={"numerics.end": 0.5})
@@ -148,7 +186,9 @@ def test_length_and_elevations_of_nodes_follow_from_it() -> None:
     assert found.links["main"].length == LENGTH
     assert (found.nodes["lake"].elevation, found.nodes["gate"].elevation) == (30.0, 20.0)
     assert fvsolve.load(found.table()) == found
-    assert np.array_equal(fvsolve.run(found)["gate.pressure"], fvsolve.run(line(profiled()))["gate.pressure"])
+    assert np.array_equal(
+        fvsolve.run(found)["gate.pressure"], fvsolve.run(line(profiled()))["gate.pressure"]
+    )
 
 
 def test_x_y_and_z_give_the_way_and_files_read_as_lists(tmp_path) -> None:
@@ -160,9 +200,15 @@ def test_x_y_and_z_give_the_way_and_files_read_as_lists(tmp_path) -> None:
     route = profiled(said)
     del route["main"]["length"]
     assert np.allclose(fvsolve.run(line(route))["gate.pressure"], first["gate.pressure"], rtol=1e-9)
-    rows = "\n".join(f"{c / 1000:.5f};{e}" for c, e in zip(HILL["chainage"], HILL["elevation"], strict=True))
-    (tmp_path / "line.csv").write_text(f"Chainage [km];Elevation [m]\n{rows}\n".replace(".", ","), encoding="utf-16")
-    read = fvsolve.run(line(profiled({"file": str(tmp_path / "line.csv")})), out=tmp_path / "run", pictures=False)
+    rows = "\n".join(
+        f"{c / 1000:.5f};{e}" for c, e in zip(HILL["chainage"], HILL["elevation"], strict=True)
+    )
+    (tmp_path / "line.csv").write_text(
+        f"Chainage [km];Elevation [m]\n{rows}\n".replace(".", ","), encoding="utf-16"
+    )
+    read = fvsolve.run(
+        line(profiled({"file": str(tmp_path / "line.csv")})), out=tmp_path / "run", pictures=False
+    )
     assert np.array_equal(read["gate.pressure"], first["gate.pressure"])
     again = fvsolve.run(tmp_path / "run" / "case.toml")
     assert np.array_equal(again["gate.pressure"], first["gate.pressure"])
@@ -195,4 +241,6 @@ def test_pressure_at_ambient_is_at_the_ground() -> None:
     case = line(profiled())
     case["links"]["valve"]["opening"] = 0.0
     found = fvsolve.run(case, set={"numerics.end": 0.1}).envelope["main"]
-    assert np.allclose(found["min_pressure"], AMBIENT + RHO * GRAVITY * (110.0 - found["elevation"]), rtol=1e-12)
+    assert np.allclose(
+        found["min_pressure"], AMBIENT + RHO * GRAVITY * (110.0 - found["elevation"]), rtol=1e-12
+    )

@@ -14,7 +14,8 @@ import fvsolve
 from fvsolve.errors import CaseError
 
 FACTOR, LENGTH, BORE = 0.02, 1000.0, 0.3
-RESISTANCE = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)  # head per flow squared
+# head per flow squared
+RESISTANCE = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)
 STEADY = {"model": "steady", "factor": FACTOR}
 ONE = {"flow": [0.1], "head": [50.0]}
 THREE = {"flow": [0.0, 0.1, 0.15], "head": [60.0, 50.0, 35.0]}
@@ -25,7 +26,13 @@ def main(start: str, end: str, cells: int = 10, **more) -> dict:
     return pipe(start, end, LENGTH, BORE, 1000.0, cells, friction=STEADY, **more)
 
 
-def rising(lift: float = 30.0, end: float = 5.0, numerics=None, probes=("pump.flow", "pump.head"), **pump_keys) -> dict:
+def rising(
+    lift: float = 30.0,
+    end: float = 5.0,
+    numerics=None,
+    probes=("pump.flow", "pump.head"),
+    **pump_keys,
+) -> dict:
     """Return a case of a pump from a sump at head 0 m through a main to a lake at head `lift` [m]."""
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
     links = {"pump": pump("sump", "out", **pump_keys), "main": main("out", "top")}
@@ -48,16 +55,26 @@ def power_law(q, a, b, c):
 C3 = math.log(25.0 / 10.0) / math.log(1.5)
 CURVES = [
     (ONE, lambda q, n=1.0: n * n * 200.0 / 3.0 - 50.0 / 3.0 / 0.01 * q * q),
-    (THREE, lambda q, n=1.0: n * n * 60.0 - 10.0 * n ** (2.0 - C3) * (q / 0.1) ** C3 if q > 0 else n * n * 60.0),
+    (
+        THREE,
+        lambda q, n=1.0: (
+            n * n * 60.0 - 10.0 * n ** (2.0 - C3) * (q / 0.1) ** C3 if q > 0 else n * n * 60.0
+        ),
+    ),
     (FOUR, lambda q, n=1.0: n * n * float(np.interp(q / n, FOUR["flow"], FOUR["head"]))),
-    ({"coefficients": [60.0, -20.0, 0.0, -5000.0]}, lambda q, n=1.0: 60 * n * n - 20.0 * q * n - 5000.0 * q**3 / n),
+    (
+        {"coefficients": [60.0, -20.0, 0.0, -5000.0]},
+        lambda q, n=1.0: 60 * n * n - 20.0 * q * n - 5000.0 * q**3 / n,
+    ),
 ]
 
 
 @pytest.mark.parametrize("lift", [20.0, 59.9, 60.0, 70.0])
 def test_a_straight_curve_of_three_points_has_a_slope_at_no_flow(lift):
     """The parabola from zero head at 0.6 m3/s has b' = 100 / 1.2; reverse flow adds b' q^2 to the straight line."""
-    found = fvsolve.build(fvsolve.load(rising(lift, curve={"flow": [0.0, 0.1, 0.2], "head": [60.0, 50.0, 40.0]})))
+    found = fvsolve.build(
+        fvsolve.load(rising(lift, curve={"flow": [0.0, 0.1, 0.2], "head": [60.0, 50.0, 40.0]}))
+    )
     q = system(lambda q: 60.0 - 100.0 * q + (100.0 / 1.2 * q * q if q < 0.0 else 0.0), lift)
     assert found.tables.valves[0]["flow"] / RHO == approx(q, rel=1e-9, abs=1e-12)
 
@@ -78,7 +95,9 @@ def test_constant_power():
     assert found.tables.valves[0]["flow"] / RHO == approx(q, rel=1e-9)
 
 
-@pytest.mark.parametrize("many, way", [(2, "series"), (3, "series"), (2, "parallel"), (3, "parallel")])
+@pytest.mark.parametrize(
+    "many, way", [(2, "series"), (3, "series"), (2, "parallel"), (3, "parallel")]
+)
 def test_pumps_in_series_add_heads_and_in_parallel_flows(many, way):
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
     if way == "series":
@@ -93,7 +112,9 @@ def test_pumps_in_series_add_heads_and_in_parallel_flows(many, way):
     result = fvsolve.run(case)
     assert result["main.flow"][0] == approx(system(f, 20.0), rel=1e-9)
     assert np.ptp(result["main.flow"]) == 0.0
-    assert result["p0.flow"][0] == approx(system(f, 20.0) / (many if way == "parallel" else 1), rel=1e-9)
+    assert result["p0.flow"][0] == approx(
+        system(f, 20.0) / (many if way == "parallel" else 1), rel=1e-9
+    )
 
 
 def test_pump_between_two_lakes_alone():
@@ -110,27 +131,40 @@ def test_pump_between_two_lakes_alone():
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
 @pytest.mark.parametrize("curve", [ONE, FOUR], ids=["one", "four"])
 def test_nothing_moves_by_a_bit_while_nothing_changes(law, curve):
-    case = rising(curve=curve, end=3.0, probes=["pump.flow", "out.pressure", "main.flow@0.5", "pump.speed"])
+    case = rising(
+        curve=curve, end=3.0, probes=["pump.flow", "out.pressure", "main.flow@0.5", "pump.speed"]
+    )
     case["fluid"] = {"name": "Water", "law": law}
     result = fvsolve.run(case)
     assert result.ok and not result.summary["marks"]
     for name in case["output"]["probes"]:
         assert np.ptp(result[name]) == 0.0
-    jet = 0.0 if law == "linear" else 1.0 / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)  # v^2 / 2 g is lost
+    # v^2 / 2 g is lost
+    jet = 0.0 if law == "linear" else 1.0 / (2.0 * GRAVITY * (math.pi / 4 * BORE**2) ** 2)
     f = CURVES[0 if curve is ONE else 2][1]
-    assert result["pump.flow"][0] == approx(system(lambda q: f(q) - jet * q * q), rel=1e-9 if law == "linear" else 2e-4)
+    assert result["pump.flow"][0] == approx(
+        system(lambda q: f(q) - jet * q * q), rel=1e-9 if law == "linear" else 2e-4
+    )
 
 
 def test_slow_change_of_speed_follows_operating_points():
     """Between two lakes the flow at every speed follows from the curve and the lift."""
     nodes = {"sump": lake(0.0), "top": lake(20.0)}
     speed = {"time": [0.0, 1.0], "value": [1.0, 0.8]}
-    case = scene(nodes, {"pump": pump("sump", "top", curve=ONE, speed=speed)}, 1.0, {"step": 0.05, "method": "rk4"},
-                 ["pump.flow", "pump.speed"], 0.1)  # fmt: skip
+    case = scene(
+        nodes,
+        {"pump": pump("sump", "top", curve=ONE, speed=speed)},
+        1.0,
+        {"step": 0.05, "method": "rk4"},
+        ["pump.flow", "pump.speed"],
+        0.1,
+    )
     result = fvsolve.run(case)
     n = result["pump.speed"]
     assert n == approx(1.0 - 0.2 * result.t, abs=1e-15)
-    assert result["pump.flow"] == approx(np.sqrt((200.0 / 3.0 * n * n - 20.0) / (50.0 / 3.0 / 0.01)), rel=1e-11)
+    assert result["pump.flow"] == approx(
+        np.sqrt((200.0 / 3.0 * n * n - 20.0) / (50.0 / 3.0 / 0.01)), rel=1e-11
+    )
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -139,8 +173,10 @@ def test_elevations_are_lifted_too(law):
     flows = []
     for height in (-5.0, 4.0):
         nodes = {
-            "sump": lake(-3.0, elevation=height), "out": junction(elevation=height), "top": lake(25.0, elevation=20.0),
-        }  # fmt: skip
+            "sump": lake(-3.0, elevation=height),
+            "out": junction(elevation=height),
+            "top": lake(25.0, elevation=20.0),
+        }
         links = {"pump": pump("sump", "out", curve=ONE), "main": main("out", "top")}
         case = scene(nodes, links, 2.0, {}, ["pump.flow", "out.head", "pump.head"])
         case["fluid"] = {**case["fluid"], "law": law}
@@ -177,7 +213,8 @@ STEADY_NETWORK = {"model": "steady", "factor": 0.02}
 NETWORK_CURVES = [
     {"curve": {"flow": [0.1], "head": [50.0]}},
     {"curve": {"flow": [0.0, 0.1, 0.15], "head": [60.0, 50.0, 35.0]}},
-    {"curve": {"flow": [0.0, 0.05, 0.06, 0.15], "head": [60.0, 59.9, 30.0, 29.9]}},  # flat, steep, flat
+    # flat, steep, flat
+    {"curve": {"flow": [0.0, 0.05, 0.06, 0.15], "head": [60.0, 59.9, 30.0, 29.9]}},
     {"curve": {"flow": [0.0, 0.1, 0.11], "head": [50.0, 49.999, 20.0]}},  # a power of 50
     {"curve": {"flow": [0.0, 0.1, 0.4], "head": [60.0, 30.0, 15.0]}},  # a power below 1
     {"curve": {"coefficients": [60.0, 0.0, 0.0, -8000.0]}},
@@ -190,7 +227,12 @@ def random_scene(seed: int) -> dict:
     """Return a case of random pumps with random speeds between lakes, with a pipe and a valve that closes and opens."""
     rng = np.random.default_rng(seed)
     many = int(rng.integers(1, 4))
-    nodes = {"sump": lake(0.0), "top": lake(float(rng.uniform(-10.0, 70.0))), "end": junction(), "out": junction()}
+    nodes = {
+        "sump": lake(0.0),
+        "top": lake(float(rng.uniform(-10.0, 70.0))),
+        "end": junction(),
+        "out": junction(),
+    }
     places = ["sump", *(f"n{k}" for k in range(many - 1)), "out"] if rng.random() < 0.5 else None
     nodes |= {name: junction() for name in (places or [])[1:-1]}
     links = {"main": pipe("out", "end", 300.0, 0.3, 1000.0, 8, friction=STEADY_NETWORK)}
@@ -201,9 +243,15 @@ def random_scene(seed: int) -> dict:
         values = rng.choice([0.0, 0.3, 1.0, 1.2], 5).tolist()
         law = NETWORK_CURVES[int(rng.integers(len(NETWORK_CURVES)))]
         links[f"p{k}"] = pump(
-            start, stop, **law, speed={"time": times, "value": values}, check_valve=bool(rng.random() < 0.5)
+            start,
+            stop,
+            **law,
+            speed={"time": times, "value": values},
+            check_valve=bool(rng.random() < 0.5),
         )
-    probes = [f"p{k}.{what}" for k in range(many) for what in ("flow", "head")] + [f"{name}.head" for name in nodes]
+    probes = [f"p{k}.{what}" for k in range(many) for what in ("flow", "head")] + [
+        f"{name}.head" for name in nodes
+    ]
     return scene(nodes, links, 2.5, {}, probes, 0.02)
 
 
@@ -240,13 +288,20 @@ def test_two_pumps_in_parallel_with_a_too_weak_pump_stop_as_a_steady_state():
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
     probes = ["strong.flow", "weak.flow"]
     result = fvsolve.run(scene(nodes, links, 60.0, {}, probes, 0.1))
-    assert not result["weak.flow"][result.t < 1.0].any() and np.ptp(result["strong.flow"][result.t < 1.0]) == 0.0
+    assert (
+        not result["weak.flow"][result.t < 1.0].any()
+        and np.ptp(result["strong.flow"][result.t < 1.0]) == 0.0
+    )
     assert result["strong.flow"][-1] == 0.0 and result["weak.flow"][-1] > 0.02
     assert len(result.summary["events"]) <= 6
 
 
 def faults(more=None, **keys) -> str:
-    links = {"pump": pump("sump", "out", **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5), **(more or {})}
+    links = {
+        "pump": pump("sump", "out", **keys),
+        "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5),
+        **(more or {}),
+    }
     case = scene({"sump": lake(0.0), "out": junction(), "top": lake(20.0)}, links, 1.0, {})
     with pytest.raises(CaseError) as caught:
         fvsolve.build(fvsolve.load(case))
@@ -298,10 +353,18 @@ def test_all_faults_come_at_once():
 def test_faults_of_torques():
     motor = {"motor": {"type": "torque", "to": "pump.shaft", "torque": 1.0}}
     assert "pump.shaft has no inertia" in faults(motor, curve=ONE)
-    held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
+    held = {
+        "curve": ONE,
+        "inertia": 2.0,
+        "rated_speed": 150.0,
+        "trip": step(0.5, 0.0, 1.0)["time"][1],
+    }
     assert "is held at its speed until the trip" in faults(motor, **held)
     wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
-    assert "a hydraulic place, and this port of a torque needs a rotational or spatial place" in faults(wet, curve=ONE)
+    assert (
+        "a hydraulic place, and this port of a torque needs a rotational or spatial place"
+        in faults(wet, curve=ONE)
+    )
 
 
 def rounded(by: float) -> dict:
@@ -310,12 +373,24 @@ def rounded(by: float) -> dict:
     head, torque = 0.5 - np.cos(x), 0.4 - np.cos(x)
     head[-1] += by
     torque[-1] -= by
-    return {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "head": head.tolist(), "torque": torque.tolist()}}
+    return {
+        "suter": {
+            "rated_flow": 0.1,
+            "rated_head": 50.0,
+            "head": head.tolist(),
+            "torque": torque.tolist(),
+        }
+    }
 
 
 @pytest.mark.parametrize("by", [1e-16, -4e-16, 1e-9, -1e-7])
 def test_ends_of_a_suter_table_that_differ_by_rounding_are_equal(by):
-    case = scene({"sump": lake(0.0), "top": lake(20.0)}, {"pump": pump("sump", "top", **rounded(by))}, 1.0, {})
+    case = scene(
+        {"sump": lake(0.0), "top": lake(20.0)},
+        {"pump": pump("sump", "top", **rounded(by))},
+        1.0,
+        {},
+    )
     table = fvsolve.load(case).links["pump"].suter
     assert table.head[0] == table.head[-1] and table.torque[0] == table.torque[-1]
 
@@ -326,9 +401,16 @@ def test_ends_of_a_suter_table_that_differ_by_more_are_a_fault(by):
 
 
 def notes(nodes: dict, start: str, end: str, **keys) -> list:
-    links = {"pump": pump(start, end, **keys), "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5, minor_loss=20.0)}
+    links = {
+        "pump": pump(start, end, **keys),
+        "main": pipe("out", "top", 100.0, 0.3, 1000.0, 5, minor_loss=20.0),
+    }
     made = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {})))
-    return [(one.key, one.text) for one in made.warnings if one.kind == "range" and one.place == "links.pump"]
+    return [
+        (one.key, one.text)
+        for one in made.warnings
+        if one.kind == "range" and one.place == "links.pump"
+    ]
 
 
 WATERS = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
@@ -341,21 +423,29 @@ def test_a_pump_drawn_backwards_is_questioned_and_a_pump_that_lifts_is_not():
     down = {"sump": lake(60.0), "out": junction(), "top": lake(20.0)}
     ((key, text),) = notes(down, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
     assert key == "from" and "m lower" in text
-    assert notes({**down, "top": lake(70.0)}, "sump", "out", curve={"flow": [0.02], "head": [10.0]}) == []  # a booster
+    # a booster
+    assert (
+        notes({**down, "top": lake(70.0)}, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
+        == []
+    )
     assert notes(WATERS, "out", "sump", curve=ONE, speed=0.0) == []  # at rest
 
 
 @pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
 def test_a_rated_flow_too_quick_for_the_adjacent_pipes_is_questioned(flow, unit):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
-    assert [key for key, _ in said] == ["curve"] and f'did you mean "{flow:.4g} {unit}"?' in said[0][1]
+    assert [key for key, _ in said] == ["curve"] and f'did you mean "{flow:.4g} {unit}"?' in said[
+        0
+    ][1]
     assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []
 
 
 @pytest.mark.parametrize("flow, asked", [("0.03 l/s", True), ("0.1 m3/h", True), ("2 l/s", False)])
 def test_a_rated_flow_too_slow_for_the_adjacent_pipes_is_questioned(flow, asked):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
-    assert [key for key, _ in said] == ["curve"] * asked and all("mean another unit?" in text for _, text in said)
+    assert [key for key, _ in said] == ["curve"] * asked and all(
+        "mean another unit?" in text for _, text in said
+    )
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,9 @@ def head(n, q):
 
 
 FLOWS = np.unique([*np.tan(np.linspace(0.0, EDGE, 65))[:-1], *np.linspace(0.0, 2.0, 65)])
-POWERS = np.maximum((1.0 + FLOWS**2) * [suter(RADIAL[1], 1.0, v) for v in FLOWS], FLOWS * (4.0 - FLOWS**2) / 3.0)
+POWERS = np.maximum(
+    (1.0 + FLOWS**2) * [suter(RADIAL[1], 1.0, v) for v in FLOWS], FLOWS * (4.0 - FLOWS**2) / 3.0
+)
 
 
 def torque(n, q):
@@ -70,8 +72,10 @@ def test_a_table_is_periodic_equals_1_at_the_rated_point_and_resists_at_standsti
     wh, wb = (np.array(row) for row in suter_tables()[name])
     assert len(wh) == len(wb) == 89 and wh[0] == wh[-1] and wb[0] == wb[-1]
     assert 2.0 * wh[55] == 2.0 * wb[55] == approx(1.0)
-    assert (wh[44:56] > 0.0).all() and (wb[44:56] > 0.0).all()  # head and torque of a pump are positive
-    assert wh[22] > 0.0 > wh[66] and wb[22] > 0.0 > wb[66]  # at rest it resists both flows and is driven by them
+    # head and torque of a pump are positive
+    assert (wh[44:56] > 0.0).all() and (wb[44:56] > 0.0).all()
+    # at rest it resists both flows and is driven by them
+    assert wh[22] > 0.0 > wh[66] and wb[22] > 0.0 > wb[66]
     steps = np.abs(np.diff(wh)).max(), np.abs(np.diff(wb)).max()
     assert max(steps) < 0.4
 
@@ -79,7 +83,9 @@ def test_a_table_is_periodic_equals_1_at_the_rated_point_and_resists_at_standsti
 def test_between_two_tables_it_is_the_logarithm_that_counts_and_beyond_them_the_nearest():
     middle = quadrants(math.sqrt(25.0 * 35.0))
     assert middle.words == "radial-25 and radial-35"
-    assert middle.head == approx(0.5 * sum(np.array(suter_tables()[one][0]) for one in ("radial-25", "radial-35")))
+    assert middle.head == approx(
+        0.5 * sum(np.array(suter_tables()[one][0]) for one in ("radial-25", "radial-35"))
+    )
     assert quadrants(10.0).words == "radial-25" and quadrants(400.0).words == "axial-260"
     assert quadrants(94.0).head == approx(suter_tables()["mixed-94"][0])
     assert SPECIFIC < 25.0
@@ -96,17 +102,26 @@ METHODS = {
 def test_a_curve_joined_to_its_table_follows_scipy_into_turbining(numerics, near):
     """The steady state equals that of the curve to the bit; kinks of the table limit the accuracy of all methods."""
     lift, end = 30.0, 10.0
-    result = fvsolve.run(column(lift, end, ["pump.speed", "pump.flow", "pump.head"], numerics, **SHAFT, trip=1.0))
+    result = fvsolve.run(
+        column(lift, end, ["pump.speed", "pump.flow", "pump.head"], numerics, **SHAFT, trip=1.0)
+    )
     alone = fvsolve.run(column(lift, 0.5, ["pump.flow", "pump.head"], numerics, curve=CURVE))
     q0 = operating_flow(lift)
-    assert result["pump.flow"][0] == alone["pump.flow"][0] and result["pump.head"][0] == alone["pump.head"][0]
+    assert (
+        result["pump.flow"][0] == alone["pump.flow"][0]
+        and result["pump.head"][0] == alone["pump.head"][0]
+    )
     truth = column_truth(lift, 1.0, q0, 1.0, end, head, torque)
     n, q = truth.sol(result.t[result.t > 1.0])
     assert n[-1] < -0.5 and q[-1] < -0.02
     assert result["pump.speed"][result.t > 1.0] == approx(n, abs=near)
     assert result["pump.flow"][result.t > 1.0] == approx(q, abs=near)
     (said,) = [one for one in result.warnings if one.kind == "range"]
-    assert result.marks == [] and "radial-25" in said.text and "specific speed of the pump, 24.09" in said.text
+    assert (
+        result.marks == []
+        and "radial-25" in said.text
+        and "specific speed of the pump, 24.09" in said.text
+    )
 
 
 def test_drawn_the_other_way_it_is_the_same():
@@ -143,8 +158,12 @@ def test_head_and_torque_are_continuous_at_both_ends_of_every_curve(given):
             inside, out = q - side * 1e-10, q + side * 1e-10
             heads = [law.curve_head(floats, curve, n, one)[0] for one in (inside, out)]
             torques = [law.fluid_torque(floats, at, curve, n, one, 1.0) for one in (inside, out)]
-            assert heads[0] == approx(heads[1], abs=1e-5) and torques[0] == approx(torques[1], abs=1e-4)
-            assert law.is_off_curve(floats, curve, n, out) and not law.is_off_curve(floats, curve, n, inside)
+            assert heads[0] == approx(heads[1], abs=1e-5) and torques[0] == approx(
+                torques[1], abs=1e-4
+            )
+            assert law.is_off_curve(floats, curve, n, out) and not law.is_off_curve(
+                floats, curve, n, inside
+            )
 
 
 def test_energy_is_never_created_in_a_run_down_and_back():
@@ -181,7 +200,10 @@ def test_a_pump_starts_against_a_rigid_column_behind_its_check_valve(numerics):
     section = area(BORE)
     loss = FACTOR * LENGTH / BORE / (2.0 * GRAVITY * section**2)
     ramp = lambda t: min((t - 1.0) / 2.0, 1.0)  # noqa: E731
-    rate = lambda t, y: [GRAVITY * section / LENGTH * (head(ramp(t), y[0]) - lift - loss * y[0] ** 2)]  # noqa: E731
+
+    def rate(t, y):
+        return [GRAVITY * section / LENGTH * (head(ramp(t), y[0]) - lift - loss * y[0] ** 2)]
+
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True}
     first = solve_ivp(rate, (opens, 3.0), [0.0], **options)
     then = solve_ivp(rate, (3.0, end), first.y[:, -1], **options)
@@ -193,8 +215,12 @@ def test_a_pump_starts_against_a_rigid_column_behind_its_check_valve(numerics):
 def test_its_efficiency_is_nowhere_above_that_at_the_rated_point():
     full = {"flow": [0.0, 0.1, 0.2], "head": [52.0, 50.0, 45.0]}
     for lift in (0.0, 20.0, 40.0, 50.0):
-        case = column(lift, 0.1, ["pump.flow", "pump.head", "pump.power"], **{**SHAFT, "curve": full})
+        case = column(
+            lift, 0.1, ["pump.flow", "pump.head", "pump.power"], **{**SHAFT, "curve": full}
+        )
         case["links"]["main"]["diameter"] = 0.5
         result = fvsolve.run(case)
-        efficiency = RHO * GRAVITY * result["pump.flow"] * result["pump.head"] / result["pump.power"]
+        efficiency = (
+            RHO * GRAVITY * result["pump.flow"] * result["pump.head"] / result["pump.power"]
+        )
         assert 0.3 < efficiency[0] <= EFFICIENCY * 1.002

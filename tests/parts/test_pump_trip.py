@@ -30,8 +30,12 @@ from fvsolve.studies.linearise import linearise
 
 ONE = {"flow": [0.1], "head": [50.0]}
 SHAFT = {
-    "curve": ONE, "curve_extrapolation": "parabola", "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY,
-}  # fmt: skip
+    "curve": ONE,
+    "curve_extrapolation": "parabola",
+    "rated_speed": OMEGA,
+    "inertia": INERTIA,
+    "efficiency": EFFICIENCY,
+}
 SUTER = {"suter": {"rated_flow": 0.1, "rated_head": 50.0, "table": "radial-35"}}
 FOUR = {**SUTER, "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY}
 WH, WB = (np.array(row) for row in suter_tables()["radial-35"])
@@ -39,14 +43,20 @@ WH, WB = (np.array(row) for row in suter_tables()["radial-35"])
 
 def suter(table, n, q):
     v = q / 0.1
-    return (n * n + v * v) * np.interp(math.pi + math.atan2(v, n), np.linspace(0, 2 * math.pi, len(table)), table)
+    return (n * n + v * v) * np.interp(
+        math.pi + math.atan2(v, n), np.linspace(0, 2 * math.pi, len(table)), table
+    )
 
 
 def test_an_isolated_shaft_runs_down_as_1_over_time():
     """At no flow the torque is T0 n^2, so 1 / n = 1 + T0 (t - trip) / (J omega)."""
     nodes = {"sump": lake(0.0), "top": lake(100.0)}
     keys = {**SHAFT, "trip": 1.0, "check_valve": True}
-    result = fvsolve.run(scene(nodes, {"pump": pump("sump", "top", **keys)}, 10.0, TIGHT, ["pump.speed", "pump.flow"]))
+    result = fvsolve.run(
+        scene(
+            nodes, {"pump": pump("sump", "top", **keys)}, 10.0, TIGHT, ["pump.speed", "pump.flow"]
+        )
+    )
     exact = 1.0 / (1.0 + 2.0 / 3.0 * TORQUE / (INERTIA * OMEGA) * np.maximum(result.t - 1.0, 0.0))
     assert result["pump.speed"] == approx(exact, rel=1e-9)
     assert not result["pump.flow"].any() and not result.summary["events"]
@@ -55,16 +65,24 @@ def test_an_isolated_shaft_runs_down_as_1_over_time():
 @pytest.mark.parametrize("check", [False, True])
 def test_pump_column_and_lakes_follow_scipy(check):
     lift, end = 30.0, 6.0
-    case = column(lift, end, ["pump.speed", "pump.flow", "pump.torque"], **SHAFT, trip=1.0, check_valve=check)
+    case = column(
+        lift, end, ["pump.speed", "pump.flow", "pump.torque"], **SHAFT, trip=1.0, check_valve=check
+    )
     result = fvsolve.run(case)
     q0 = operating_flow(lift)
     truth = column_truth(lift, 1.0, q0, 1.0, end, check=check)
     before, after = result.t <= 1.0, (result.t > 1.0) & (result.t <= truth.t[-1])
-    assert result["pump.flow"][before] == approx(q0, rel=1e-12) and np.ptp(result["pump.flow"][before]) == 0.0
+    assert (
+        result["pump.flow"][before] == approx(q0, rel=1e-12)
+        and np.ptp(result["pump.flow"][before]) == 0.0
+    )
     n, q = truth.sol(result.t[after])
     assert result["pump.speed"][after] == approx(n, rel=1e-8)
-    assert result["pump.flow"][after] == approx(q, abs=2e-8)  # the curve is straight below 1e-5 of its last flow
-    assert result["pump.torque"][after] == approx([torque(*one) for one in zip(n, q, strict=True)], rel=1e-7)
+    # the curve is straight below 1e-5 of its last flow
+    assert result["pump.flow"][after] == approx(q, abs=2e-8)
+    assert result["pump.torque"][after] == approx(
+        [torque(*one) for one in zip(n, q, strict=True)], rel=1e-7
+    )
     if check:
         events = result.summary["events"]
         assert [event["what"] for event in events] == ["check valve shuts"]
@@ -78,7 +96,9 @@ def test_pump_column_and_lakes_follow_scipy(check):
 def test_four_quadrants_follow_scipy_into_turbining():
     """Kinks of the table, which is linear between its values, limit the accuracy of all methods."""
     lift, end = 30.0, 12.0
-    result = fvsolve.run(column(lift, end, ["pump.speed", "pump.flow", "pump.head"], **FOUR, trip=1.0))
+    result = fvsolve.run(
+        column(lift, end, ["pump.speed", "pump.flow", "pump.head"], **FOUR, trip=1.0)
+    )
     heads = lambda n, q: 50.0 * suter(WH, n, q)  # noqa: E731
     q0 = operating_flow(lift, lambda q: heads(1.0, q))
     assert result["pump.flow"][0] == approx(q0, rel=1e-11)
@@ -102,7 +122,9 @@ SPEED, FAR = 1000.0, 1000.0  # wave speed [m/s] and length of the main [m]
 def line(lift: float, end: float, numerics, probes, cells: int = 100, **keys) -> dict:
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
     main = pipe("out", "top", FAR, BORE, SPEED, cells, friction=NO_FRICTION)
-    return scene(nodes, {"pump": pump("sump", "out", **keys), "main": main}, end, numerics, probes, 0.02)
+    return scene(
+        nodes, {"pump": pump("sump", "out", **keys), "main": main}, end, numerics, probes, 0.02
+    )
 
 
 def test_a_pump_that_stops_at_once_makes_the_joukowsky_drop():
@@ -115,22 +137,30 @@ def test_a_pump_that_stops_at_once_makes_the_joukowsky_drop():
     during = (result.t > 1.001) & (result.t < 2.9)
     assert result["pump.flow"][during] == approx(q, rel=1e-10)
     assert result["out.head"][during] == approx(head(0.0, q), rel=1e-10)
-    shut = fvsolve.run(line(lift, 2.9, SHARP, ["out.head"], curve=ONE, speed=step(1.0, 1.0, 0.0), check_valve=True))
-    assert shut["out.head"][during] == approx(result["out.head"][during], rel=1e-10)  # q > 0: it stays open
+    shut = fvsolve.run(
+        line(lift, 2.9, SHARP, ["out.head"], curve=ONE, speed=step(1.0, 1.0, 0.0), check_valve=True)
+    )
+    # q > 0: it stays open
+    assert shut["out.head"][during] == approx(result["out.head"][during], rel=1e-10)
 
 
 def test_trip_against_a_pipe_follows_its_characteristic():
     """H = lift + (a / g A) (q - q0) until the reflection returns from the lake, so one equation gives the speed."""
     lift, rise = 40.0, SPEED / (GRAVITY * SECTION)
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
-    result = fvsolve.run(line(lift, 2.9, numerics, ["pump.speed", "out.head"], 200, **SHAFT, trip=1.0))
+    result = fvsolve.run(
+        line(lift, 2.9, numerics, ["pump.speed", "out.head"], 200, **SHAFT, trip=1.0)
+    )
     q0 = math.sqrt((200.0 / 3.0 - lift) / (50.0 / 3.0 / 0.01))
     flow = lambda n: brentq(lambda q: head(n, q) - lift - rise * (q - q0), -1.0, 1.0, xtol=1e-15)  # noqa: E731
     rate = lambda t, y: [-torque(y[0], flow(y[0])) / (INERTIA * OMEGA)]  # noqa: E731
-    truth = solve_ivp(rate, (1.0, 2.9), [1.0], method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
+    truth = solve_ivp(
+        rate, (1.0, 2.9), [1.0], method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True
+    )
     after = (result.t > 1.0) & (result.t < 2.8)  # later, precursors of the reflection
     n = truth.sol(result.t[after])[0]
-    assert result["pump.speed"][after] == approx(n, rel=1e-7)  # kink of the torque at four times the rated flow
+    # kink of the torque at four times the rated flow
+    assert result["pump.speed"][after] == approx(n, rel=1e-7)
     assert result["out.head"][after] == approx([head(one, flow(one)) for one in n], abs=1e-6)
 
 
@@ -152,7 +182,11 @@ def test_given_torques_turn_the_shaft():
     q0 = operating_flow(30.0)
     balance = torque(1.0, q0)
     case = column(30.0, 3.0, ["pump.speed", "pump.flow"], **SHAFT)
-    case["links"]["motor"] = {"type": "torque", "to": "pump.shaft", "torque": step(1.0, balance, 0.0)}
+    case["links"]["motor"] = {
+        "type": "torque",
+        "to": "pump.shaft",
+        "torque": step(1.0, balance, 0.0),
+    }
     result = fvsolve.run(case)
     assert np.ptp(result["pump.speed"][result.t <= 1.0]) == 0.0
     truth = column_truth(30.0, 1.0, q0, 1.0, 3.0)
@@ -198,13 +232,19 @@ def test_a_study_holds_the_motor_as_it_is():
 
 def test_torque_is_an_input():
     case = column(30.0, 3.0, ["pump.speed"], **SHAFT)
-    case["links"]["motor"] = {"type": "torque", "to": "pump.shaft", "torque": torque(1.0, operating_flow(30.0))}
+    case["links"]["motor"] = {
+        "type": "torque",
+        "to": "pump.shaft",
+        "torque": torque(1.0, operating_flow(30.0)),
+    }
     model = fvsolve.build(fvsolve.load(case))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 1.0)
     assert np.abs(state.y).max() < 1e-9
     tripped = fvsolve.advance(model, fvsolve.initial_state(model), 1.0, {"motor.torque": 0.0})
     truth = column_truth(30.0, 1.0, operating_flow(30.0), 0.0, 1.0)
-    assert tripped.y[model.state_names.index("pump.speed")] == approx(truth.y[0, -1] - 1.0, rel=1e-8)
+    assert tripped.y[model.state_names.index("pump.speed")] == approx(
+        truth.y[0, -1] - 1.0, rel=1e-8
+    )
 
 
 def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
@@ -223,7 +263,14 @@ def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
 
 
 def test_implicit_steps_follow_scipy_too():
-    case = column(30.0, 6.0, ["pump.speed", "pump.flow"], {"method": "rodas-5p", "rtol": 1e-9}, **SHAFT, trip=1.0)
+    case = column(
+        30.0,
+        6.0,
+        ["pump.speed", "pump.flow"],
+        {"method": "rodas-5p", "rtol": 1e-9},
+        **SHAFT,
+        trip=1.0,
+    )
     result = fvsolve.run(case)
     truth = column_truth(30.0, 1.0, operating_flow(30.0), 1.0, 6.0)
     assert result.ok and result["pump.speed"][-1] == approx(truth.y[0, -1], rel=1e-7)

@@ -8,7 +8,20 @@ from reference.jacobians import stray
 from reference.level_control import METHODS
 from reference.quasi_steady import FACTOR, HAZEN, loss_of, pipe
 from reference.resumed_runs import killed_and_resumed, same_files
-from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, lake, reservoir, scene, step, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    RHO,
+    WATER,
+    area,
+    junction,
+    lake,
+    reservoir,
+    scene,
+    step,
+    tank,
+    valve,
+)
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
@@ -24,7 +37,14 @@ EXACT = {"rtol": 1e-12}
 def two_tanks(friction=FACTOR, end=600.0, numerics=EXACT, probes=(), **more):
     nodes = {"upper": tank(2.0, 5.0, elevation=3.0), "lower": tank(3.0, 1.0, elevation=0.0)}
     probes = ["upper.level", "lower.level", "main.flow", *probes]
-    return scene(nodes, {"main": pipe("upper", "lower", friction=friction, **more)}, end, dict(numerics), probes, 20.0)
+    return scene(
+        nodes,
+        {"main": pipe("upper", "lower", friction=friction, **more)},
+        end,
+        dict(numerics),
+        probes,
+        20.0,
+    )
 
 
 # laws -------------------------------------------------------------------------------------------------------------
@@ -40,8 +60,13 @@ def test_tanks_equalise_as_in_the_closed_form(method):
     assert run.ok and heads == pytest.approx((math.sqrt(7.0) - 0.5 * speed * run.t) ** 2, abs=CLOSE)
 
 
-FRICTIONS = [FACTOR, HAZEN, {"model": "chezy-manning", "coefficient": 0.011},
-             {"model": "quasi-steady", "roughness": 2e-4}, {"model": "swamee-jain", "roughness": 2e-4}]  # fmt: skip
+FRICTIONS = [
+    FACTOR,
+    HAZEN,
+    {"model": "chezy-manning", "coefficient": 0.011},
+    {"model": "quasi-steady", "roughness": 2e-4},
+    {"model": "swamee-jain", "roughness": 2e-4},
+]
 
 
 @pytest.mark.parametrize("friction", FRICTIONS, ids=lambda one: one["model"])
@@ -54,7 +79,9 @@ def test_the_flow_has_the_losses_of_its_friction_model(friction):
 
 def test_laminar_flow_is_poiseuilles():
     """In 0.5 mm of bore: heads fall exponentially with the flow pi d^4 / (128 mu L)."""
-    case = two_tanks({"model": "quasi-steady", "roughness": 0.0}, 3600.0, diameter=0.0005, length=1.0)
+    case = two_tanks(
+        {"model": "quasi-steady", "roughness": 0.0}, 3600.0, diameter=0.0005, length=1.0
+    )
     case["nodes"]["upper"]["area"] = case["nodes"]["lower"]["area"] = 1e-4
     case["nodes"]["upper"] |= {"elevation": 0.5, "level": 7.5}
     run = fvsolve.run(case)
@@ -65,15 +92,27 @@ def test_laminar_flow_is_poiseuilles():
 
 # networks ---------------------------------------------------------------------------------------------------------
 
-LOOP = {"p1": ("high", "a", 400.0, 0.25), "p2": ("a", "b", 300.0, 0.15), "p3": ("b", "c", 350.0, 0.2),
-        "p4": ("a", "c", 500.0, 0.15), "p5": ("c", "tower", 450.0, 0.2), "p6": ("b", "pond", 200.0, 0.1)}  # fmt: skip
+LOOP = {
+    "p1": ("high", "a", 400.0, 0.25),
+    "p2": ("a", "b", 300.0, 0.15),
+    "p3": ("b", "c", 350.0, 0.2),
+    "p4": ("a", "c", 500.0, 0.15),
+    "p5": ("c", "tower", 450.0, 0.2),
+    "p6": ("b", "pond", 200.0, 0.1),
+}
 DEMANDS, SECTIONS = {"a": 5e-3, "b": 3e-3, "c": 4e-3}, {"tower": 60.0, "pond": 40.0}
 
 
 def loop(friction=HAZEN, end=7200.0, numerics=EXACT, **top):
-    nodes = {"high": lake(60.0, elevation=50.0), "tower": tank(60.0, 3.0, elevation=40.0),
-             "pond": tank(40.0, 2.0, elevation=35.0)}  # fmt: skip
-    nodes |= {name: junction(step(3600.0, demand, 2.0 * demand), elevation=10.0) for name, demand in DEMANDS.items()}
+    nodes = {
+        "high": lake(60.0, elevation=50.0),
+        "tower": tank(60.0, 3.0, elevation=40.0),
+        "pond": tank(40.0, 2.0, elevation=35.0),
+    }
+    nodes |= {
+        name: junction(step(3600.0, demand, 2.0 * demand), elevation=10.0)
+        for name, demand in DEMANDS.items()
+    }
     links = {name: pipe(*keys, friction) for name, keys in LOOP.items()}
     probes = ["tower.level", "pond.level", "a.head", *(f"{name}.flow" for name in LOOP)]
     return scene(nodes, links, end, dict(numerics), probes, 360.0, **top)
@@ -110,7 +149,9 @@ loop_rates.guess = [50.0, 45.0, 45.0]
 @pytest.mark.parametrize("method", ["dormand-prince", "radau-iia-5"])
 def test_tanks_behind_a_loop_of_pipes_follow_explicit_equations(method):
     run = fvsolve.run(loop(), {"numerics.method": method})
-    first = solve_ivp(loop_rates, (0.0, 3600.0 - 1e-9), [3.0, 2.0], "DOP853", rtol=1e-11, atol=1e-12)
+    first = solve_ivp(
+        loop_rates, (0.0, 3600.0 - 1e-9), [3.0, 2.0], "DOP853", rtol=1e-11, atol=1e-12
+    )
     last = solve_ivp(loop_rates, (3600.0, 7200.0), first.y[:, -1], "DOP853", rtol=1e-11, atol=1e-12)
     assert run.ok
     assert [run["tower.level"][-1], run["pond.level"][-1]] == pytest.approx(last.y[:, -1], abs=1e-8)
@@ -121,13 +162,22 @@ def test_a_grid_of_pipes_balances_at_every_node(size):
     """The sparse order of elimination leaves no node and no fill out: each pipe has its loss, each node its balance."""
     rng = np.random.default_rng(size)
     places = [(i, j) for i in range(size) for j in range(size)]
-    nodes = {f"n{i}{j}": junction(float(rng.uniform(0.0, 1e-3)), elevation=float(rng.uniform(0.0, 5.0)))
-             for i, j in places}  # fmt: skip
+    nodes = {
+        f"n{i}{j}": junction(float(rng.uniform(0.0, 1e-3)), elevation=float(rng.uniform(0.0, 5.0)))
+        for i, j in places
+    }
     nodes |= {"west": lake(50.0, elevation=0.0), "east": tank(30.0, 20.0, elevation=20.0)}
-    joins = [(f"n{i}{j}", f"n{k}{m}") for i, j in places for k, m in ((i + 1, j), (i, j + 1)) if max(k, m) < size]
+    joins = [
+        (f"n{i}{j}", f"n{k}{m}")
+        for i, j in places
+        for k, m in ((i + 1, j), (i, j + 1))
+        if max(k, m) < size
+    ]
     joins += [("west", "n00"), (f"n{size - 1}{size - 1}", "east")]
-    links = {f"p{k}": pipe(*ends, float(rng.uniform(50.0, 300.0)), float(rng.uniform(0.05, 0.2)), HAZEN)
-             for k, ends in enumerate(joins)}  # fmt: skip
+    links = {
+        f"p{k}": pipe(*ends, float(rng.uniform(50.0, 300.0)), float(rng.uniform(0.05, 0.2)), HAZEN)
+        for k, ends in enumerate(joins)
+    }
     probes = [*(f"{name}.flow" for name in links), *(f"{name}.head" for name in nodes)]
     run = fvsolve.run(scene(nodes, links, 1800.0, dict(EXACT), probes, 1800.0))
     inflow = {name: -node.get("demand", 0.0) for name, node in nodes.items()}
@@ -147,9 +197,20 @@ def test_no_flow_passes_a_dead_end_and_a_shut_valve_parts_the_network():
     case["links"]["p7"] = pipe("c", "stub")
     case["links"]["p6"]["from"] = "gate"
     case["links"]["shut"] = valve("b", "gate", 0.01, step(100.0, 1.0, 0.0))
-    case["output"]["probes"] = ["p7.flow", "stub.head", "c.head", "p6.flow", "pond.level", "gate.head"]
+    case["output"]["probes"] = [
+        "p7.flow",
+        "stub.head",
+        "c.head",
+        "p6.flow",
+        "pond.level",
+        "gate.head",
+    ]
     run = fvsolve.run(case)
-    assert run.ok and np.all(run["p7.flow"] == 0.0) and run["stub.head"] == pytest.approx(run["c.head"], abs=1e-9)
+    assert (
+        run.ok
+        and np.all(run["p7.flow"] == 0.0)
+        and run["stub.head"] == pytest.approx(run["c.head"], abs=1e-9)
+    )
     assert run["p6.flow"][-1] == 0.0
     assert run["gate.head"][-1] == pytest.approx(35.0 + run["pond.level"][-1], abs=1e-6)
 
@@ -174,10 +235,17 @@ def test_the_words_do_not_matter():
     turned = loop(end=3000.0)
     for link in turned["links"].values():
         link["from"], link["to"] = link["to"], link["from"]
-    shuffled = {**case, "nodes": dict(reversed(case["nodes"].items())), "links": dict(reversed(case["links"].items()))}
+    shuffled = {
+        **case,
+        "nodes": dict(reversed(case["nodes"].items())),
+        "links": dict(reversed(case["links"].items())),
+    }
     units = loop(end=3000.0)
     for link in units["links"].values():
-        link["length"], link["diameter"] = f"{link['length'] * 1e-3!r} km", f"{link['diameter'] * 1e3!r} mm"
+        link["length"], link["diameter"] = (
+            f"{link['length'] * 1e-3!r} km",
+            f"{link['diameter'] * 1e3!r} mm",
+        )
     bare = loop(end=3000.0)
     for link in bare["links"].values():
         del link["pipe_model"]
@@ -190,26 +258,33 @@ def test_the_words_do_not_matter():
     for other in (turned, shuffled, units, halved, waves):
         assert final(other) == pytest.approx(exact, abs=CLOSE)
     assert final(bare, **{"numerics.pipe_model": "quasi-steady"}) == pytest.approx(exact, abs=0.0)
-    assert final({**bare, "defaults": {"pipe": {"pipe_model": "quasi-steady"}}}) == pytest.approx(exact, abs=0.0)
+    assert final({**bare, "defaults": {"pipe": {"pipe_model": "quasi-steady"}}}) == pytest.approx(
+        exact, abs=0.0
+    )
 
 
 FLUIDS = {
-    "log": {**WATER, "law": "log"}, "table": {"name": "Water", "temperature": 293.15, "law": "table"},
+    "log": {**WATER, "law": "log"},
+    "table": {"name": "Water", "temperature": 293.15, "law": "table"},
     "mixture": {**WATER, "law": "mixture", "air_fraction": 1e-6},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("law", FLUIDS)
 def test_every_density_law_has_the_flows_of_a_liquid_that_hardly_yields(law):
     assert set(FLUIDS) | {"linear"} == set(LAWS)
-    assert final(loop(end=3000.0, fluid=FLUIDS[law])) == pytest.approx(final(loop(end=3000.0)), abs=3e-3)
+    assert final(loop(end=3000.0, fluid=FLUIDS[law])) == pytest.approx(
+        final(loop(end=3000.0)), abs=3e-3
+    )
 
 
 def test_a_pipe_with_waves_comes_to_the_same_flow():
     """Levels of long tanks by delay lines and by quasi-steady pipes differ by the inertia of the water alone."""
     case = two_tanks(end=120.0, numerics={"method": "dormand-prince", "rtol": 1e-8})
     case["nodes"]["upper"]["area"] = case["nodes"]["lower"]["area"] = 20.0
-    waves = two_tanks(end=120.0, numerics={"method": "rk4", "courant": 0.8}, wave_speed=1000.0, cells=4)
+    waves = two_tanks(
+        end=120.0, numerics={"method": "rk4", "courant": 0.8}, wave_speed=1000.0, cells=4
+    )
     waves["nodes"], waves["links"]["main"]["pipe_model"] = case["nodes"], "finite-volume"
     quick, slow = fvsolve.run(case), fvsolve.run(waves)
     assert quick["main.flow"][-1] == pytest.approx(slow["main.flow"][-1], rel=1e-4)
@@ -229,23 +304,34 @@ def test_at_rest_no_bit_changes(method, law, friction):
             del node["demand"]
         elif node["type"] == "tank":
             node["level"] = 60.0 - node["elevation"]
-    if law != "linear":  # tanks and a lake at the same level, so that their pressures agree to the bit
-        case["nodes"] = {k: v | {"elevation": 10.0, "level": 20.0} if v["type"] == "tank" else v
-                         for k, v in case["nodes"].items()}  # fmt: skip
+    # tanks and a lake at the same level, so that their pressures agree to the bit
+    if law != "linear":
+        case["nodes"] = {
+            k: v | {"elevation": 10.0, "level": 20.0} if v["type"] == "tank" else v
+            for k, v in case["nodes"].items()
+        }
         case["nodes"]["high"] = tank(50.0, 20.0, elevation=10.0)
     model = fvsolve.build(fvsolve.load(case, {"numerics.method": method}))
     assert np.all(model.rhs(0.0, np.zeros(model.y_size)) == 0.0)
     run = fvsolve.run(case, {"numerics.method": method})
-    assert run.ok and all(np.ptp(run[probe]) == 0.0 for probe in ("tower.level", "pond.level", "p3.flow", "a.head"))
+    assert run.ok and all(
+        np.ptp(run[probe]) == 0.0 for probe in ("tower.level", "pond.level", "p3.flow", "a.head")
+    )
 
 
 def test_the_ledger_closes_and_pipes_dissipate_drop_times_flow():
     case = two_tanks(minor_loss=2.0)
     run, ledger = fvsolve.run(case), energy(case)
     assert abs(ledger.remainder[-1]) < 1e-12 * ledger.throughput
-    fallen = RHO * GRAVITY * (2.0 * 0.5 * (5.0**2 - run["upper.level"][-1] ** 2)
-                              + 3.0 * 0.5 * (1.0 - run["lower.level"][-1] ** 2)
-                              + 3.0 * 2.0 * (5.0 - run["upper.level"][-1]))  # fmt: skip
+    fallen = (
+        RHO
+        * GRAVITY
+        * (
+            2.0 * 0.5 * (5.0**2 - run["upper.level"][-1] ** 2)
+            + 3.0 * 0.5 * (1.0 - run["lower.level"][-1] ** 2)
+            + 3.0 * 2.0 * (5.0 - run["upper.level"][-1])
+        )
+    )
     assert ledger.dissipated["main"][-1] == pytest.approx(fallen, rel=1e-9)
     ledger = energy(loop(end=3000.0))
     assert abs(ledger.remainder[-1]) < 1e-12 * ledger.throughput
@@ -255,7 +341,10 @@ def test_the_ledger_closes_and_pipes_dissipate_drop_times_flow():
 def test_no_rate_depends_on_a_state_outside_its_pattern(law):
     model = fvsolve.build(fvsolve.load(loop(fluid={**WATER, "law": law})))
     rng = np.random.default_rng(1)
-    assert max(stray(model, t, model.scale * rng.normal(size=model.y_size)) for t in (0.0, 4000.0)) < 1e-7
+    assert (
+        max(stray(model, t, model.scale * rng.normal(size=model.y_size)) for t in (0.0, 4000.0))
+        < 1e-7
+    )
 
 
 def test_a_killed_run_resumes_to_the_bit(tmp_path):
@@ -271,7 +360,13 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path):
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_pressure_is_linear_along_the_pipe_and_flow_is_uniform(law):
     probes = [f"main.{q}@{x}" for q in ("pressure", "gauge_pressure", "head") for x in (0, 0.25, 1)]
-    probes += ["main.flow@0.7", "main.velocity@0.3", "upper.pressure", "lower.pressure", "lower.head"]
+    probes += [
+        "main.flow@0.7",
+        "main.velocity@0.3",
+        "upper.pressure",
+        "lower.pressure",
+        "lower.head",
+    ]
     case = two_tanks(probes=probes)
     case["fluid"]["law"] = law
     run = fvsolve.run(case)
@@ -281,19 +376,25 @@ def test_pressure_is_linear_along_the_pipe_and_flow_is_uniform(law):
     mean = 0.75 * run["upper.pressure"] + 0.25 * run["lower.pressure"]
     assert run["main.pressure@0.25"] == pytest.approx(mean, rel=1e-12)
     assert run["main.gauge_pressure@0.25"] == pytest.approx(mean - AMBIENT, abs=1e-6)
-    assert run["main.head@0.25"] == pytest.approx(2.25 + (mean - AMBIENT) / (RHO * GRAVITY), rel=1e-5)
+    assert run["main.head@0.25"] == pytest.approx(
+        2.25 + (mean - AMBIENT) / (RHO * GRAVITY), rel=1e-5
+    )
     assert run["main.flow@0.7"] == pytest.approx(run["main.flow"], rel=1e-15)
     assert run["main.velocity@0.3"] * area(0.05) == pytest.approx(run["main.flow"], rel=1e-12)
 
 
 def test_a_profile_sets_the_pressure_between_the_ends():
     profile = {"chainage": [0.0, 40.0, 100.0], "elevation": [3.0, 6.0, 0.0]}
-    case = two_tanks(probes=["main.pressure@0.4", "main.head@0.4", "upper.head", "lower.head"], profile=profile)
+    case = two_tanks(
+        probes=["main.pressure@0.4", "main.head@0.4", "upper.head", "lower.head"], profile=profile
+    )
     del case["links"]["main"]["length"]
     run = fvsolve.run(case)
     head = run["upper.head"] - 0.4 * (run["upper.head"] - run["lower.head"])
     assert run["main.head@0.4"] == pytest.approx(head, rel=1e-12)
-    assert run["main.pressure@0.4"] == pytest.approx(AMBIENT + RHO * GRAVITY * (head - 6.0), rel=1e-12)
+    assert run["main.pressure@0.4"] == pytest.approx(
+        AMBIENT + RHO * GRAVITY * (head - 6.0), rel=1e-12
+    )
 
 
 def test_limits_know_the_pressures_at_its_ends():
@@ -320,14 +421,32 @@ def test_other_models_of_the_pipe_are_a_key_away():
 
 
 FAULTS = {
-    "lossless": (pipe("upper", "lower", friction={"model": "none"}), "links.main.friction", "follows its losses"),
-    "factor": (pipe("upper", "lower", friction={"model": "steady", "factor": 0.0}), "links.main.friction", "has none"),
-    "history": (pipe("upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}),
-                "links.main.friction.model", "depends on waves"),
-    "frozen": (pipe("upper", "lower", friction={"model": "steady", "roughness": 1e-4}),
-               "links.main.friction.model", "initial flow"),
-    "flow": (pipe("upper", "lower", initial_flow=1e-3), "links.main.initial_flow", "follows the pressures"),
-}  # fmt: skip
+    "lossless": (
+        pipe("upper", "lower", friction={"model": "none"}),
+        "links.main.friction",
+        "follows its losses",
+    ),
+    "factor": (
+        pipe("upper", "lower", friction={"model": "steady", "factor": 0.0}),
+        "links.main.friction",
+        "has none",
+    ),
+    "history": (
+        pipe("upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}),
+        "links.main.friction.model",
+        "depends on waves",
+    ),
+    "frozen": (
+        pipe("upper", "lower", friction={"model": "steady", "roughness": 1e-4}),
+        "links.main.friction.model",
+        "initial flow",
+    ),
+    "flow": (
+        pipe("upper", "lower", initial_flow=1e-3),
+        "links.main.initial_flow",
+        "follows the pressures",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -353,7 +472,9 @@ def test_scalars_a_force_and_bodies_are_refused_by_name():
 
 
 def test_all_faults_of_a_pipe_are_reported_at_once():
-    link = pipe("upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}, initial_flow=1e-3)
+    link = pipe(
+        "upper", "lower", friction={"model": "unsteady", "roughness": 1e-4}, initial_flow=1e-3
+    )
     with pytest.raises(CaseError) as caught:
         fvsolve.load(two_tanks() | {"links": {"main": link}})
     assert len(caught.value.faults) == 2
@@ -362,7 +483,11 @@ def test_all_faults_of_a_pipe_are_reported_at_once():
 def test_a_reservoir_drains_through_pipes_in_series_without_any_state():
     nodes = {"up": reservoir(3e5), "mid": junction(), "down": reservoir(1e5)}
     links = {"one": pipe("up", "mid", 60.0), "two": pipe("mid", "down", 40.0)}
-    run = fvsolve.run(scene(nodes, links, 1.0, {"rtol": 1e-9}, ["one.flow", "two.flow", "mid.pressure"], 0.5))
+    run = fvsolve.run(
+        scene(nodes, links, 1.0, {"rtol": 1e-9}, ["one.flow", "two.flow", "mid.pressure"], 0.5)
+    )
     exact = area(0.05) * math.sqrt(2.0 * 2e5 / RHO / (0.02 * 100.0 / 0.05))
-    assert run["one.flow"] == pytest.approx(exact, rel=1e-12) and run["two.flow"] == pytest.approx(exact, rel=1e-12)
+    assert run["one.flow"] == pytest.approx(exact, rel=1e-12) and run["two.flow"] == pytest.approx(
+        exact, rel=1e-12
+    )
     assert run["mid.pressure"] == pytest.approx(3e5 - 0.6 * 2e5, rel=1e-12)

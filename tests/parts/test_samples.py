@@ -21,9 +21,14 @@ def test_a_sampled_pi_on_two_lags_is_its_difference_equation(method):
         error = (0.0 if k == 0 else 1.0) - x[0]
         integral += 5.0 * 0.1 / 0.4 * error
         u = 5.0 * error + integral
-        assert value_at(run, "controls.loop.output", 0.1 * k + 0.05) == pytest.approx(u, abs=EXACT) or k == 0
+        assert (
+            value_at(run, "controls.loop.output", 0.1 * k + 0.05) == pytest.approx(u, abs=EXACT)
+            or k == 0
+        )
         x = ad @ x + bd * u
-        assert value_at(run, "controls.plant.output", 0.1 * (k + 1)) == pytest.approx(x[0], abs=EXACT)
+        assert value_at(run, "controls.plant.output", 0.1 * (k + 1)) == pytest.approx(
+            x[0], abs=EXACT
+        )
 
 
 def test_a_sampled_loop_grows_from_1_percent_above_its_limit():
@@ -37,12 +42,30 @@ def test_a_sampled_loop_grows_from_1_percent_above_its_limit():
 def test_a_sampled_pid_with_limits_and_an_offset_is_its_difference_equation(method):
     gain, ti, td, n, b, c, tt, h = 1.5, 60.0, 8.0, 6.0, 0.7, 0.3, 25.0, 3.0
     steps = {"time": [0.0, 20.0, 120.0], "value": [4.0, 4.6, 4.2], "kind": "step"}
-    control = pi(steps, gain, ti, derivative_time=td, derivative_filter=n, setpoint_weight=b, derivative_weight=c,
-                 tracking_time=tt, limits=[0.1, 0.6], period=h, offset=1.0) | {"type": "pid"}  # fmt: skip
+    control = pi(
+        steps,
+        gain,
+        ti,
+        derivative_time=td,
+        derivative_filter=n,
+        setpoint_weight=b,
+        derivative_weight=c,
+        tracking_time=tt,
+        limits=[0.1, 0.6],
+        period=h,
+        offset=1.0,
+    ) | {"type": "pid"}
     level, t, u, integral, lagged = 4.0, 0.0, 0.25, 0.25 - gain * (b - 1.0) * 4.0, (c - 1.0) * 4.0
     for moment in [*np.arange(1.0, 200.0, h), 200.0]:
-        found = solve_ivp(lambda t, y, u=u: [(orifice_flow(u, SUPPLY - y[0]) - orifice_flow(0.5, y[0])) / SECTION],
-                          (t, moment), [level], "DOP853", **FINE)  # fmt: skip
+        found = solve_ivp(
+            lambda t, y, u=u: [
+                (orifice_flow(u, SUPPLY - y[0]) - orifice_flow(0.5, y[0])) / SECTION
+            ],
+            (t, moment),
+            [level],
+            "DOP853",
+            **FINE,
+        )
         level, t = found.y[0, -1], moment
         setpoint = 4.0 if t < 20.0 else 4.6 if t < 120.0 else 4.2
         z = c * setpoint - level
@@ -59,16 +82,25 @@ def test_a_sampled_pid_with_limits_and_an_offset_is_its_difference_equation(meth
 def test_a_sampled_transfer_function_follows_tustin_s_rule(method):
     """(2 s + 1) / (5 s + 1) by s = 2 (z - 1) / (h (z + 1)), of the level of a tank that drains."""
     h = 1.5
-    lead = {"type": "transfer-function", "input": "tower.level", "numerator": [2.0, 1.0], "denominator": [5.0, 1.0],
-            "period": h}  # fmt: skip
-    case = tower(0.1, 0.5, end=30.1, controls={"lead": lead}, numerics={"rtol": 1e-11, "method": method})
+    lead = {
+        "type": "transfer-function",
+        "input": "tower.level",
+        "numerator": [2.0, 1.0],
+        "denominator": [5.0, 1.0],
+        "period": h,
+    }
+    case = tower(
+        0.1, 0.5, end=30.1, controls={"lead": lead}, numerics={"rtol": 1e-11, "method": method}
+    )
     run = fvsolve.run(case, {"output.every": 0.1})
     before = output = 4.0
     for k in range(20):
         x = value_at(run, "tower.level", 1.5 * k)
         output = ((10.0 - h) * output + (4.0 + h) * x + (h - 4.0) * before) / (10.0 + h)
         before = x
-        assert value_at(run, "controls.lead.output", 1.5 * k + 0.1) == pytest.approx(output, abs=1e-9)
+        assert value_at(run, "controls.lead.output", 1.5 * k + 0.1) == pytest.approx(
+            output, abs=1e-9
+        )
 
 
 def test_a_sampled_block_tends_to_its_continuous_twin_with_first_order():
@@ -76,31 +108,53 @@ def test_a_sampled_block_tends_to_its_continuous_twin_with_first_order():
     errors = []
     for period in (0.1, 0.05, 0.025, 0.0125):
         run = fvsolve.run(two_lags(1.0, 4.0, period))
-        errors.append(max(abs(value_at(run, "controls.plant.output", t) - value_at(twin, "controls.plant.output", t))
-                          for t in np.arange(0.5, 4.0, 0.5)))  # fmt: skip
+        errors.append(
+            max(
+                abs(
+                    value_at(run, "controls.plant.output", t)
+                    - value_at(twin, "controls.plant.output", t)
+                )
+                for t in np.arange(0.5, 4.0, 0.5)
+            )
+        )
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders[-1] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_sample_that_is_no_number_ends_the_run():
-    act = {"type": "function", "inputs": {"h": "tower.level"}, "formula": "0.1 + sqrt(h - 3.99)", "period": 1.0,
-           "initial": 0.2}  # fmt: skip
+    act = {
+        "type": "function",
+        "inputs": {"h": "tower.level"},
+        "formula": "0.1 + sqrt(h - 3.99)",
+        "period": 1.0,
+        "initial": 0.2,
+    }
     run = fvsolve.run(tower({"control": "act"}, 0.9, controls={"act": act}))
-    assert not run.ok and "the output of controls.act is not a finite number at t = 3 s" in run.reason
+    assert (
+        not run.ok and "the output of controls.act is not a finite number at t = 3 s" in run.reason
+    )
 
 
 def test_a_loop_in_python_by_advance_is_the_sampled_block():
     period, gain, ti = 2.0, 1.2, 40.0
-    control = pi({"time": [0.0, 10.0], "value": [4.0, 4.3], "kind": "step"}, gain, ti, period=period)
-    by_block = final(tower({"control": "valve"}, 0.5, end=60.0, controls={"valve": control}), "dormand-prince")[0]
+    control = pi(
+        {"time": [0.0, 10.0], "value": [4.0, 4.3], "kind": "step"}, gain, ti, period=period
+    )
+    by_block = final(
+        tower({"control": "valve"}, 0.5, end=60.0, controls={"valve": control}), "dormand-prince"
+    )[0]
     model = fvsolve.build(
-        fvsolve.load(tower(0.25, 0.5, end=60.0, numerics={"method": "dormand-prince", "rtol": 1e-10}))
+        fvsolve.load(
+            tower(0.25, 0.5, end=60.0, numerics={"method": "dormand-prince", "rtol": 1e-10})
+        )
     )
     state, integral = fvsolve.initial_state(model), 0.25
     for k in range(30):
         error = (4.0 if k < 5 else 4.3) - model.observe(state)[0]
         integral += gain * period * error / ti
-        state = fvsolve.advance(model, state, period * (k + 1), {"inlet.opening": gain * error + integral})
+        state = fvsolve.advance(
+            model, state, period * (k + 1), {"inlet.opening": gain * error + integral}
+        )
     assert model.observe(state)[0] == pytest.approx(by_block, abs=EXACT)
 
 
@@ -108,16 +162,32 @@ def test_a_loop_in_python_by_advance_is_the_sampled_block():
 def test_given_steps_end_at_samples(method):
     numerics = {"method": method, "step": 0.7}
     control = pi({"time": [0.0, 10.0], "value": [4.0, 4.3], "kind": "step"}, 1.2, 40.0, period=2.0)
-    case = tower({"control": "valve"}, 0.5, end=60.0, numerics=numerics, controls={"valve": control})
+    case = tower(
+        {"control": "valve"}, 0.5, end=60.0, numerics=numerics, controls={"valve": control}
+    )
     run = fvsolve.run(case)
     close = final(case | {"numerics": {"end": 60.0}}, "dormand-prince")[0]
     assert run.ok and run["tower.level"][-1] == pytest.approx(close, abs=1e-7)
 
 
 def test_a_killed_and_resumed_run_with_samples_and_relays_is_the_unbroken_run(tmp_path):
-    relay = {"type": "relay", "input": "tower.level", "on": 3.9, "off": 4.1, "output": [0.2, 0.6], "initial": 0}
-    outlet = {"type": "pi", "input": "tower.level", "setpoint": 4.0, "gain": -0.3, "integral_time": 20.0, "period": 0.7,
-              "initial": 0.5}  # fmt: skip
+    relay = {
+        "type": "relay",
+        "input": "tower.level",
+        "on": 3.9,
+        "off": 4.1,
+        "output": [0.2, 0.6],
+        "initial": 0,
+    }
+    outlet = {
+        "type": "pi",
+        "input": "tower.level",
+        "setpoint": 4.0,
+        "gain": -0.3,
+        "integral_time": 20.0,
+        "period": 0.7,
+        "initial": 0.5,
+    }
     controls = {"fill": relay, "drain": outlet}
     case = tower({"control": "fill"}, {"control": "drain"}, end=3000.0, controls=controls)
     whole = fvsolve.run(case, out=tmp_path / "whole", pictures=False)

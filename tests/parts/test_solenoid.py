@@ -22,17 +22,32 @@ from fvsolve.studies.linearise import linearise
 EXACT = 1e-9
 METHODS = ["dormand-prince", "radau-iia-5", "rodas-5p", "auto"]
 MU_0 = 4e-7 * pi
-COIL = {"type": "solenoid", "ports": {"p": "b", "n": "gnd", "armature": "plunger"}, "turns": 800.0,
-        "pole_area": 8e-5, "closed_position": 3e-3, "core_reluctance": 4e6}  # fmt: skip
+COIL = {
+    "type": "solenoid",
+    "ports": {"p": "b", "n": "gnd", "armature": "plunger"},
+    "turns": 800.0,
+    "pole_area": 8e-5,
+    "closed_position": 3e-3,
+    "core_reluctance": 4e6,
+}
 OHM, VOLT = 12.0, 24.0
 
 
 def coil(end=0.05, nodes=None, links=None, probes=None, voltage=VOLT, **keys):
     """Coil with a resistor on a source; its armature is fixed if `nodes` names no other."""
-    nodes = GROUND | {"a": {"type": "terminal"}, "b": {"type": "terminal"}} | (nodes or {"plunger": {"type": "frame"}})
-    links = {"supply": two_port("voltage-source", "gnd", "a", voltage=voltage),
-             "wire": two_port("resistor", "a", "b", resistance=OHM), "coil": COIL | keys} | (links or {})  # fmt: skip
-    return deepcopy(network(nodes, links, end, probes or ["coil.current", "coil.flux", "coil.force"]))
+    nodes = (
+        GROUND
+        | {"a": {"type": "terminal"}, "b": {"type": "terminal"}}
+        | (nodes or {"plunger": {"type": "frame"}})
+    )
+    links = {
+        "supply": two_port("voltage-source", "gnd", "a", voltage=voltage),
+        "wire": two_port("resistor", "a", "b", resistance=OHM),
+        "coil": COIL | keys,
+    } | (links or {})
+    return deepcopy(
+        network(nodes, links, end, probes or ["coil.current", "coil.flux", "coil.force"])
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -53,17 +68,28 @@ MOVING = {
     "wall": {"type": "frame"},
     "base": {"type": "frame", "initial_position": -0.01},
 }
-PULLED = {"spring": two_port("spring", "base", "plunger", stiffness=900.0, preload=-4.0),
-          "stop": two_port("end-stop", "wall", "plunger", stiffness=4e6, damping=120.0, minimum=0.0, maximum=2.8e-3),
-          "oil": two_port("damper", "wall", "plunger", damping=2.0)}  # fmt: skip
+PULLED = {
+    "spring": two_port("spring", "base", "plunger", stiffness=900.0, preload=-4.0),
+    "stop": two_port(
+        "end-stop", "wall", "plunger", stiffness=4e6, damping=120.0, minimum=0.0, maximum=2.8e-3
+    ),
+    "oil": two_port("damper", "wall", "plunger", damping=2.0),
+}
 SATURATION = 1.5e-4
 
 
 def moving(end=0.06, **keys):
     """Armature with a spring and stops: it closes when the voltage comes, and opens when it goes."""
     voltage = {"time": [0.0, 0.005, 0.035], "value": [0.0, VOLT, 0.0], "kind": "step"}
-    return coil(end, MOVING, PULLED, ["coil.current", "coil.flux", "coil.force", "plunger.position", "stop.force"],
-                voltage, saturation_flux=SATURATION, **keys)  # fmt: skip
+    return coil(
+        end,
+        MOVING,
+        PULLED,
+        ["coil.current", "coil.flux", "coil.force", "plunger.position", "stop.force"],
+        voltage,
+        saturation_flux=SATURATION,
+        **keys,
+    )
 
 
 @dataclass(frozen=True)
@@ -122,9 +148,23 @@ class Armature:
         touched = -1
         for high, voltage in self.voltages:
             while t < high:
-                ends = {-1: [end(0.0, 1)], 0: [end(0.0, -1), end(self.travel, 1)], 1: [end(self.travel, -1)]}[touched]
-                run = solve_ivp(self.rates, (t, high), y, "DOP853", args=(voltage, touched), events=ends, rtol=1e-12,
-                                atol=[1e-18, 1e-16, 1e-13], dense_output=True, max_step=1e-4)  # fmt: skip
+                ends = {
+                    -1: [end(0.0, 1)],
+                    0: [end(0.0, -1), end(self.travel, 1)],
+                    1: [end(self.travel, -1)],
+                }[touched]
+                run = solve_ivp(
+                    self.rates,
+                    (t, high),
+                    y,
+                    "DOP853",
+                    args=(voltage, touched),
+                    events=ends,
+                    rtol=1e-12,
+                    atol=[1e-18, 1e-16, 1e-13],
+                    dense_output=True,
+                    max_step=1e-4,
+                )
                 found.append((t, run.t[-1], run.sol))
                 t, y = run.t[-1], run.y[:, -1]
                 if run.status == 1:
@@ -148,12 +188,16 @@ class Armature:
             x = solution(t)[1] - place
             x[np.abs(x) < 1e-13] = 0.0  # a piece begins or ends there
             found += [low] if x[0] == 0.0 else []
-            found += [brentq(lambda t: solution(t)[1] - place, *t[k : k + 2], xtol=1e-16)  # noqa: B023
-                      for k in np.flatnonzero(x[:-1] * x[1:] < 0.0)]  # fmt: skip
+            found += [
+                brentq(lambda t: solution(t)[1] - place, *t[k : k + 2], xtol=1e-16)  # noqa: B023
+                for k in np.flatnonzero(x[:-1] * x[1:] < 0.0)
+            ]
         return found
 
 
-PULSED = Armature(((0.005, lambda i: -OHM * i), (0.035, lambda i: VOLT - OHM * i), (0.06, lambda i: -OHM * i)))
+PULSED = Armature(
+    ((0.005, lambda i: -OHM * i), (0.035, lambda i: VOLT - OHM * i), (0.06, lambda i: -OHM * i))
+)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -195,11 +239,16 @@ def test_the_force_is_the_slope_of_the_coenergy(x):
 @pytest.mark.parametrize("saturation", [None, 2e-5])
 def test_an_equilibrium_start_balances_spring_and_coil(saturation, begins, method):
     """k x = Phi^2 / (2 mu0 A) with the flux of the steady current, from either side of the closed position."""
-    nodes = {"plunger": {"type": "mass", "mass": 0.02, "initial_position": begins}, "wall": {"type": "frame"},
-             "weight": {"type": "mass", "mass": 0.5, "initial_position": 0.1}}  # fmt: skip
-    links = {"spring": two_port("spring", "wall", "plunger", stiffness=4e4),
-             "rod": two_port("spring", "plunger", "weight", stiffness=1e5, preload=-3.0),
-             "push": {"type": "force", "to": "weight", "force": 3.0}}  # fmt: skip
+    nodes = {
+        "plunger": {"type": "mass", "mass": 0.02, "initial_position": begins},
+        "wall": {"type": "frame"},
+        "weight": {"type": "mass", "mass": 0.5, "initial_position": 0.1},
+    }
+    links = {
+        "spring": two_port("spring", "wall", "plunger", stiffness=4e4),
+        "rod": two_port("spring", "plunger", "weight", stiffness=1e5, preload=-3.0),
+        "push": {"type": "force", "to": "weight", "force": 3.0},
+    }
     keys = {} if saturation is None else {"saturation_flux": saturation}
     case = coil(0.1, nodes, links, ["plunger.position", "weight.position", "coil.force"], **keys)
     case["numerics"]["initial"] = "equilibrium"
@@ -208,8 +257,13 @@ def test_an_equilibrium_start_balances_spring_and_coil(saturation, begins, metho
     def pull(x):
         gap, core = (3e-3 - x) / (MU_0 * COIL["pole_area"]), COIL["core_reluctance"]
         share = 0.0 if saturation is None else saturation**-2
-        law = lambda flux: (core * (1.0 + share * flux * flux) + gap) * flux - COIL["turns"] * current  # noqa: E731
-        return brentq(law, 0.0, 1e-3, xtol=1e-20, rtol=1e-14) ** 2 / (2.0 * MU_0 * COIL["pole_area"])
+
+        def law(flux):
+            return (core * (1.0 + share * flux * flux) + gap) * flux - COIL["turns"] * current
+
+        return brentq(law, 0.0, 1e-3, xtol=1e-20, rtol=1e-14) ** 2 / (
+            2.0 * MU_0 * COIL["pole_area"]
+        )
 
     place = brentq(lambda x: 4e4 * x - 3.0 - pull(x), 0.0, 1e-3, xtol=1e-18)
     for probe, value in (("plunger.position", place), ("weight.position", place + 0.1 - begins)):
@@ -240,7 +294,9 @@ def resting():
     case["numerics"]["initial"] = "steady"
     x = 2.8e-3
     for _ in range(50):
-        flux = brentq(lambda f, x=x: reluctance(f, x) * f / COIL["turns"] - VOLT / OHM, 0.0, 1e-3, xtol=1e-22)
+        flux = brentq(
+            lambda f, x=x: reluctance(f, x) * f / COIL["turns"] - VOLT / OHM, 0.0, 1e-3, xtol=1e-22
+        )
         force = 0.5 * flux**2 / (MU_0 * COIL["pole_area"])
         x = 2.8e-3 + (force - 10.0) / 4e6
     case["nodes"]["plunger"]["initial_position"] = float(x)
@@ -271,18 +327,32 @@ def test_the_energy_of_a_moving_armature_closes(method):
 def restated():
     case = moving()
     links = case["links"]
-    yield "order", case | {"links": dict(reversed(links.items())), "nodes": dict(reversed(case["nodes"].items()))}, 1, 1
+    yield (
+        "order",
+        case
+        | {"links": dict(reversed(links.items())), "nodes": dict(reversed(case["nodes"].items()))},
+        1,
+        1,
+    )
     turned = links["coil"] | {"ports": {"p": "gnd", "n": "b", "armature": "plunger"}}
     yield "terminals", case | {"links": links | {"coil": turned}}, -1, 1
-    units = links["coil"] | {"pole_area": "80 mm2", "closed_position": "3 mm", "core_reluctance": "4e6 A/Wb",
-                             "saturation_flux": "0.15 mWb"}  # fmt: skip
+    units = links["coil"] | {
+        "pole_area": "80 mm2",
+        "closed_position": "3 mm",
+        "core_reluctance": "4e6 A/Wb",
+        "saturation_flux": "0.15 mWb",
+    }
     yield "units", case | {"links": links | {"coil": units}}, 1, 1
-    nodes = case["nodes"] | {"plunger": {"type": "mass", "mass": 0.02, "initial_position": 1e-6},
-                             "base": {"type": "frame", "initial_position": 0.01}}  # fmt: skip
+    nodes = case["nodes"] | {
+        "plunger": {"type": "mass", "mass": 0.02, "initial_position": 1e-6},
+        "base": {"type": "frame", "initial_position": 0.01},
+    }
     mirrored = links | {
         "coil": links["coil"] | {"closed_position": -3e-3},
         "spring": two_port("spring", "plunger", "base", stiffness=900.0, preload=-4.0),
-        "stop": two_port("end-stop", "plunger", "wall", stiffness=4e6, damping=120.0, minimum=0.0, maximum=2.8e-3),
+        "stop": two_port(
+            "end-stop", "plunger", "wall", stiffness=4e6, damping=120.0, minimum=0.0, maximum=2.8e-3
+        ),
     }
     yield "mirrored", case | {"nodes": nodes, "links": mirrored}, 1, -1
 
@@ -302,13 +372,21 @@ def test_restated_solenoids_move_alike(what, case, flux, place):
 
 def switched(diode=True, forward=0.7):
     """Coil with a switch that opens at 20 ms and closes again at 60 ms, and a diode beside it."""
-    links = {"switch": two_port("switch", "b", "c", closed={"time": [0.0, 0.02, 0.06], "value": [1.0, 0.0, 1.0],
-                                                              "kind": "step"}),
-             "coil": COIL | {"ports": {"p": "c", "n": "gnd", "armature": "plunger"}}}  # fmt: skip
+    links = {
+        "switch": two_port(
+            "switch",
+            "b",
+            "c",
+            closed={"time": [0.0, 0.02, 0.06], "value": [1.0, 0.0, 1.0], "kind": "step"},
+        ),
+        "coil": COIL | {"ports": {"p": "c", "n": "gnd", "armature": "plunger"}},
+    }
     if diode:
         links["diode"] = two_port("diode", "gnd", "c", forward_voltage=forward)
     nodes = {"plunger": {"type": "frame"}, "c": {"type": "terminal"}}
-    case = coil(0.08, nodes, links, ["coil.current", "diode.current"] if diode else ["coil.current"])
+    case = coil(
+        0.08, nodes, links, ["coil.current", "diode.current"] if diode else ["coil.current"]
+    )
     case["links"]["coil"]["initial_flux"] = 0.0
     return case
 
@@ -323,17 +401,28 @@ def test_a_diode_takes_the_current_of_an_opened_coil_until_it_is_zero(method):
     top = VOLT / ohm * (1.0 - np.exp(-ohm / inductance * 0.02))
     end = 0.02 + inductance / contact * np.log1p(contact * top / 5.0)
     down = (top + 5.0 / contact) * np.exp(-contact / inductance * (t - 0.02)) - 5.0 / contact
-    exact = np.where(t < 0.02, VOLT / ohm * (1.0 - np.exp(-ohm / inductance * t)), np.where(t < end, down, 0.0))
+    exact = np.where(
+        t < 0.02, VOLT / ohm * (1.0 - np.exp(-ohm / inductance * t)), np.where(t < end, down, 0.0)
+    )
     exact = np.where(t > 0.06, VOLT / ohm * (1.0 - np.exp(-ohm / inductance * (t - 0.06))), exact)
     assert np.array(run["coil.current"]) == pytest.approx(exact, abs=4.0 * EXACT)
     events = [(event["name"], event["what"]) for event in run.summary["events"]]
-    assert events == [("switch", "opens"), ("diode", "conducts"), ("diode", "blocks"), ("switch", "closes")]
+    assert events == [
+        ("switch", "opens"),
+        ("diode", "conducts"),
+        ("diode", "blocks"),
+        ("switch", "closes"),
+    ]
     assert run.summary["events"][2]["time"] == pytest.approx(end, abs=0.08 * EXACT)
 
 
 def test_a_switch_that_would_cut_the_current_of_a_coil_ends_the_run_by_name():
     run = fvsolve.run(switched(diode=False), {"numerics.method": "dormand-prince"})
-    assert not run.ok and "switch would cut the current of coil" in run.reason and "diode" in run.reason
+    assert (
+        not run.ok
+        and "switch would cut the current of coil" in run.reason
+        and "diode" in run.reason
+    )
 
 
 def test_an_armature_may_pass_its_closed_position():
@@ -359,8 +448,16 @@ def test_the_rates_of_a_coil_at_rest_are_exact():
 def test_a_control_of_the_current_reaches_its_setpoint(method):
     case = coil(0.2, initial_flux=0.0, saturation_flux=SATURATION)
     case["links"]["supply"]["voltage"] = {"control": "pi"}
-    case["controls"] = {"pi": {"type": "pi", "input": "coil.current", "setpoint": "0.5 A", "gain": "20 V/A",
-                               "integral_time": "10 ms", "initial": 0.0}}  # fmt: skip
+    case["controls"] = {
+        "pi": {
+            "type": "pi",
+            "input": "coil.current",
+            "setpoint": "0.5 A",
+            "gain": "20 V/A",
+            "integral_time": "10 ms",
+            "initial": 0.0,
+        }
+    }
     assert runs(case, method)["coil.current"][-1] == pytest.approx(0.5, abs=1e-5)
 
 
@@ -391,16 +488,33 @@ FAULTS = [
     ({"links.coil.core_reluctance": 0.0}, "links.coil.core_reluctance", "above 0"),
     ({"links.coil.saturation_flux": "0 Wb"}, "links.coil.saturation_flux", "above 0"),
     ({"links.coil.core_reluctance": "4e6 H"}, "links.coil.core_reluctance", "a reluctance"),
-    ({"links.coil.ports": {"p": "plunger", "n": "gnd", "armature": "plunger"}}, "links.coil.ports.p",
-     "electrical place"),
-    ({"links.coil.ports": {"p": "b", "n": "gnd", "armature": "a"}}, "links.coil.ports.armature", "translational place"),
+    (
+        {"links.coil.ports": {"p": "plunger", "n": "gnd", "armature": "plunger"}},
+        "links.coil.ports.p",
+        "electrical place",
+    ),
+    (
+        {"links.coil.ports": {"p": "b", "n": "gnd", "armature": "a"}},
+        "links.coil.ports.armature",
+        "translational place",
+    ),
     ({"links.coil.turn": 3.0}, "links.coil.turn", "did you mean"),
-    ({"links.wire": two_port("inductor", "a", "b", inductance=1e-3)}, "links.coil",
-     "its flux gives the current, and wire in series gives a current too; put a resistor in parallel"),
-    ({"links.wire": two_port("current-source", "a", "b", current=1.0)}, "links.coil", "wire in series"),
-    ({"links.wire": two_port("switch", "a", "b", closed=0.0), "links.coil.initial_flux": 1e-4}, "links.coil",
-     "its current at the start has no way"),
-]  # fmt: skip
+    (
+        {"links.wire": two_port("inductor", "a", "b", inductance=1e-3)},
+        "links.coil",
+        "its flux gives the current, and wire in series gives a current too; put a resistor in parallel",
+    ),
+    (
+        {"links.wire": two_port("current-source", "a", "b", current=1.0)},
+        "links.coil",
+        "wire in series",
+    ),
+    (
+        {"links.wire": two_port("switch", "a", "b", closed=0.0), "links.coil.initial_flux": 1e-4},
+        "links.coil",
+        "its current at the start has no way",
+    ),
+]
 
 
 @pytest.mark.parametrize(("change", "place", "text"), FAULTS)
@@ -420,7 +534,9 @@ def test_a_coil_without_resistance_needs_its_flux():
     case = coil()
     case["links"]["wire"]["resistance"] = 1.0
     case["links"] = {key: case["links"][key] for key in ("supply", "coil")}
-    case["links"]["coil"] = case["links"]["coil"] | {"ports": {"p": "a", "n": "gnd", "armature": "plunger"}}
+    case["links"]["coil"] = case["links"]["coil"] | {
+        "ports": {"p": "a", "n": "gnd", "armature": "plunger"}
+    }
     case["nodes"].pop("b")
     with pytest.raises(CaseError, match="no equilibrium of coil.flux"):
         fvsolve.build(fvsolve.load(case))
@@ -429,12 +545,30 @@ def test_a_coil_without_resistance_needs_its_flux():
 def test_the_shipped_valve_opens_and_closes_at_the_times_of_scipy():
     """The opening of the valve leaves 0 where the armature passes 0.2 mm, and reaches 1 at 2 mm."""
     valve = Armature(
-        ((0.01, lambda i: -30.0 * i), (0.06, lambda i: 24.0 - 30.001 * i), (0.08, lambda i: -0.7 - 30.05 * i)),
-        turns=1200.0, area=1.2e-4, closed=2.2e-3, core=3e6, saturation=2e-4, mass=8e-3, spring=1500.0, preload=5.0,
-        stop=2e6, stop_damping=60.0, travel=2e-3, damping=1.0,
-    )  # fmt: skip
+        (
+            (0.01, lambda i: -30.0 * i),
+            (0.06, lambda i: 24.0 - 30.001 * i),
+            (0.08, lambda i: -0.7 - 30.05 * i),
+        ),
+        turns=1200.0,
+        area=1.2e-4,
+        closed=2.2e-3,
+        core=3e6,
+        saturation=2e-4,
+        mass=8e-3,
+        spring=1500.0,
+        preload=5.0,
+        stop=2e6,
+        stop_damping=60.0,
+        travel=2e-3,
+        damping=1.0,
+    )
     run = fvsolve.run("solenoid-valve", {"numerics.rtol": 1e-12, "expect": {}, "output.units": {}})
-    events = [(event["time"], event["what"]) for event in run.summary["events"] if event["name"] == "controls.lift"]
+    events = [
+        (event["time"], event["what"])
+        for event in run.summary["events"]
+        if event["name"] == "controls.lift"
+    ]
     seat = [t for t, what in events if "lower" in what]
     full = [t for t, what in events if "upper" in what]
     assert seat == pytest.approx(valve.crossings(2e-4), abs=0.12 * EXACT)

@@ -37,15 +37,22 @@ def valve_between_ports(ways="4/3", end=0.1, held=True, links=(), **spool):
         nodes[port] = {"type": "reservoir", "pressure": PRESSURES[port]}
         if port in "AB" and not held:
             nodes[port] = {"type": "chamber", "volume": 1e-2, "initial_pressure": PRESSURES[port]}
-    valve = {"type": "spool-valve", "ways": ways, "ports": {port: port for port in PORTS[ways]}, "area": 1e-5,
-             "laminar_reynolds": 1e-6}  # fmt: skip
+    valve = {
+        "type": "spool-valve",
+        "ways": ways,
+        "ports": {port: port for port in PORTS[ways]},
+        "area": 1e-5,
+        "laminar_reynolds": 1e-6,
+    }
     probes = [*(f"spool.flow_{port}" for port in PORTS[ways]), "spool.position"]
     probes += [] if held else [f"{port}.pressure" for port in PORTS[ways] if port in "AB"]
     return {
-        "fluid": OIL, "nodes": nodes, "links": {"spool": valve | spool, **dict(links)},
+        "fluid": OIL,
+        "nodes": nodes,
+        "links": {"spool": valve | spool, **dict(links)},
         "numerics": {"end": end, "method": "dormand-prince", "rtol": 1e-11},
         "output": {"probes": probes, "every": end / 50},
-    }  # fmt: skip
+    }
 
 
 def sized(case, **size):
@@ -66,10 +73,18 @@ def flow(opening, drop, area=0.61e-5):
 def test_each_edge_opens_beyond_its_own_overlap(x):
     laps = {"P-A": 0.05, "P-B": -0.04, "A-T": 0.1, "B-T": 0.0}
     run = fvsolve.run(valve_between_ports(end=0.01, position=x, overlap=laps))
-    openings = {edge: (side * x - laps[edge]) / (1.0 - laps[edge])
-                for edge, side in (("P-A", 1), ("P-B", -1), ("A-T", -1), ("B-T", 1))}  # fmt: skip
-    edges = {edge: flow(opening, PRESSURES[edge[0]] - PRESSURES[edge[2]]) for edge, opening in openings.items()}
-    sums = {port: sum(q * ((edge[0] == port) - (edge[2] == port)) for edge, q in edges.items()) for port in "PTAB"}
+    openings = {
+        edge: (side * x - laps[edge]) / (1.0 - laps[edge])
+        for edge, side in (("P-A", 1), ("P-B", -1), ("A-T", -1), ("B-T", 1))
+    }
+    edges = {
+        edge: flow(opening, PRESSURES[edge[0]] - PRESSURES[edge[2]])
+        for edge, opening in openings.items()
+    }
+    sums = {
+        port: sum(q * ((edge[0] == port) - (edge[2] == port)) for edge, q in edges.items())
+        for port in "PTAB"
+    }
     for port in "PTAB":
         assert run[f"spool.flow_{port}"] == approx(sums[port], rel=CLOSE, abs=1e-15)
     assert (run["spool.position"] == x).all()
@@ -85,7 +100,10 @@ def test_each_edge_opens_beyond_its_own_overlap(x):
 def test_valves_with_fewer_ports_have_fewer_edges(ways, x, flows, more):
     key = "command" if more else "position"
     run = fvsolve.run(valve_between_ports(ways, 0.01, **{key: x}, **more))
-    assert [str(probe) for probe in run.probes] == [*(f"spool.flow_{port}" for port in PORTS[ways]), "spool.position"]
+    assert [str(probe) for probe in run.probes] == [
+        *(f"spool.flow_{port}" for port in PORTS[ways]),
+        "spool.position",
+    ]
     for port, q in flows.items():
         assert run[f"spool.flow_{port}"] == approx(q, rel=CLOSE, abs=1e-15)
     assert run["spool.position"] == approx(0.0 if ways == "2/2" and x < 0 else x, abs=1e-14)
@@ -97,12 +115,16 @@ def test_valves_with_fewer_ports_have_fewer_edges(ways, x, flows, more):
 def test_the_spool_of_a_2_2_valve_stops_at_0(keys, method, rtol):
     """Also with an underlap, with which it stays open there."""
     keys, wave = dict(keys), {"mean": 0.0, "amplitude": 1.0, "period": 0.05}
-    run = fvsolve.run(valve_between_ports("2/2", 0.1, **{keys.pop("key"): wave}, overlap=-0.1, **keys),
-                      {"numerics.method": method, "numerics.rtol": rtol})  # fmt: skip
+    run = fvsolve.run(
+        valve_between_ports("2/2", 0.1, **{keys.pop("key"): wave}, overlap=-0.1, **keys),
+        {"numerics.method": method, "numerics.rtol": rtol},
+    )
     u, dead = np.sin(2.0 * pi * np.array(run.t) / 0.05), keys.get("dead_band", 0.0)
     x = np.maximum(u - dead, 0.0) / (1.0 - dead)
     assert run["spool.position"] == approx(x, abs=1e-11)
-    assert run["spool.flow_P"] == approx(np.array([flow((y + 0.1) / 1.1, 80e5) for y in x]), rel=1e-9)
+    assert run["spool.flow_P"] == approx(
+        np.array([flow((y + 0.1) / 1.1, 80e5) for y in x]), rel=1e-9
+    )
     assert "reaches its lower stop" in {event["what"] for event in run.summary["events"]}
 
 
@@ -118,8 +140,10 @@ def test_the_rated_flow_passes_an_edge_at_the_rated_drop(law):
 def test_a_rated_flow_is_the_equal_kv():
     kv = {"Kv": 6.7e-4 * 3600.0 * sqrt(1e5 / 80e5) * sqrt(870.0 / 1000.0)}
     wave = {"mean": 0.1, "amplitude": 0.8, "period": 0.05}
-    found = [fvsolve.run(sized(valve_between_ports(held=False, position=wave), **size))
-             for size in ({"rated_flow": 6.7e-4, "rated_drop": 80e5}, kv)]  # fmt: skip
+    found = [
+        fvsolve.run(sized(valve_between_ports(held=False, position=wave), **size))
+        for size in ({"rated_flow": 6.7e-4, "rated_drop": 80e5}, kv)
+    ]
     assert found[0]["A.pressure"] == approx(found[1]["A.pressure"], rel=1e-11)
 
 
@@ -133,7 +157,10 @@ def swing(t, zeta, goal):
         return goal * (1.0 - (1.0 + W * t) * np.exp(-W * t))
     root = sqrt(abs(1.0 - zeta * zeta))
     if zeta < 1.0:
-        return goal * (1.0 - np.exp(-zeta * W * t) * (np.cos(root * W * t) + zeta / root * np.sin(root * W * t)))
+        return goal * (
+            1.0
+            - np.exp(-zeta * W * t) * (np.cos(root * W * t) + zeta / root * np.sin(root * W * t))
+        )
     fast, slow = W * (zeta + root), W * (zeta - root)
     return goal * (1.0 - (fast * np.exp(-slow * t) - slow * np.exp(-fast * t)) / (fast - slow))
 
@@ -144,7 +171,9 @@ def test_the_spool_follows_a_step_as_its_closed_form(zeta, method, rtol):
     case = valve_between_ports(command=STEP, natural_frequency=60.0, damping_ratio=zeta)
     run = fvsolve.run(case, {"numerics.method": method, "numerics.rtol": rtol})
     assert run["spool.position"] == approx(swing(run.t - 0.01, zeta, 0.5), abs=CLOSE)
-    assert run["spool.flow_P"] == approx(np.array([flow(x, 80e5) for x in run["spool.position"]]), abs=1e-12)
+    assert run["spool.flow_P"] == approx(
+        np.array([flow(x, 80e5) for x in run["spool.position"]]), abs=1e-12
+    )
 
 
 def test_at_the_natural_frequency_the_position_lags_by_90_degrees():
@@ -157,11 +186,17 @@ def test_at_the_natural_frequency_the_position_lags_by_90_degrees():
         at = (found.c @ np.linalg.solve(1j * W * np.eye(2) - found.a, found.b) + found.d)[0, 0]
         assert at == approx(1.0 / (2j * zeta), abs=1e-8)
     case = valve_between_ports(
-        end=1.0, command="0.3*sin(120*pi*t)", natural_frequency=60.0, damping_ratio=0.8, overlap=-0.6
+        end=1.0,
+        command="0.3*sin(120*pi*t)",
+        natural_frequency=60.0,
+        damping_ratio=0.8,
+        overlap=-0.6,
     )
     case["output"]["every"] = 1.0 / 480.0
     run = fvsolve.run(case)
-    assert run["spool.position"][-40:] == approx(-0.3 / 1.6 * np.cos(120.0 * pi * run.t[-40:]), abs=1e-8)
+    assert run["spool.position"][-40:] == approx(
+        -0.3 / 1.6 * np.cos(120.0 * pi * run.t[-40:]), abs=1e-8
+    )
 
 
 def hybrid(command, times, zeta=0.8, fastest=np.inf, half=0.0, dead=0.0, jumps=()):
@@ -180,7 +215,9 @@ def hybrid(command, times, zeta=0.8, fastest=np.inf, half=0.0, dead=0.0, jumps=(
     y, t, found = np.zeros(2), 0.0, []
     for end in [*jumps, times[-1]]:
         last = np.nextafter(end, 0.0)
-        part = solve_ivp(rates, (t, end), y, "DOP853", dense_output=True, rtol=1e-12, atol=1e-13, max_step=1e-4)
+        part = solve_ivp(
+            rates, (t, end), y, "DOP853", dense_output=True, rtol=1e-12, atol=1e-13, max_step=1e-4
+        )
         found.append(part.sol(times[(times >= t) & (times < end)]))
         t, y = end, part.y[:, -1]
     return np.column_stack([*found, y[:, None]])[0]
@@ -190,7 +227,10 @@ MOVES = {  # keys beside those of `SERVO`, and arguments of `hybrid`
     "speed": ({"stroke_time": 0.02}, {"fastest": 50.0}),
     "hysteresis": ({"hysteresis": 0.1}, {"half": 0.05}),
     "dead band": ({"dead_band": 0.1}, {"dead": 0.1}),
-    "all": ({"stroke_time": 0.02, "hysteresis": 0.1, "dead_band": 0.1}, {"fastest": 50.0, "half": 0.05, "dead": 0.1}),
+    "all": (
+        {"stroke_time": 0.02, "hysteresis": 0.1, "dead_band": 0.1},
+        {"fastest": 50.0, "half": 0.05, "dead": 0.1},
+    ),
 }
 SLOW_AND_QUICK = table((0.0, 0.0), (0.01, 0.6), (0.02, 0.6), (0.021, -0.7), (0.06, 0.0), (0.1, 0.3))
 
@@ -203,12 +243,16 @@ def test_limits_hysteresis_and_dead_band_follow_scipy(name):
     truth = hybrid(command, np.asarray(run.t), jumps=SLOW_AND_QUICK["time"][1:-1], **arguments)
     assert run["spool.position"] == approx(truth, abs=3e-9)
     if "stroke_time" in more:
-        assert "moves forward at its greatest speed" in [event["what"] for event in run.summary["events"]]
+        assert "moves forward at its greatest speed" in [
+            event["what"] for event in run.summary["events"]
+        ]
 
 
 def test_a_full_stroke_takes_the_stroke_time():
     command = {"start": 0.0, "duration": 0.0, "value": [0.0, 1.0]}
-    case = valve_between_ports(command=command, natural_frequency=5e3, damping_ratio=1.0, stroke_time=0.05)
+    case = valve_between_ports(
+        command=command, natural_frequency=5e3, damping_ratio=1.0, stroke_time=0.05
+    )
     case["output"]["every"] = 1e-3
     run = fvsolve.run(case)
     events = {event["what"]: event["time"] for event in run.summary["events"]}
@@ -219,25 +263,38 @@ def test_a_full_stroke_takes_the_stroke_time():
 
 def test_a_spool_that_swings_beyond_its_stop_rests_there():
     zeta, root = 0.2, sqrt(1.0 - 0.2**2)
-    case = valve_between_ports(command=table((0.05, 0.9), (0.08, 0.0)), natural_frequency=60.0, damping_ratio=zeta)
-    case["links"]["spool"]["command"] |= {"kind": "step", "time": [0.0, 0.01, 0.05], "value": [0.0, 0.9, 0.0]}
+    case = valve_between_ports(
+        command=table((0.05, 0.9), (0.08, 0.0)), natural_frequency=60.0, damping_ratio=zeta
+    )
+    case["links"]["spool"]["command"] |= {
+        "kind": "step",
+        "time": [0.0, 0.01, 0.05],
+        "value": [0.0, 0.9, 0.0],
+    }
     run = fvsolve.run(case)
     low, high = 0.0, pi / (root * W)  # up to its first peak
     for _ in range(100):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if swing(middle, zeta, 0.9) < 1.0 else (low, middle)
     (reach, leave) = (event for event in run.summary["events"] if "upper stop" in event["what"])
-    assert reach["time"] == approx(0.01 + low, abs=1e-9) and reach["what"] == "reaches its upper stop"
+    assert (
+        reach["time"] == approx(0.01 + low, abs=1e-9) and reach["what"] == "reaches its upper stop"
+    )
     # the command, 0.9, draws it back from rest at once
     assert leave["time"] == approx(reach["time"], abs=1e-6)
     after = (run.t > leave["time"]) & (run.t < 0.05)
-    assert run["spool.position"][after] == approx(1.0 + swing(run.t[after] - reach["time"], zeta, -0.1), abs=1e-8)
+    assert run["spool.position"][after] == approx(
+        1.0 + swing(run.t[after] - reach["time"], zeta, -0.1), abs=1e-8
+    )
     assert run["spool.position"].max() <= 1.0 + 1e-12
 
 
 def test_a_full_command_holds_the_spool_at_its_stop():
-    case = valve_between_ports(command=table((0.01, 0.0), (0.011, 1.0), (0.06, 1.0), (0.061, -1.0)),
-                               natural_frequency=60.0, damping_ratio=0.3)  # fmt: skip
+    case = valve_between_ports(
+        command=table((0.01, 0.0), (0.011, 1.0), (0.06, 1.0), (0.061, -1.0)),
+        natural_frequency=60.0,
+        damping_ratio=0.3,
+    )
     run = fvsolve.run(case)
     events = [event["what"] for event in run.summary["events"]]
     assert events == ["reaches its upper stop", "leaves its upper stop", "reaches its lower stop"]
@@ -249,7 +306,9 @@ def test_a_full_command_holds_the_spool_at_its_stop():
 def test_slow_commands_leave_half_the_hysteresis_on_each_side(dead):
     command = table((0.0, 0.0), (5.0, 0.8), (10.0, -0.8), (12.5, 0.0))
     keys = {"hysteresis": 0.06, "stroke_time": 0.02} | ({} if dead is None else {"dead_band": dead})
-    case = valve_between_ports(end=12.5, command=command, natural_frequency=60.0, damping_ratio=1.0, **keys)
+    case = valve_between_ports(
+        end=12.5, command=command, natural_frequency=60.0, damping_ratio=1.0, **keys
+    )
     run, d = fvsolve.run(case, {"numerics.rtol": 1e-8, "output.every": 0.25}), dead or 0.0
     for t, u, side in ((4.0, 0.64, 1), (9.0, -0.48, -1), (12.0, -0.16, 1)):
         target = np.sign(u) * (abs(u) - d) / (1.0 - d)
@@ -264,7 +323,9 @@ def test_slow_commands_leave_half_the_hysteresis_on_each_side(dead):
 @pytest.mark.parametrize("command", [{"mean": 0.05, "amplitude": 0.5, "period": 0.04},
                                      "0.05 + 0.5*sin(50*pi*t)", SLOW_AND_QUICK])  # fmt: skip
 def test_a_dead_band_without_dynamics_acts_at_once(command, overlap):
-    run = fvsolve.run(valve_between_ports(held=False, command=command, dead_band=0.2, overlap=overlap))
+    run = fvsolve.run(
+        valve_between_ports(held=False, command=command, dead_band=0.2, overlap=overlap)
+    )
     u = np.interp(run.t, SLOW_AND_QUICK["time"], SLOW_AND_QUICK["value"])
     u = u if command is SLOW_AND_QUICK else 0.05 + 0.5 * np.sin(50.0 * pi * run.t)
     x = np.sign(u) * np.maximum(np.abs(u) - 0.2, 0.0) / 0.8
@@ -305,7 +366,8 @@ def test_a_position_in_other_words_is_the_same_run(position, twin, overlap):
 @pytest.mark.parametrize("given", [WAVE, FORMULA, RAMP])
 def test_a_command_without_dynamics_is_the_position_to_the_bit(given):
     found = [
-        fvsolve.run(valve_between_ports(held=False, overlap=0.05, **{key: given})) for key in ("position", "command")
+        fvsolve.run(valve_between_ports(held=False, overlap=0.05, **{key: given}))
+        for key in ("position", "command")
     ]
     for probe in ("A.pressure", "B.pressure", "spool.flow_A", "spool.position"):
         assert np.array_equal(found[0][probe], found[1][probe])
@@ -314,7 +376,10 @@ def test_a_command_without_dynamics_is_the_position_to_the_bit(given):
 def test_a_common_overlap_for_all_edges_is_a_table_of_equal_overlaps_to_the_bit():
     laps = dict.fromkeys(("P-A", "P-B", "A-T", "B-T"), 0.05)
     for more in ({"position": WAVE}, {"command": STEP} | SERVO):
-        found = [fvsolve.run(valve_between_ports(held=False, overlap=lap, **more)) for lap in (0.05, laps)]
+        found = [
+            fvsolve.run(valve_between_ports(held=False, overlap=lap, **more))
+            for lap in (0.05, laps)
+        ]
         assert np.array_equal(found[0]["A.pressure"], found[1]["A.pressure"])
 
 
@@ -328,15 +393,23 @@ def test_a_spool_valve_is_four_valves(overlap, reverse):
     for start, end, side in (("P", "A", 1), ("P", "B", -1), ("A", "T", -1), ("B", "T", 1)):
         opening = f"max(0, ({side}*({FORMULA}) - {overlap})/{1.0 - overlap})"
         ends = (end, start) if reverse else (start, end)
-        links[f"{start}{end}"] = {"type": "valve", "from": ends[0], "to": ends[1], "area": 1e-5, "opening": opening,
-                                   "laminar_reynolds": 1e-6}  # fmt: skip
+        links[f"{start}{end}"] = {
+            "type": "valve",
+            "from": ends[0],
+            "to": ends[1],
+            "area": 1e-5,
+            "opening": opening,
+            "laminar_reynolds": 1e-6,
+        }
     case["links"], case["output"]["probes"] = links, ["A.pressure", "B.pressure", "PA.flow"]
     apart = fvsolve.run(case)
     for port in "AB":
         assert whole[f"{port}.pressure"] == approx(apart[f"{port}.pressure"], rel=1e-9)
 
 
-@pytest.mark.parametrize("keys", [{}, SERVO | {"stroke_time": 0.02, "hysteresis": 0.04, "dead_band": 0.05}])
+@pytest.mark.parametrize(
+    "keys", [{}, SERVO | {"stroke_time": 0.02, "hysteresis": 0.04, "dead_band": 0.05}]
+)
 def test_a_valve_and_its_mirror_image_pass_the_same(keys):
     key, found = "command" if keys else "position", []
     for side, ports in ((1.0, "PTAB"), (-1.0, "PTBA")):
@@ -366,7 +439,9 @@ def test_units_and_the_order_of_parts_change_nothing():
 def test_methods_and_laws_agree(method, rtol, law):
     found = []
     for name, accuracy in (METHODS[0], (method, rtol)):
-        case = valve_between_ports(held=False, end=0.06, command=SLOW_AND_QUICK, **SERVO, **MOVES["all"][0])
+        case = valve_between_ports(
+            held=False, end=0.06, command=SLOW_AND_QUICK, **SERVO, **MOVES["all"][0]
+        )
         case["fluid"] = OIL | {"law": law}
         found.append(fvsolve.run(case, {"numerics.method": name, "numerics.rtol": accuracy}))
     assert found[0]["spool.position"] == approx(found[1]["spool.position"], abs=1e-8)
@@ -376,8 +451,10 @@ def test_methods_and_laws_agree(method, rtol, law):
 # the rest of the program ------------------------------------------------------------------------------------------
 
 
-RESTING = [(0.0, {}), (0.05, {"overlap": -0.1}), (-0.1, {"dead_band": 0.1})]  # also under other laws
-HELD = [(0.3, {"dead_band": 0.1}), (1.0, {}), (-1.0, {"hysteresis": 0.1})]  # chambers at equal pressures
+# also under other laws
+RESTING = [(0.0, {}), (0.05, {"overlap": -0.1}), (-0.1, {"dead_band": 0.1})]
+# chambers at equal pressures
+HELD = [(0.3, {"dead_band": 0.1}), (1.0, {}), (-1.0, {"hysteresis": 0.1})]
 
 
 @pytest.mark.in_turn
@@ -389,10 +466,21 @@ def test_a_valve_at_rest_does_not_change_any_bit(method, law, command, keys):
     del case["links"]["spool"]["laminar_reynolds"]
     level = {"type": "chamber", "volume": 1e-3}
     case["nodes"] |= {"A": {"type": "junction"}, "B": level, "C": level}
-    case["links"]["line"] = {"type": "pipe", "from": "A", "to": "C", "length": 3.0, "diameter": 0.02,
-                             "friction": {"model": "none"}, "cells": 5}  # fmt: skip
+    case["links"]["line"] = {
+        "type": "pipe",
+        "from": "A",
+        "to": "C",
+        "length": 3.0,
+        "diameter": 0.02,
+        "friction": {"model": "none"},
+        "cells": 5,
+    }
     case["output"]["probes"] = ["B.pressure", "C.pressure", "spool.position", "spool.flow_A"]
-    numerics = {"numerics.step": 1e-4, "numerics.rtol": None} if method == "rk4" else {"numerics.rtol": 1e-6}
+    numerics = (
+        {"numerics.step": 1e-4, "numerics.rtol": None}
+        if method == "rk4"
+        else {"numerics.rtol": 1e-6}
+    )
     if numerics.get("numerics.rtol", 1) is None:
         del case["numerics"]["rtol"], numerics["numerics.rtol"]
     case["fluid"] = OIL | {"law": law}
@@ -404,18 +492,42 @@ def test_a_valve_at_rest_does_not_change_any_bit(method, law, command, keys):
 @pytest.mark.parametrize("ways", ["4/3", "3/2", "2/2"])
 def test_no_rate_depends_on_a_state_that_the_pattern_has_not(ways):
     rng = np.random.default_rng(1)
-    case = valve_between_ports(ways, held=False, command={"control": "hold"}, overlap=-0.05, **SERVO)
+    case = valve_between_ports(
+        ways, held=False, command={"control": "hold"}, overlap=-0.05, **SERVO
+    )
     case["nodes"]["A"] = {"type": "junction"}
     case["nodes"]["C"] = {"type": "chamber", "volume": 1e-3, "initial_pressure": 60e5}
-    case["links"]["line"] = {"type": "pipe", "from": "A", "to": "C", "length": 3.0, "diameter": 0.02, "cells": 5}
-    case["controls"] = {"hold": {"type": "pi", "input": "A.pressure", "setpoint": 60e5, "gain": 1e-8,
-                                 "integral_time": 0.1, "limits": [-1, 1], "initial": 0.0}}  # fmt: skip
+    case["links"]["line"] = {
+        "type": "pipe",
+        "from": "A",
+        "to": "C",
+        "length": 3.0,
+        "diameter": 0.02,
+        "cells": 5,
+    }
+    case["controls"] = {
+        "hold": {
+            "type": "pi",
+            "input": "A.pressure",
+            "setpoint": 60e5,
+            "gain": 1e-8,
+            "integral_time": 0.1,
+            "limits": [-1, 1],
+            "initial": 0.0,
+        }
+    }
     case["output"]["probes"] = ["A.pressure"]
     for key, more in (("command", SERVO), ("command", {"dead_band": 0.1}), ("position", {})):
-        spool = {name: value for name, value in case["links"]["spool"].items() if name not in ("command", *SERVO)}
+        spool = {
+            name: value
+            for name, value in case["links"]["spool"].items()
+            if name not in ("command", *SERVO)
+        }
         filtered = {} if more is SERVO else {"filter": 1e-3}
         case["controls"]["hold"] |= filtered
-        given = case | {"links": case["links"] | {"spool": spool | {key: {"control": "hold"}} | more}}
+        given = case | {
+            "links": case["links"] | {"spool": spool | {key: {"control": "hold"}} | more}
+        }
         model = fvsolve.build(fvsolve.load(given))
         for _ in range(3):
             assert stray(model, 0.0, random_state(model, rng)) < 1e-6
@@ -426,8 +538,16 @@ def test_a_pressure_that_the_valve_sets_may_command_its_spool_at_once():
     case = valve_between_ports("2/2", 2.0, command={"control": "hold"}, **SERVO)
     case["nodes"] |= {"A": {"type": "junction"}, "T": {"type": "reservoir", "pressure": 2e5}}
     case["links"]["load"] = {"type": "orifice", "from": "A", "to": "T", "area": 4e-6}
-    case["controls"] = {"hold": {"type": "pi", "input": "A.pressure", "gain": 2e-8, "integral_time": 0.02,
-                                 "setpoint": table((0.1, 60e5), (0.12, 80e5)), "limits": [0, 1]}}  # fmt: skip
+    case["controls"] = {
+        "hold": {
+            "type": "pi",
+            "input": "A.pressure",
+            "gain": 2e-8,
+            "integral_time": 0.02,
+            "setpoint": table((0.1, 60e5), (0.12, 80e5)),
+            "limits": [0, 1],
+        }
+    }
     case["output"]["probes"] = ["A.pressure", "spool.position"]
     run = fvsolve.run(case, {"numerics.rtol": 1e-8})
     assert run["A.pressure"][:2] == approx(60e5, abs=1.0)
@@ -441,8 +561,16 @@ def test_a_pressure_that_the_valve_sets_may_command_its_spool_at_once():
 
 def test_the_position_of_the_spool_is_an_input_of_other_blocks_before_the_nodes():
     case = valve_between_ports(held=False, command=STEP, **SERVO)
-    case["controls"] = {"half": {"type": "function", "inputs": {"x": "spool.position"}, "formula": "0.5*x"}}
-    case["links"]["by"] = {"type": "valve", "from": "A", "to": "B", "area": 1e-6, "opening": {"control": "half"}}
+    case["controls"] = {
+        "half": {"type": "function", "inputs": {"x": "spool.position"}, "formula": "0.5*x"}
+    }
+    case["links"]["by"] = {
+        "type": "valve",
+        "from": "A",
+        "to": "B",
+        "area": 1e-6,
+        "opening": {"control": "half"},
+    }
     case["output"]["probes"] = ["controls.half.output", "spool.position"]
     run = fvsolve.run(case)
     assert np.array_equal(run["controls.half.output"], 0.5 * run["spool.position"])
@@ -452,14 +580,24 @@ def test_the_position_of_the_spool_is_an_input_of_other_blocks_before_the_nodes(
 def test_a_command_held_by_advance_is_that_of_the_file(keys):
     case = valve_between_ports(held=False, command=0.4, overlap=0.05, **keys)
     states = []
-    for command, inputs in ((0.0, {"spool.command": 0.4}), ({"start": 0.0, "duration": 0.0, "value": [0, 0.4]}, {})):
-        model = fvsolve.build(fvsolve.load(case | {"links": {"spool": case["links"]["spool"] | {"command": command}}}))
+    for command, inputs in (
+        (0.0, {"spool.command": 0.4}),
+        ({"start": 0.0, "duration": 0.0, "value": [0, 0.4]}, {}),
+    ):
+        model = fvsolve.build(
+            fvsolve.load(case | {"links": {"spool": case["links"]["spool"] | {"command": command}}})
+        )
         states.append(fvsolve.advance(model, fvsolve.initial_state(model), 0.05, inputs).y)
     assert states[0] == approx(states[1], rel=1e-8, abs=1e-9) and np.abs(states[0]).max() > 1e-3
 
 
 def test_a_killed_run_resumes_to_the_bit(tmp_path):
-    changes = {"numerics.method": "radau-iia-5", "numerics.rtol": 1e-9, "numerics.end": 0.6, "expect": {}}
+    changes = {
+        "numerics.method": "radau-iia-5",
+        "numerics.rtol": 1e-9,
+        "numerics.end": 0.6,
+        "expect": {},
+    }
     case = tomllib.loads((CASES / "servo-axis.toml").read_text(encoding="utf-8"))
     fvsolve.run(fvsolve.load(case, changes), out=tmp_path / "whole", pictures=False)
     same_files(tmp_path / "whole", killed_and_resumed(tmp_path / "whole", 0.205))
@@ -469,10 +607,18 @@ def test_a_killed_run_resumes_to_the_bit(tmp_path):
                                                  ("command", -0.02, False)])  # fmt: skip
 def test_a_rigid_column_at_a_spool_that_shuts_is_noted(key, overlap, noted):
     keys = SERVO if key == "command" else {}
-    case = valve_between_ports(end=0.3, overlap=overlap, **{key: table((0.05, 0.5), (0.1, -0.5))}, **keys)
+    case = valve_between_ports(
+        end=0.3, overlap=overlap, **{key: table((0.05, 0.5), (0.1, -0.5))}, **keys
+    )
     del case["links"]["spool"]["laminar_reynolds"]
     case["nodes"] |= {"A": {"type": "junction"}, "C": {"type": "reservoir", "pressure": 60e5}}
-    case["links"]["line"] = {"type": "rigid-column", "from": "A", "to": "C", "length": 2.0, "diameter": 0.01}
+    case["links"]["line"] = {
+        "type": "rigid-column",
+        "from": "A",
+        "to": "C",
+        "length": 2.0,
+        "diameter": 0.01,
+    }
     case["output"]["probes"] = ["line.flow", "spool.flow_A"]
     model = fvsolve.build(fvsolve.load(case, {"numerics.rtol": 1e-6}))
     assert any("a rigid column ends at a port" in notice.text for notice in model.warnings) == noted
@@ -491,8 +637,14 @@ def test_the_energy_of_a_spool_valve_closes(keys):
 
 # the servo axis ---------------------------------------------------------------------------------------------------
 
-AXIS = ["load.position", "load.velocity", "cyl.A.pressure", "cyl.B.pressure", "spool.position",
-        "controls.position.output"]  # fmt: skip
+AXIS = [
+    "load.position",
+    "load.velocity",
+    "cyl.A.pressure",
+    "cyl.B.pressure",
+    "spool.position",
+    "controls.position.output",
+]
 
 
 @pytest.fixture(scope="module")
@@ -504,20 +656,36 @@ def axis_truth():
 @pytest.mark.parametrize("method, rtol", [("dormand-prince", 1e-11), ("rodas-5p", 1e-9)])
 def test_the_servo_axis_is_that_of_scipy(method, rtol, axis_truth):
     times, truth = axis_truth
-    run = fvsolve.run("servo-axis", {"numerics.method": method, "numerics.rtol": rtol, "output.probes": AXIS,
-                                     "output.units": {}, "expect": {}})  # fmt: skip
+    run = fvsolve.run(
+        "servo-axis",
+        {
+            "numerics.method": method,
+            "numerics.rtol": rtol,
+            "output.probes": AXIS,
+            "output.units": {},
+            "expect": {},
+        },
+    )
     kept = np.unique(np.round(run.t, 9), return_index=True)[1]
     x, v, in_a, in_b, s = truth[:5]
-    volumes = servo_axis.DEAD + servo_axis.AREA_A * x, servo_axis.DEAD + servo_axis.AREA_B * (servo_axis.STROKE - x)
-    pressures = [servo_axis.AMBIENT + servo_axis.BETA * (mass / (servo_axis.RHO * volume) - 1.0)
-                 for mass, volume in zip((in_a, in_b), volumes, strict=True)]  # fmt: skip
-    for probe, one, scale in zip(AXIS, (x, v, *pressures, s), (0.1, 1.0, 1e7, 1e7, 1.0), strict=False):
+    volumes = (
+        servo_axis.DEAD + servo_axis.AREA_A * x,
+        servo_axis.DEAD + servo_axis.AREA_B * (servo_axis.STROKE - x),
+    )
+    pressures = [
+        servo_axis.AMBIENT + servo_axis.BETA * (mass / (servo_axis.RHO * volume) - 1.0)
+        for mass, volume in zip((in_a, in_b), volumes, strict=True)
+    ]
+    for probe, one, scale in zip(
+        AXIS, (x, v, *pressures, s), (0.1, 1.0, 1e7, 1e7, 1.0), strict=False
+    ):
         assert run[probe][kept] == approx(one, abs=1e-8 * scale), probe
 
 
 def test_the_energy_of_the_axis_closes_between_its_events():
     found = energy(
-        "servo-axis", {"fluid.law": "log", "numerics.initial": "steady", "numerics.rtol": 1e-9, "expect": {}}
+        "servo-axis",
+        {"fluid.law": "log", "numerics.initial": "steady", "numerics.rtol": 1e-9, "expect": {}},
     )
     assert found.ok and abs(found.remainder[-1]) < 1e-10 * found.throughput
 
@@ -526,7 +694,10 @@ def axis_with(gain, **more):
     """Servo axis at rest whose set position moves by 1 um at 10 ms, as a table."""
     case = tomllib.loads((CASES / "servo-axis.toml").read_text(encoding="utf-8"))
     del case["expect"]
-    case["controls"]["position"] |= {"gain": gain, "setpoint": {"time": [0.01, 0.011], "value": [0.05, 0.050001]}}
+    case["controls"]["position"] |= {
+        "gain": gain,
+        "setpoint": {"time": [0.01, 0.011], "value": [0.05, 0.050001]},
+    }
     case["links"]["weight"]["force"] = -2800.0
     case["numerics"] |= {"end": 3.0, "rtol": 1e-9} | more
     case["output"] = {"every": 1e-3, "probes": ["load.velocity"]}
@@ -545,27 +716,50 @@ def test_the_axis_begins_to_swing_at_the_predicted_gain_within_a_hundredth():
 
 FAULTS = {
     "ways": ({"ways": "5/2"}, 'links.spool.ways: no type of spool valve named "5/2"'),
-    "a port too few": ({"ports": {"P": "P", "T": "T", "A": "A"}}, "links.spool.ports: B is missing"),
+    "a port too few": (
+        {"ports": {"P": "P", "T": "T", "A": "A"}},
+        "links.spool.ports: B is missing",
+    ),
     "a port too many": ({"ways": "3/2"}, "links.spool.ports.B: unknown key"),
-    "overlap": ({"overlap": 1.2}, "links.spool.overlap: 1.2 is out of range; expected a value below 1"),
-    "overlap of an edge": ({"overlap": {"P-A": 1.0}}, "links.spool.overlap.P-A: 1.0 is out of range; expected a value"),
+    "overlap": (
+        {"overlap": 1.2},
+        "links.spool.overlap: 1.2 is out of range; expected a value below 1",
+    ),
+    "overlap of an edge": (
+        {"overlap": {"P-A": 1.0}},
+        "links.spool.overlap.P-A: 1.0 is out of range; expected a value",
+    ),
     "no such edge": ({"overlap": {"A-B": 0.1}}, "links.spool.overlap.A-B: unknown key"),
-    "two sizes": ({"rated_flow": 1e-3, "rated_drop": 35e5}, "links.spool.area: rated_flow and area are given; keep"),
-    "no drop": ({"area": None, "rated_flow": 1e-3}, "links.spool.rated_flow: needs the key `rated_drop`"),
+    "two sizes": (
+        {"rated_flow": 1e-3, "rated_drop": 35e5},
+        "links.spool.area: rated_flow and area are given; keep",
+    ),
+    "no drop": (
+        {"area": None, "rated_flow": 1e-3},
+        "links.spool.rated_flow: needs the key `rated_drop`",
+    ),
     "no flow": ({"rated_drop": 35e5}, "links.spool.rated_drop: needs the key `rated_flow`"),
-    "no size": ({"area": None}, "links.spool: size is missing; expected area, diameter, Kv, Cv or rated_flow"),
+    "no size": (
+        {"area": None},
+        "links.spool: size is missing; expected area, diameter, Kv, Cv or rated_flow",
+    ),
     "no position": ({"position": None}, "links.spool: expected one of position, command"),
-    "position and command": ({"command": 0.1}, "links.spool.command: position and command are given; keep one"),
+    "position and command": (
+        {"command": 0.1},
+        "links.spool.command: position and command are given; keep one",
+    ),
     "dynamics of a position": (SERVO, "links.spool.natural_frequency: needs the key `command`"),
     "no damping": (
         {"position": None, "command": 0.1, "natural_frequency": 60.0},
         "links.spool.natural_frequency: needs the key `damping_ratio`",
     ),
     "no frequency": (
-        {"position": None, "command": 0.1, "stroke_time": 0.1}, "links.spool.stroke_time: needs the key `natural_freq"
+        {"position": None, "command": 0.1, "stroke_time": 0.1},
+        "links.spool.stroke_time: needs the key `natural_freq",
     ),
     "hysteresis at once": (
-        {"position": None, "command": 0.1, "hysteresis": 0.1}, "links.spool.hysteresis: needs the key `natural_freq"
+        {"position": None, "command": 0.1, "hysteresis": 0.1},
+        "links.spool.hysteresis: needs the key `natural_freq",
     ),
     "dead band": (
         {"position": None, "command": 0.1, "dead_band": 1.0},
@@ -576,7 +770,7 @@ FAULTS = {
         'links.spool.ways: no type of spool valve named "5/2"; did you mean "3/2"?',
     ),
     "command": ({"position": None, "command": 1.5}, "links.spool.command: 1.5 is out of range"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -586,7 +780,9 @@ def test_each_bad_input_has_a_single_fault(name):
     spool = case["links"]["spool"] | keys
     case["links"]["spool"] = {key: value for key, value in spool.items() if value is not None}
     case["output"] = {"probes": ["P.pressure"]}
-    case["nodes"] = {name: node for name, node in case["nodes"].items() if name in str(case["links"])}
+    case["nodes"] = {
+        name: node for name, node in case["nodes"].items() if name in str(case["links"])
+    }
     with pytest.raises(CaseError) as error:
         fvsolve.load(case)
     faults = [f"{fault.place}: {fault.message}" for fault in error.value.faults]
@@ -601,7 +797,9 @@ def test_a_probe_of_a_port_that_the_valve_has_not_is_refused():
 
 
 def test_implausible_values_are_noted():
-    case = valve_between_ports(command=0.1, natural_frequency=1e4, damping_ratio=0.01, dead_band=0.6)
+    case = valve_between_ports(
+        command=0.1, natural_frequency=1e4, damping_ratio=0.01, dead_band=0.6
+    )
     texts = " ".join(notice.text for notice in fvsolve.load(case).notices)
     for key in ("natural_frequency", "damping ratio below 0.1", "dead_band"):
         assert key in texts

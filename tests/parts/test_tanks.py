@@ -8,7 +8,18 @@ import math
 import numpy as np
 import pytest
 from reference import scenes, vessels
-from reference.scenes import AMBIENT, GRAVITY, WATER, area, lake, pipe, reservoir, scene, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    WATER,
+    area,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -41,14 +52,20 @@ def test_a_prism_drains_in_finite_time_and_stays_empty(numerics, near):
     emptied = 2 * section * math.sqrt(level) / (OUTLET * math.sqrt(2 * GRAVITY))
     result = drained(section, level, emptied + 60.0, numerics)
     assert result.ok
-    assert result["basin.level"] == pytest.approx(vessels.prism(section, OUTLET, level, result.t), abs=near)
+    assert result["basin.level"] == pytest.approx(
+        vessels.prism(section, OUTLET, level, result.t), abs=near
+    )
 
 
-@pytest.mark.parametrize("foot, growth", [(0.5, 1.5), (3.0, -1.0), (0.01, 2.0)], ids=["funnel", "dome", "near a point"])
+@pytest.mark.parametrize(
+    "foot, growth", [(0.5, 1.5), (3.0, -1.0), (0.01, 2.0)], ids=["funnel", "dome", "near a point"]
+)
 def test_a_shaped_tank_drains_as_its_closed_form(foot, growth):
     level = 2.0
     section = {"level": [0.0, 2.5], "area": [foot, foot + 2.5 * growth]}
-    emptied = (2 * foot * math.sqrt(level) + 2 / 3 * growth * level**1.5) / (OUTLET * math.sqrt(2 * GRAVITY))
+    emptied = (2 * foot * math.sqrt(level) + 2 / 3 * growth * level**1.5) / (
+        OUTLET * math.sqrt(2 * GRAVITY)
+    )
     result = drained(section, level, emptied + 5.0)
     exact = vessels.tapered(foot, growth, OUTLET, level, np.asarray(result.t))
     assert result["basin.level"] == pytest.approx(exact, abs=1e-6)
@@ -69,8 +86,12 @@ def test_two_tanks_level_in_finite_time_and_rest(levels, numerics, near):
     slope = flow_area * math.sqrt(2 * GRAVITY) * (1 / areas[0] + 1 / areas[1])
     drop = abs(levels[0] - levels[1])
     end = 2 * math.sqrt(drop) / slope + 60.0
-    result = fvsolve.run(scene(nodes, links, end, numerics, ["one.level", "two.level", "gap.flow"], 1.0))
-    left = vessels.levelling(areas, flow_area, drop, result.t) * math.copysign(1, levels[0] - levels[1])
+    result = fvsolve.run(
+        scene(nodes, links, end, numerics, ["one.level", "two.level", "gap.flow"], 1.0)
+    )
+    left = vessels.levelling(areas, flow_area, drop, result.t) * math.copysign(
+        1, levels[0] - levels[1]
+    )
     mean = (areas[0] * levels[0] + areas[1] * levels[1]) / sum(areas)
     assert result.ok
     assert result["one.level"] == pytest.approx(mean + left * areas[1] / sum(areas), abs=near)
@@ -108,7 +129,14 @@ def test_a_tank_with_a_rising_and_falling_outfall_reverses_the_flow():
     t = np.linspace(0.0, 600.0, 12001)
     head = {"time": t.tolist(), "value": outfall(t).tolist(), "kind": "smooth"}
     nodes = {"basin": tank(section, level), "sea": lake(head)}
-    case = scene(nodes, {"hole": valve("basin", "sea", OUTLET)}, 600.0, CLOSE, ["basin.level", "hole.flow"], 1.0)
+    case = scene(
+        nodes,
+        {"hole": valve("basin", "sea", OUTLET)},
+        600.0,
+        CLOSE,
+        ["basin.level", "hole.flow"],
+        1.0,
+    )
     result = fvsolve.run(case)
     now = np.asarray(result.t)
     assert result["hole.flow"].min() < 0 < result["hole.flow"].max()
@@ -142,7 +170,10 @@ def test_an_outfall_that_goes_up_and_down_in_straight_lines_agrees_with_scipy():
 def test_running_dry_is_marked_when_and_where_it_happens():
     """The outfall is below the bottom of the tank, so outflow continues at level 0."""
     section, level, below = 2.0, 1.5, 2.0
-    nodes = {"basin": tank(section, level, elevation=10.0), "air": reservoir(AMBIENT, elevation=10.0 - below)}
+    nodes = {
+        "basin": tank(section, level, elevation=10.0),
+        "air": reservoir(AMBIENT, elevation=10.0 - below),
+    }
     links = {"hole": valve("basin", "air", OUTLET)}
     slope = OUTLET * math.sqrt(2 * GRAVITY) / section
     dry = 2 * (math.sqrt(level + below) - math.sqrt(below)) / slope
@@ -156,26 +187,47 @@ def test_running_dry_is_marked_when_and_where_it_happens():
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
 
-@pytest.mark.parametrize("numerics", [CLOSE, {"method": "rk4", "step": 0.3}], ids=["tight", "fixed step"])
+@pytest.mark.parametrize(
+    "numerics", [CLOSE, {"method": "rk4", "step": 0.3}], ids=["tight", "fixed step"]
+)
 def test_a_tank_filled_above_its_height_spills_and_the_ledger_has_it(numerics):
     nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
     links = {"pipe": valve("spring", "basin", 0.05)}
     result = fvsolve.run(scene(nodes, links, 100.0, numerics, ["basin.level"], 1.0))
     wanted = np.minimum(1.0 + 0.01 * np.asarray(result.t), 1.5)
     assert result["basin.level"] == pytest.approx(wanted, abs=1e-6)
-    assert result.ledger["mass"]["spilled"] == pytest.approx(1000.0 * (0.02 * 100.0 - 1.0), rel=1e-6)
+    assert result.ledger["mass"]["spilled"] == pytest.approx(
+        1000.0 * (0.02 * 100.0 - 1.0), rel=1e-6
+    )
     (note,) = [one for one in result.warnings if one.kind == "spilling"]
-    assert note.place == "nodes.basin" and note.value == pytest.approx(50.0, abs=1e-6) and not result.marks
+    assert (
+        note.place == "nodes.basin"
+        and note.value == pytest.approx(50.0, abs=1e-6)
+        and not result.marks
+    )
 
 
 def test_a_tank_through_a_pipe_swings_with_the_period_of_mass_oscillation():
     """Rigid column without friction: w^2 = g A / (L A_tank), about the level of the reservoir."""
     length, diameter, section = 200.0, 0.4, 0.5
     nodes = {"lake": lake(10.0), "surge": tank(section, 10.5)}
-    column = {"type": "rigid-column", "from": "lake", "to": "surge", "length": length, "diameter": diameter}
+    column = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "surge",
+        "length": length,
+        "diameter": diameter,
+    }
     links = {"main": {**column, "friction": scenes.NO_FRICTION, "initial_flow": 0.0}}
     w = math.sqrt(GRAVITY * scenes.area(diameter) / (length * section))
-    case = scene(nodes, links, 2.5 * 2 * math.pi / w, {**CLOSE, "rtol": 1e-10}, ["surge.level", "main.flow"], 0.5)
+    case = scene(
+        nodes,
+        links,
+        2.5 * 2 * math.pi / w,
+        {**CLOSE, "rtol": 1e-10},
+        ["surge.level", "main.flow"],
+        0.5,
+    )
     result = fvsolve.run(case)
     t = np.asarray(result.t)
     assert result["surge.level"] == pytest.approx(10 + 0.5 * np.cos(w * t), abs=1e-6)
@@ -186,12 +238,20 @@ def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic
     """L / (g A) q' = H - (q / K)^2, so q = q1 tanh((t - 1) / T + artanh 0.2) with T = L q1 / (g A H)."""
     length, diameter, head = 1000.0, 0.3, 20.0
     nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
-    column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}
+    column = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "gate",
+        "length": length,
+        "diameter": diameter,
+    }
     links = {
         "main": {**column, "friction": scenes.NO_FRICTION},
         "valve": valve("gate", "air", OUTLET, scenes.step(1.0, 0.2, 1.0)),
     }
-    case = scene(nodes, links, 40.0, {**CLOSE, "rtol": 1e-10}, ["valve.flow", "main.flow", "gate.head"], 0.5)
+    case = scene(
+        nodes, links, 40.0, {**CLOSE, "rtol": 1e-10}, ["valve.flow", "main.flow", "gate.head"], 0.5
+    )
     result = fvsolve.run(case)
     most = OUTLET * math.sqrt(2 * GRAVITY * head)
     scale = length * most / (GRAVITY * scenes.area(diameter) * head)
@@ -201,12 +261,18 @@ def test_a_rigid_column_behind_a_valve_that_opens_at_once_starts_as_a_hyperbolic
     assert result["main.flow"] == pytest.approx(flow, abs=1e-8 * most)
     assert result["valve.flow"] == pytest.approx(flow, abs=1e-8 * most)
     opened = np.where(after, 1.0, 0.2)
-    assert result["gate.head"] == pytest.approx((flow / (opened * OUTLET)) ** 2 / (2 * GRAVITY), abs=1e-6 * head)
+    assert result["gate.head"] == pytest.approx(
+        (flow / (opened * OUTLET)) ** 2 / (2 * GRAVITY), abs=1e-6 * head
+    )
 
 
 @pytest.mark.parametrize(
     "numerics, near",
-    [(CLOSE, 1e-5), ({"method": "rk4", "step": 0.008}, 1e-5), ({"method": "ssp-rk3", "step": 0.02}, 1e-4)],
+    [
+        (CLOSE, 1e-5),
+        ({"method": "rk4", "step": 0.008}, 1e-5),
+        ({"method": "ssp-rk3", "step": 0.02}, 1e-4),
+    ],
     ids=["tight", "rk4", "ssp"],
 )
 def test_a_valve_that_shuts_brings_a_rigid_column_to_rest_and_the_run_goes_on(numerics, near):
@@ -217,12 +283,20 @@ def test_a_valve_that_shuts_brings_a_rigid_column_to_rest_and_the_run_goes_on(nu
     """
     length, diameter, head, factor, start, shut = 100.0, 0.2, 60.0, 0.02, 2.0, 3.0
     nodes = {"lake": lake(head), "gate": scenes.junction(), "air": reservoir(AMBIENT)}
-    column = {"type": "rigid-column", "from": "lake", "to": "gate", "length": length, "diameter": diameter}
+    column = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "gate",
+        "length": length,
+        "diameter": diameter,
+    }
     links = {
         "main": {**column, "friction": {"model": "steady", "factor": factor}},
         "tap": valve("gate", "air", OUTLET, scenes.ramp(start, shut - start, 1.0, 0.0)),
     }
-    result = fvsolve.run(scene(nodes, links, 5.0, numerics, ["main.flow", "tap.flow", "gate.head"], 0.1))
+    result = fvsolve.run(
+        scene(nodes, links, 5.0, numerics, ["main.flow", "tap.flow", "gate.head"], 0.1)
+    )
     assert result.ok, result.reason
     area = scenes.area(diameter)
     wall = factor * length / diameter / area**2 / (2 * GRAVITY)
@@ -257,7 +331,9 @@ def turns(z: float, flow: float, losses: tuple[float, float], count: int) -> lis
     square, found = flow**2, []
     for turn in range(count):
         side = 1 if turn % 2 == 0 else -1
-        c = FACTOR * LENGTH / DIAMETER / (2 * GRAVITY * bore**2) + losses[turn % 2] / (2 * GRAVITY * throat**2)
+        c = FACTOR * LENGTH / DIAMETER / (2 * GRAVITY * bore**2) + losses[turn % 2] / (
+            2 * GRAVITY * throat**2
+        )
 
         def left(x, z=z, square=square, side=side, c=c):
             plain = (1 / (k * c * c) - side * z / c, 1 / (k * c * c) - side * x / c)
@@ -273,9 +349,19 @@ def turns(z: float, flow: float, losses: tuple[float, float], count: int) -> lis
 
 def swing(losses: tuple[float, float], numerics: dict = TIGHT, law: str = "linear") -> dict:
     connection = {"diameter": THROAT, "loss_in": losses[0], "loss_out": losses[1]}
-    nodes = {"lake": lake(50.0), "t": {"type": "tank", "area": SHAFT, "level": 45.9, "connection": connection}}
-    tunnel = {"type": "rigid-column", "from": "lake", "to": "t", "length": LENGTH, "diameter": DIAMETER,
-              "friction": {"model": "steady", "factor": FACTOR}, "initial_flow": 20.0}  # fmt: skip
+    nodes = {
+        "lake": lake(50.0),
+        "t": {"type": "tank", "area": SHAFT, "level": 45.9, "connection": connection},
+    }
+    tunnel = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "t",
+        "length": LENGTH,
+        "diameter": DIAMETER,
+        "friction": {"model": "steady", "factor": FACTOR},
+        "initial_flow": 20.0,
+    }
     probes = ["t.level", "t.head", "c.flow"]
     return scene(nodes, {"c": tunnel}, 400.0, numerics, probes, 0.1, fluid=WATER | {"law": law})
 
@@ -308,10 +394,15 @@ def test_the_throttle_dissipates_and_the_ledger_closes(law):
 
 def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
     connection = {"area": 0.5, "loss_in": 1.0, "loss_out": 2.0}
-    nodes = {"lake": lake(20.0), "t": {"type": "tank", "area": 9.0, "level": 20.0, "connection": connection}}
+    nodes = {
+        "lake": lake(20.0),
+        "t": {"type": "tank", "area": 9.0, "level": 20.0, "connection": connection},
+    }
     links = {"main": pipe("lake", "t", 100.0, 0.5, 1000.0, 10)}
     for law in ("linear", "log"):
-        model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}, fluid=WATER | {"law": law})))
+        model = fvsolve.build(
+            fvsolve.load(scene(nodes, links, 1.0, {}, fluid=WATER | {"law": law}))
+        )
         assert not model.rhs(0.0, np.zeros(model.y_size)).any()
         pattern = jacobian_pattern(model).toarray()[: model.y_size]
         assert not np.any((np.abs(model.jacobian(0.0, np.zeros(model.y_size))) > 1e-6) & ~pattern)
@@ -319,15 +410,27 @@ def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
 
 def test_marks_and_moving_parts_name_the_tank_itself():
     """Marks, notices and moving parts name the tank, without its inner node; an outlet below its bottom drains it."""
-    nodes = {"t": {"type": "tank", "area": 1.0, "level": 0.5,
-                   "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0}}, "air": lake(-0.5)}  # fmt: skip
+    nodes = {
+        "t": {
+            "type": "tank",
+            "area": 1.0,
+            "level": 0.5,
+            "connection": {"diameter": 0.2, "loss_in": 1.0, "loss_out": 1.0},
+        },
+        "air": lake(-0.5),
+    }
     result = fvsolve.run(scene(nodes, {"hole": valve("t", "air", 0.02)}, 40.0, {}, ["t.level"]))
-    assert [mark.place for mark in result.marks] == ["nodes.t"] and result["t.level"][-1] == pytest.approx(
-        0.0, abs=1e-6
-    )
+    assert [mark.place for mark in result.marks] == ["nodes.t"] and result["t.level"][
+        -1
+    ] == pytest.approx(0.0, abs=1e-6)
     full = {"t": nodes["t"] | {"height": 0.6}, "spring": {"type": "inflow", "flow": 0.02}}
     spilt = fvsolve.run(scene(full, {"way": valve("spring", "t", 0.02)}, 40.0, {}, ["t.level"]))
     (note,) = [one for one in spilt.warnings if one.kind == "spilling"]
-    assert (note.place, note.value) == ("nodes.t", pytest.approx(5.0, abs=1e-6)) and "inside" not in note.text
-    moving = fvsolve.build(fvsolve.load(scene(nodes, {"hole": valve("t", "air", 0.02)}, 1.0, {}))).steady["moving"]
+    assert (note.place, note.value) == (
+        "nodes.t",
+        pytest.approx(5.0, abs=1e-6),
+    ) and "inside" not in note.text
+    moving = fvsolve.build(
+        fvsolve.load(scene(nodes, {"hole": valve("t", "air", 0.02)}, 1.0, {}))
+    ).steady["moving"]
     assert moving[0].startswith("tank t falls at")

@@ -15,7 +15,18 @@ import pytest
 from pytest import approx
 from reference.hydropower import chart, steady
 from reference.refusals import refused
-from reference.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, WATER, area, junction, lake, pipe, scene
+from reference.scenes import (
+    GRAVITY,
+    NO_FRICTION,
+    RHO,
+    SHARP,
+    WATER,
+    area,
+    junction,
+    lake,
+    pipe,
+    scene,
+)
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -37,7 +48,10 @@ PROBES = ["unit.flow", "unit.head", "unit.speed", "unit.torque"]
 
 
 def line(x: float, speeds=(0.0, 60.0, 150.0)) -> dict:
-    flows, torques = [x * (ALPHA - BETA * n) for n in speeds], [x * (PUSH - BRAKE * n) for n in speeds]
+    flows, torques = (
+        [x * (ALPHA - BETA * n) for n in speeds],
+        [x * (PUSH - BRAKE * n) for n in speeds],
+    )
     return {"opening": x, "unit_speed": list(speeds), "unit_flow": flows, "unit_torque": torques}
 
 
@@ -45,12 +59,25 @@ LINE = [line(0.4), line(1.0)]
 
 
 def turbine(**more) -> dict:
-    return {"type": "turbine", "from": "mid", "to": "low", "diameter": D, "speed": OMEGA, "hill_chart": LINE, **more}
+    return {
+        "type": "turbine",
+        "from": "mid",
+        "to": "low",
+        "diameter": D,
+        "speed": OMEGA,
+        "hill_chart": LINE,
+        **more,
+    }
 
 
 def plant(numerics, end=20.0, conduit=None, every=0.5, **keys) -> dict:
     """Return a case of lake, conduit, turbine and lake; the conduit is a rigid column unless given."""
-    column = {"type": "rigid-column", "length": LENGTH, "diameter": BORE, "friction": dict(NO_FRICTION)}
+    column = {
+        "type": "rigid-column",
+        "length": LENGTH,
+        "diameter": BORE,
+        "friction": dict(NO_FRICTION),
+    }
     nodes = {"up": lake(HEAD), "mid": junction(), "low": lake(0.0)}
     links = {"way": {**(conduit or column), "from": "up", "to": "mid"}, "unit": turbine(**keys)}
     return scene(nodes, links, end, numerics, PROBES, every)
@@ -60,7 +87,14 @@ def direct(head: float, **keys) -> dict:
     """Return a case of a turbine between two lakes."""
     unit = {**turbine(**keys), "from": "up"}
     probes = [*PROBES, "unit.power", "unit.opening"]
-    return scene({"up": lake(head), "low": lake(0.0)}, {"unit": unit}, 1.0, {"method": "rk4", "step": 0.1}, probes, 0.5)
+    return scene(
+        {"up": lake(head), "low": lake(0.0)},
+        {"unit": unit},
+        1.0,
+        {"method": "rk4", "step": 0.1},
+        probes,
+        0.5,
+    )
 
 
 def head_of(x, q, omega):
@@ -82,7 +116,9 @@ def rejection(times):
     for begin, end in ((1.0, 2.0), (2.0, 5.0), (5.0, 8.0), (8.0, 20.0)):
         inside = [t for t in times if begin < t <= end]
         options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12}
-        one = solve_ivp(rate, (begin, end), y, t_eval=[*inside, end] if inside[-1] < end else inside, **options)
+        one = solve_ivp(
+            rate, (begin, end), y, t_eval=[*inside, end] if inside[-1] < end else inside, **options
+        )
         y = one.y[:, -1]
         found.append(one.y[:, : len(inside)])
     return np.concatenate(found, axis=1)
@@ -114,8 +150,18 @@ def test_the_ledger_of_energy_closes_with_the_step():
 
 
 CHART = [
-    {"opening": 0.5, "unit_speed": [40, 60, 90], "unit_flow": [0.52, 0.5, 0.41], "efficiency": [0.7, 0.85, 0.6]},
-    {"opening": 0.9, "unit_speed": [45, 65, 95], "unit_flow": [0.95, 0.92, 0.8], "efficiency": [0.75, 0.91, 0.7]},
+    {
+        "opening": 0.5,
+        "unit_speed": [40, 60, 90],
+        "unit_flow": [0.52, 0.5, 0.41],
+        "efficiency": [0.7, 0.85, 0.6],
+    },
+    {
+        "opening": 0.9,
+        "unit_speed": [45, 65, 95],
+        "unit_flow": [0.95, 0.92, 0.8],
+        "efficiency": [0.75, 0.91, 0.7],
+    },
 ]
 
 
@@ -162,13 +208,17 @@ def test_faster_than_that_it_brakes_and_torques_turn_it():
 
 
 def test_vanes_that_shut_at_once_are_joukowsky():
-    conduit = {k: v for k, v in pipe("up", "mid", 600.0, BORE, 1000.0, 30, friction=NO_FRICTION).items()}
+    conduit = {
+        k: v for k, v in pipe("up", "mid", 600.0, BORE, 1000.0, 30, friction=NO_FRICTION).items()
+    }
     shut = {"time": [0.1, 0.2], "value": [0.8, 0.0], "kind": "step"}
     case = plant(dict(SHARP), 0.9, conduit, 0.02, opening=shut)
     case["output"]["probes"] = ["unit.flow", "mid.pressure"]
     found = fvsolve.run(case)
     rise = found["mid.pressure"][found.t > 0.25] - found["mid.pressure"][0]
-    assert rise == approx(np.full(len(rise), RHO * 1000.0 * found["unit.flow"][0] / area(BORE)), rel=1e-12)
+    assert rise == approx(
+        np.full(len(rise), RHO * 1000.0 * found["unit.flow"][0] / area(BORE)), rel=1e-12
+    )
 
 
 # Pump-turbine with a folded curve: distance and T11 over the angle of Q11 / 0.8 and n11 / 85.
@@ -183,13 +233,21 @@ def folded(points: int) -> dict:
     angle = np.linspace(-0.6, 1.5, points)
     n, q = 85.0 * distance(angle) * np.cos(angle), 0.8 * distance(angle) * np.sin(angle)
     torque = 1600.0 * (angle - 0.45)
-    return {"opening": 1.0, "unit_speed": n.tolist(), "unit_flow": q.tolist(), "unit_torque": torque.tolist()}
+    return {
+        "opening": 1.0,
+        "unit_speed": n.tolist(),
+        "unit_flow": q.tolist(),
+        "unit_torque": torque.tolist(),
+    }
 
 
 def folds(points: int, numerics, conduit=None) -> fvsolve.Result:
     way = {
-        "type": "rigid-column", "length": 500.0, "diameter": math.sqrt(48.0 / math.pi), "friction": dict(NO_FRICTION),
-    }  # fmt: skip
+        "type": "rigid-column",
+        "length": 500.0,
+        "diameter": math.sqrt(48.0 / math.pi),
+        "friction": dict(NO_FRICTION),
+    }
     case = plant(numerics, 40.0, conduit or way, hill_chart=[folded(points)], **FOLD)
     case["nodes"]["up"] = lake(200.0)
     return fvsolve.run(case)
@@ -214,7 +272,9 @@ def test_through_its_folds_a_pump_turbine_is_its_equations_to_second_order_in_it
     for points in (40, 80, 160):
         found = folds(points, {"method": "dormand-prince", "rtol": 1e-9})
         after = found.t > 1.0
-        y = solve_ivp(rate, (1.0, 40.0), [q0, FOLD["speed"]], "DOP853", found.t[after], rtol=1e-11, atol=1e-12).y
+        y = solve_ivp(
+            rate, (1.0, 40.0), [q0, FOLD["speed"]], "DOP853", found.t[after], rtol=1e-11, atol=1e-12
+        ).y
         errors.append(np.max(np.abs(found["unit.speed"][after] / y[1] - 1.0)))
         assert np.ptp(y[0]) > 60.0
     assert errors[2] < 1e-3 and errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
@@ -235,7 +295,11 @@ def test_behind_a_pipe_it_swings_through_them_under_every_law(law):
 
     def run(courant):
         case = plant(
-            {"scheme": "muscl", "method": "rk4", "courant": courant}, 12.0, way, hill_chart=[folded(160)], **FOLD
+            {"scheme": "muscl", "method": "rk4", "courant": courant},
+            12.0,
+            way,
+            hill_chart=[folded(160)],
+            **FOLD,
         )
         case["nodes"]["up"] = lake(200.0)
         case["fluid"] = FLUIDS[law]
@@ -251,25 +315,37 @@ def test_an_s_between_given_pressures_starts_at_the_greatest_flow_and_is_noted()
     case = direct(200.0, hill_chart=[folded(160)], diameter=3.0, speed=FOLD["speed"])
     found = fvsolve.run(case)
     assert found["unit.flow"][0] == approx(85.06, rel=1e-4)
-    assert [one.key for one in found.warnings] == ["hill_chart"] and "its hill chart is folded" in found.warnings[
-        0
-    ].text
+    assert [one.key for one in found.warnings] == [
+        "hill_chart"
+    ] and "its hill chart is folded" in found.warnings[0].text
     assert not fvsolve.run(direct(HEAD, hill_chart=CHART, speed="300 rpm")).warnings
 
 
 def test_stated_otherwise_it_is_the_same(tmp_path):
     """Equivalent input: other orders of curves and points, other units, and a file."""
     numerics = {"method": "rk4", "step": 0.05}
-    first = fvsolve.run(plant(numerics, 4.0, inertia=INERTIA, trip=1.0, opening=VANES, hill_chart=CHART))
-    turned = [{k: v[::-1] if isinstance(v, list) else v for k, v in one.items()} for one in CHART[::-1]]
+    first = fvsolve.run(
+        plant(numerics, 4.0, inertia=INERTIA, trip=1.0, opening=VANES, hill_chart=CHART)
+    )
+    turned = [
+        {k: v[::-1] if isinstance(v, list) else v for k, v in one.items()} for one in CHART[::-1]
+    ]
     other = {"diameter": "1500 mm", "speed": "375 rpm", "inertia": "60 t m2", "trip": "1000 ms"}
     again = fvsolve.run(plant(numerics, 4.0, opening=VANES, hill_chart=turned, **other))
     rows = ["opening [%];unit_flow [m^(1/2)/s];efficiency [%];unit_speed [rpm m^(1/2)]"]
-    rows += [f"{100 * one['opening']};{q};{100 * e};{n}" for one in CHART
-             for q, e, n in zip(one["unit_flow"], one["efficiency"], one["unit_speed"], strict=True)]  # fmt: skip
+    rows += [
+        f"{100 * one['opening']};{q};{100 * e};{n}"
+        for one in CHART
+        for q, e, n in zip(one["unit_flow"], one["efficiency"], one["unit_speed"], strict=True)
+    ]
     (tmp_path / "chart.csv").write_text("\n".join(rows))
     case = plant(
-        numerics, 4.0, inertia=INERTIA, trip=1.0, opening=VANES, hill_chart={"file": str(tmp_path / "chart.csv")}
+        numerics,
+        4.0,
+        inertia=INERTIA,
+        trip=1.0,
+        opening=VANES,
+        hill_chart={"file": str(tmp_path / "chart.csv")},
     )
     third = fvsolve.run(case)
     for probe in PROBES:
@@ -279,10 +355,18 @@ def test_stated_otherwise_it_is_the_same(tmp_path):
 
 def test_it_starts_from_rest_and_leaves_its_chart_once():
     """At rest, and later without flow, the turbine is outside its chart; a single notice reports it."""
-    keys = {"hill_chart": CHART, "opening": {"time": [0.0, 5.0], "value": [0.0, 0.9]}, "speed": 0.0, "inertia": INERTIA}
+    keys = {
+        "hill_chart": CHART,
+        "opening": {"time": [0.0, 5.0], "value": [0.0, 0.9]},
+        "speed": 0.0,
+        "inertia": INERTIA,
+    }
     found = fvsolve.run(plant({"method": "radau-iia-5", "rtol": 1e-7}, 60.0, trip=0.0, **keys))
     (said,) = [one for one in found.warnings if one.kind == "range"]
-    assert (said.place, said.key) == ("links.unit", "hill_chart") and "unit: leaves its hill chart at" in said.text
+    assert (said.place, said.key) == (
+        "links.unit",
+        "hill_chart",
+    ) and "unit: leaves its hill chart at" in said.text
     assert found["unit.speed"][0] == 0.0 and not found.marks
     assert found["unit.head"][-1] == approx(HEAD, rel=1e-3)
     assert abs(found["unit.torque"][-1]) < 1e-3 * max(found["unit.torque"])
@@ -305,19 +389,38 @@ def test_the_shipped_plant_has_the_points_of_its_formula():
 
 
 @pytest.mark.parametrize(("inertia", "far"), [(INERTIA, False), (60.0, True), (60e6, True)])
-def test_an_inertia_far_from_that_of_machines_of_its_power_is_noted(inertia: float, far: bool) -> None:
+def test_an_inertia_far_from_that_of_machines_of_its_power_is_noted(
+    inertia: float, far: bool
+) -> None:
     for opening in (0.0, 0.8):
         made = fvsolve.build(fvsolve.load(plant(TIGHT, inertia=inertia, trip=1.0, opening=opening)))
         assert [one.key for one in made.warnings if one.kind == "range"] == ["inertia"] * far
 
 
-HALF = {"opening": 0.5, "unit_speed": [40, 60, 90], "unit_flow": [0.52, 0.5, 0.41], "efficiency": [0.7, 0.85, 0.6]}
-FULL = {"opening": 1.0, "unit_speed": [45, 95], "unit_flow": [0.95, 0.8], "unit_torque": [1500, 700]}
+HALF = {
+    "opening": 0.5,
+    "unit_speed": [40, 60, 90],
+    "unit_flow": [0.52, 0.5, 0.41],
+    "efficiency": [0.7, 0.85, 0.6],
+}
+FULL = {
+    "opening": 1.0,
+    "unit_speed": [45, 95],
+    "unit_flow": [0.95, 0.8],
+    "unit_torque": [1500, 700],
+}
 WEIGHT = RHO * GRAVITY
 
 
 def case(chart=(HALF, FULL), **keys) -> dict:
-    unit = {"type": "turbine", "from": "up", "to": "low", "diameter": 1.5, "speed": "300 rpm", "hill_chart": chart}
+    unit = {
+        "type": "turbine",
+        "from": "up",
+        "to": "low",
+        "diameter": 1.5,
+        "speed": "300 rpm",
+        "hill_chart": chart,
+    }
     if isinstance(chart, tuple):
         unit["hill_chart"] = list(chart)
     numerics = {"method": "rk4", "step": 0.1}
@@ -409,9 +512,28 @@ def test_a_fault_of_a_file(header, message, tmp_path):
 def test_spoiled_charts_are_refused_or_run(seed):
     """A chart with random invalid entries gives a named fault, or a run that fails or has finite flows."""
     draw = random.Random(seed)
-    odd = [0, -1, 1e-300, 1e300, math.nan, math.inf, "x", None, [], {}, True, 1, 60.0, [0.5, 0.4], "50 %"]
+    odd = [
+        0,
+        -1,
+        1e-300,
+        1e300,
+        math.nan,
+        math.inf,
+        "x",
+        None,
+        [],
+        {},
+        True,
+        1,
+        60.0,
+        [0.5, 0.4],
+        "50 %",
+    ]
     for _ in range(60):
-        chart = [{k: list(v) if isinstance(v, list) else v for k, v in one.items()} for one in (HALF, FULL, STILL)]
+        chart = [
+            {k: list(v) if isinstance(v, list) else v for k, v in one.items()}
+            for one in (HALF, FULL, STILL)
+        ]
         for _ in range(draw.randint(1, 3)):
             one, key = draw.choice(chart), draw.choice([*HALF, "unit_torque"])
             if isinstance(one.get(key), list) and one[key] and draw.random() < 0.7:
@@ -434,10 +556,18 @@ def random_chart(draw) -> list[dict]:
         n, q = 80.0 * far * np.cos(angle), opening * far * np.sin(angle)
         most = WEIGHT * q * 30.0 / math.pi / n
         torque = np.where(
-            q > 0.0, np.where(n > 0.0, np.minimum(0.6 * most, 4e3 * opening), 500.0 * opening), 2.5 * most
+            q > 0.0,
+            np.where(n > 0.0, np.minimum(0.6 * most, 4e3 * opening), 500.0 * opening),
+            2.5 * most,
         )
-        chart.append({"opening": float(opening), "unit_speed": n.tolist(), "unit_flow": q.tolist(),
-                      "unit_torque": torque.tolist()})  # fmt: skip
+        chart.append(
+            {
+                "opening": float(opening),
+                "unit_speed": n.tolist(),
+                "unit_flow": q.tolist(),
+                "unit_torque": torque.tolist(),
+            }
+        )
     return chart
 
 
@@ -454,13 +584,21 @@ def test_at_any_speed_flow_and_opening_it_loses_power_and_nothing_jumps():
         numbers = np.array(chart_numbers(SimpleNamespace(hill_chart=chart, diameter=1.3), WEIGHT))
         for _ in range(100):
             x, omega = draw.uniform(1e-3, 1.0), draw.uniform(-60.0, 60.0)
-            q = draw.uniform(-2.0, 2.0) * turbine_law.capacity(numbers, 0, x) * numbers[turbine_law.FLOW]
+            q = (
+                draw.uniform(-2.0, 2.0)
+                * turbine_law.capacity(numbers, 0, x)
+                * numbers[turbine_law.FLOW]
+            )
             root, _, _, torque, _ = turbine_law.chart_at(numbers, 0, x, omega, q)
             given, taken = WEIGHT * q * root * abs(root), torque * omega
             assert given - taken >= -1e-9 * (abs(given) + abs(taken))
-            for more in ((x * (1 - 1e-9), omega, q), (x, omega + 1e-9, q), (x, omega, q * (1 + 1e-9))):
+            for more in (
+                (x * (1 - 1e-9), omega, q),
+                (x, omega + 1e-9, q),
+                (x, omega, q * (1 + 1e-9)),
+            ):
                 near = turbine_law.chart_at(numbers, 0, *more)
-                assert abs(near[0] - root) < 1e-5 * (1.0 + abs(root)) and abs(near[3] - torque) < 1e-5 * (
-                    1e3 + abs(torque)
-                )
+                assert abs(near[0] - root) < 1e-5 * (1.0 + abs(root)) and abs(
+                    near[3] - torque
+                ) < 1e-5 * (1e3 + abs(torque))
     assert tried > 20

@@ -20,10 +20,12 @@ INERTIA = RHO * LENGTH / BORE  # inertance of the column, dp = INERTIA dq/dt
 RADIUS, LONG = 0.5 * ACROSS, VOLUME / area(ACROSS)
 TABLE = {"level": [0.0, 0.5, 1.0], "area": [0.05, 0.1, 0.08]}
 SHAPES = {
-    "upright": {"diameter": ACROSS, "level": 0.7}, "sloped": {"diameter": ACROSS, "slope": 0.4, "level": 0.4},
-    "lying": {"diameter": ACROSS, "slope": 0.0, "level": 0.18}, "table": {"area": TABLE, "level": 0.6},
+    "upright": {"diameter": ACROSS, "level": 0.7},
+    "sloped": {"diameter": ACROSS, "slope": 0.4, "level": 0.4},
+    "lying": {"diameter": ACROSS, "slope": 0.0, "level": 0.18},
+    "table": {"area": TABLE, "level": 0.6},
     "prism": {"area": 0.08, "level": 0.6},
-}  # fmt: skip
+}
 
 
 def surface(shape: str, z: float) -> float:
@@ -49,14 +51,31 @@ def section(slope: float, z: float, radius: float = RADIUS, length: float = LONG
 
 
 def vessel(shape: str = "sloped", **more) -> dict:
-    return {"type": "accumulator", "volume": VOLUME, "exponent": N, "bottom": 0.5, **SHAPES[shape], **more}
+    return {
+        "type": "accumulator",
+        "volume": VOLUME,
+        "exponent": N,
+        "bottom": 0.5,
+        **SHAPES[shape],
+        **more,
+    }
 
 
-def swing(flow: float, end: float, numerics=TIGHT, law="linear", probes=("a.level", "c.flow"), **more) -> dict:
+def swing(
+    flow: float, end: float, numerics=TIGHT, law="linear", probes=("a.level", "c.flow"), **more
+) -> dict:
     """Return a case of a rigid column between a reservoir and a vessel, with the initial flow `flow` [m3/s]."""
     nodes = {"lake": reservoir(P0), "a": vessel(**more)}
-    links = {"c": {"type": "rigid-column", "from": "lake", "to": "a", "length": LENGTH, "diameter": 0.1,
-                   "initial_flow": flow}}  # fmt: skip
+    links = {
+        "c": {
+            "type": "rigid-column",
+            "from": "lake",
+            "to": "a",
+            "length": LENGTH,
+            "diameter": 0.1,
+            "initial_flow": flow,
+        }
+    }
     return scene(nodes, links, end, numerics, probes, fluid=WATER | {"law": law})
 
 
@@ -73,27 +92,46 @@ def at_start(model) -> tuple[float, float]:
 @pytest.mark.parametrize("degrees", [0.0, 0.05, 1.0, 20.0, 45.0, 75.0, 89.99])
 def test_volume_of_a_cylinder_below_a_level_is_the_quadrature_of_its_sections(degrees):
     radius, length, slope = 1.1, 5.3, math.radians(degrees)
-    top, whole = length * math.sin(slope) + 2.0 * radius * math.cos(slope), math.pi * radius**2 * length
+    top, whole = (
+        length * math.sin(slope) + 2.0 * radius * math.cos(slope),
+        math.pi * radius**2 * length,
+    )
     kind = law_vessel.HORIZONTAL_CYLINDER if degrees == 0.0 else law_vessel.INCLINED_CYLINDER
     shape = np.array([kind, top, radius, length, slope])
     bends = sorted((length * math.sin(slope), 2.0 * radius * math.cos(slope)))
     for z in np.linspace(0.01, 0.99, 7) * top:
         edges = [0.0, *(min(max(bend, 0.0), z) for bend in bends), z]
         below, moment = (
-            sum(quad(lambda h, k=k: h**k * section(slope, h, radius, length), a, b, epsabs=1e-13, epsrel=1e-12)[0]
-                for a, b in zip(edges, edges[1:], strict=False) if b > a)
+            sum(
+                quad(
+                    lambda h, k=k: h**k * section(slope, h, radius, length),
+                    a,
+                    b,
+                    epsabs=1e-13,
+                    epsrel=1e-12,
+                )[0]
+                for a, b in zip(edges, edges[1:], strict=False)
+                if b > a
+            )
             for k in (0, 1)
-        )  # fmt: skip
+        )
         assert law_vessel.volume_below(shape, 0, z) == pytest.approx(below, abs=1e-12 * whole)
-        assert law_vessel.moment_below(shape, 0, z) == pytest.approx(moment, abs=1e-12 * whole * top)
-        assert law_vessel.surface_at(shape, 0, z) == pytest.approx(section(slope, z, radius, length), abs=1e-11 * whole)
+        assert law_vessel.moment_below(shape, 0, z) == pytest.approx(
+            moment, abs=1e-12 * whole * top
+        )
+        assert law_vessel.surface_at(shape, 0, z) == pytest.approx(
+            section(slope, z, radius, length), abs=1e-11 * whole
+        )
         assert law_vessel.level_at(shape, 0, below) == pytest.approx(z, abs=1e-12 * top)
     assert law_vessel.volume_below(shape, 0, top) == pytest.approx(whole, rel=1e-12)
 
 
 def test_a_cylinder_of_small_inclination_approaches_a_horizontal_or_an_upright_cylinder():
     for slope, near in ((0.0, 3e-6), (90.0, 89.9999)):
-        found = [at_start(model_of(swing(0.0, 1.0, slope=f"{one:.12f} deg", level=0.2))) for one in (slope, near)]
+        found = [
+            at_start(model_of(swing(0.0, 1.0, slope=f"{one:.12f} deg", level=0.2)))
+            for one in (slope, near)
+        ]
         assert found[0] == pytest.approx(found[1], rel=1e-5)
 
 
@@ -107,8 +145,12 @@ def test_a_small_oscillation_has_its_closed_period(shape, law, near):
     assert p == pytest.approx(
         P0 - RHO * GRAVITY * (0.5 + SHAPES[shape]["level"]), rel=1e-8 if law == "linear" else 1e-4
     )
-    exact = math.sqrt((N * p / gas + RHO * GRAVITY / surface(shape, SHAPES[shape]["level"])) / INERTIA)
-    assert np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag.max() == pytest.approx(exact, rel=near)
+    exact = math.sqrt(
+        (N * p / gas + RHO * GRAVITY / surface(shape, SHAPES[shape]["level"])) / INERTIA
+    )
+    assert np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag.max() == pytest.approx(
+        exact, rel=near
+    )
     assert not model.rhs(0.0, np.zeros(2)).any()
 
 
@@ -173,9 +215,9 @@ def test_its_level_gives_the_volume_of_gas_and_its_gas_pressure_holds():
     for law in ("linear", "log", "mixture"):
         case = swing(0.0, 1.0, law=law, initial_pressure=4e5)
         del case["links"]["c"]["initial_flow"]
-        assert at_start(model_of(case | {"numerics": {**case["numerics"], "initial": "rest"}}))[1] == pytest.approx(
-            4e5, rel=1e-12
-        )
+        assert at_start(model_of(case | {"numerics": {**case["numerics"], "initial": "rest"}}))[
+            1
+        ] == pytest.approx(4e5, rel=1e-12)
 
 
 def test_higher_by_as_much_as_its_reservoir_it_swings_alike():
@@ -190,7 +232,10 @@ def test_higher_by_as_much_as_its_reservoir_it_swings_alike():
 
 def pumped(flow, end: float, numerics=TIGHT, **more) -> dict:
     """Return a case of a given flow into an upright vessel."""
-    nodes = {"in": {"type": "inflow", "flow": flow}, "a": vessel("upright", initial_pressure=P0, **more)}
+    nodes = {
+        "in": {"type": "inflow", "flow": flow},
+        "a": vessel("upright", initial_pressure=P0, **more),
+    }
     links = {"gap": {"type": "valve", "from": "in", "to": "a", "area": 1e-3}}
     return scene(nodes, links, end, numerics, ("a.gas_pressure", "a.gas_volume", "a.level"), 0.05)
 
@@ -233,10 +278,14 @@ def test_a_level_above_its_start_at_the_start_lets_it_run_and_a_level_between_do
 
 
 def test_an_empty_vessel_gives_a_notice_and_fills_again():
-    result = fvsolve.run(swing(-0.04, 4.0, {"rtol": 1e-8}, level=0.02, probes=["a.level", "a.gas_pressure"]))
+    result = fvsolve.run(
+        swing(-0.04, 4.0, {"rtol": 1e-8}, level=0.02, probes=["a.level", "a.gas_pressure"])
+    )
     texts = [event["what"] for event in result.summary["events"]]
     assert result.ok and texts[:2] == ["is empty", "holds fluid again"]
-    away = (result.t > result.summary["events"][0]["time"]) & (result.t < result.summary["events"][1]["time"])
+    away = (result.t > result.summary["events"][0]["time"]) & (
+        result.t < result.summary["events"][1]["time"]
+    )
     assert np.all(result["a.level"][away] == 0.0) and result["a.level"][-1] >= 0.0
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
 
@@ -245,7 +294,9 @@ def test_the_pattern_holds_every_coupling():
     model = model_of(swing(0.01, 1.0, compressor={"start": 0.3, "stop": 0.1, "flow": 1e-3}))
     with model.run_data(1.0):
         pattern = jacobian_pattern(model).toarray()[: model.y_size]
-        assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3, 0.01]))) > 1e-9) & ~pattern)
+        assert not np.any(
+            (np.abs(model.jacobian(0.0, np.array([0.1, 0.3, 0.01]))) > 1e-9) & ~pattern
+        )
 
 
 def test_its_norm_is_the_curvature_of_its_energy():
@@ -255,12 +306,19 @@ def test_its_norm_is_the_curvature_of_its_energy():
     y[names.index("a.mass")], y[names.index("a.gas")] = 2e-3, -3e-5
     ((_, part, device),), (row,) = model.devices, model.tables.devices
     out = model.evaluate(0.0, np.zeros(model.y_size))[1]
-    found = sum(sum(factor * y[k] for k, factor in one.items()) ** 2 for one in
-                device.energy_rows(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
+    found = sum(
+        sum(factor * y[k] for k, factor in one.items()) ** 2
+        for one in device.energy_rows(model, part, row, np.zeros(model.y_size), out)
+    )
     tables, node = model.tables, model.tables.nodes[row["node"]]
     both = [
         law_vessel.stored_energy_change(
-            tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]], sign * y[row["y"]]
+            tables.settings[0],
+            tables.floats,
+            node,
+            int(row["data"]),
+            sign * y[node["y"]],
+            sign * y[row["y"]],
         )
         for sign in (1.0, -1.0)
     ]
@@ -268,13 +326,18 @@ def test_its_norm_is_the_curvature_of_its_energy():
 
 
 def test_limits_and_claims_look_at_its_level():
-    limits = {"full": {"on": "a", "quantity": "level", "maximum": 0.35},
-              "empty": {"on": "a", "quantity": "level", "minimum": 0.1}}  # fmt: skip
+    limits = {
+        "full": {"on": "a", "quantity": "level", "maximum": 0.35},
+        "empty": {"on": "a", "quantity": "level", "minimum": 0.1},
+    }
     case = swing(0.04, 1.0, limits=limits)
     case |= {"limits": limits, "expect": {"max(a.level)": {"value": 0.43, "atol": 0.05}}}
     del case["nodes"]["a"]["limits"]
     result = fvsolve.run(case)
-    assert {one["name"]: one["ok"] for one in result.summary["verdicts"]} == {"full": False, "empty": True}
+    assert {one["name"]: one["ok"] for one in result.summary["verdicts"]} == {
+        "full": False,
+        "empty": True,
+    }
 
 
 @pytest.mark.parametrize(
@@ -289,14 +352,20 @@ def test_limits_and_claims_look_at_its_level():
         ({"area": 0.1}, "diameter and area are given; keep one"),
         ({"diameter": None, "area": 0.1}, "slope: applies only with `diameter`"),
         ({"level": None, "precharge": 4e5}, "is not valid with `precharge` (a bladder)"),
-        ({"slope": 45.0}, '2578.31 deg is steeper than upright; expected 0 to 90 deg, did you mean "45 deg"'),
+        (
+            {"slope": 45.0},
+            '2578.31 deg is steeper than upright; expected 0 to 90 deg, did you mean "45 deg"',
+        ),
         ({"slope": -0.1}, "out of range"),
         ({"level": 5.0}, "5 m leaves no volume for gas; the vessel is full at 0.827"),
         (
             {"compressor": {"start": 0.2, "stop": 0.3, "flow": 1e-3}},
             "compressor.stop: 0.3 m is not below the level `start`",
         ),
-        ({"compressor": {"start": 2.0, "stop": 0.3, "flow": 1e-3}}, "2 m is never reached; expected less than"),
+        (
+            {"compressor": {"start": 2.0, "stop": 0.3, "flow": 1e-3}},
+            "2 m is never reached; expected less than",
+        ),
         ({"compressor": {"start": 0.2}}, "stop is missing"),
         (
             {"bottom": 70.0},
@@ -315,7 +384,9 @@ def test_faults_of_a_shape_are_reported(wrong, said):
 
 
 def test_all_faults_are_reported_at_once_and_a_vessel_without_a_shape_has_no_level():
-    case = swing(0.0, 1.0, slope=2.0, gas_volume=0.2, compressor={"start": 0.1, "stop": 0.2, "flow": -1.0})
+    case = swing(
+        0.0, 1.0, slope=2.0, gas_volume=0.2, compressor={"start": 0.1, "stop": 0.2, "flow": -1.0}
+    )
     error = refused(case)
     assert all(key in str(error) for key in ("gas_volume", "compressor.flow"))
     bare = swing(0.0, 1.0)
@@ -327,8 +398,16 @@ def test_a_valve_at_its_node_carries_the_flow_of_both_heads():
     """Two isolated vessels equalise until gas pressure plus weight of the fluid are equal at the valve."""
     nodes = {"a": vessel("upright"), "b": vessel("lying", initial_pressure=4e5)}
     nodes["a"]["initial_pressure"] = P0
-    result = fvsolve.run(scene(nodes, {"v": valve("a", "b", 1e-3)}, 40.0, {"method": "radau-iia-5", "rtol": 1e-8},
-                               ["a.pressure", "b.pressure", "a.gas_pressure", "a.level"], 1.0))  # fmt: skip
+    result = fvsolve.run(
+        scene(
+            nodes,
+            {"v": valve("a", "b", 1e-3)},
+            40.0,
+            {"method": "radau-iia-5", "rtol": 1e-8},
+            ["a.pressure", "b.pressure", "a.gas_pressure", "a.level"],
+            1.0,
+        )
+    )
     assert result["a.pressure"][-1] == pytest.approx(result["b.pressure"][-1], abs=2.0)
     weight = RHO * GRAVITY * (0.5 + result["a.level"])
     assert result["a.pressure"] == pytest.approx(result["a.gas_pressure"] + weight, rel=1e-12)

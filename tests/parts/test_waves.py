@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 from reference import frictionless, scenes
 from reference.frictionless import relative_drop
-from reference.scenes import AMBIENT, RHO, SHARP, WATER, junction, pipe, ramp, reservoir, scene, step, valve
+from reference.scenes import (
+    AMBIENT,
+    RHO,
+    SHARP,
+    WATER,
+    junction,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    step,
+    valve,
+)
 
 import fvsolve
 from fvsolve import run
@@ -26,7 +38,9 @@ STEP = LENGTH / CELLS / SPEED
 PLACES = {"gate.pressure": 1.0, "main.pressure@0.5": 0.5, "main.pressure@0.21": 0.21}
 
 
-def shut_pipe(velocity: float, how: str, every: float = 0.01, turned: bool = False, **numerics) -> tuple[dict, float]:
+def shut_pipe(
+    velocity: float, how: str, every: float = 0.01, turned: bool = False, **numerics
+) -> tuple[dict, float]:
     """Return (case, jump rho a v [Pa]) of a flow that stops by `how`: initial_flow, demand or valve."""
     jump = RHO * SPEED * velocity
     supply = 2 * AMBIENT + 2 * jump
@@ -140,7 +154,11 @@ SCHEDULES = {
     "curved closure": ramp(0.0, 2.05 * PERIOD, 1.0, 0.0, 1.5),
     "opening": ramp(0.0, 1.5 * PERIOD, 0.2, 1.0),
     "late closure": ramp(7 * LINE_STEP, PERIOD, 1.0, 0.1),
-    "there and back": {"time": [0.0, PERIOD, 2 * PERIOD, 4 * PERIOD], "value": [1.0, 0.4, 0.4, 0.9], "kind": "linear"},
+    "there and back": {
+        "time": [0.0, PERIOD, 2 * PERIOD, 4 * PERIOD],
+        "value": [1.0, 0.4, 0.4, 0.9],
+        "kind": "linear",
+    },
 }
 
 
@@ -155,7 +173,9 @@ def opening(schedule: dict, t: float) -> float:
 
 def flow_area(velocity: float, schedule: dict) -> float:
     """Product Cd A of the fully open valve, which passes `velocity` [m/s] at its initial opening [m2]."""
-    return velocity * scenes.area(LINE_DIAMETER) / math.sqrt(2 * DROP / RHO) / opening(schedule, -1.0)
+    return (
+        velocity * scenes.area(LINE_DIAMETER) / math.sqrt(2 * DROP / RHO) / opening(schedule, -1.0)
+    )
 
 
 def closure(velocity: float, schedule: dict, every: float, turned: bool = False) -> dict:
@@ -189,7 +209,13 @@ def test_valve_pressure_and_flow_are_exact_at_every_step(name):
     result = fvsolve.run(closure(velocity, schedule, LINE_STEP))
     area = flow_area(velocity, schedule)
     main = frictionless.Pipe(
-        "lake", "gate", LINE_LENGTH, LINE_DIAMETER, LINE_SPEED, velocity * scenes.area(LINE_DIAMETER), AMBIENT + DROP
+        "lake",
+        "gate",
+        LINE_LENGTH,
+        LINE_DIAMETER,
+        LINE_SPEED,
+        velocity * scenes.area(LINE_DIAMETER),
+        AMBIENT + DROP,
     )
     exact = frictionless.Rays(
         RHO,
@@ -247,8 +273,17 @@ def test_the_volume_of_a_wave_is_its_integral(method):
 
 def test_a_wave_stated_by_a_signal_in_other_units_is_the_same_to_the_bit():
     said = chamber({"signal": "swing"}, rtol=1e-8)
-    said["signals"] = {"swing": {"phase": math.pi / 6, "period": "400 ms", "amplitude": "18 m3/h", "mean": "36 m3/h"}}
-    assert np.array_equal(run(said)["tank.pressure"], run(chamber(WAVE, rtol=1e-8))["tank.pressure"])
+    said["signals"] = {
+        "swing": {
+            "phase": math.pi / 6,
+            "period": "400 ms",
+            "amplitude": "18 m3/h",
+            "mean": "36 m3/h",
+        }
+    }
+    assert np.array_equal(
+        run(said)["tank.pressure"], run(chamber(WAVE, rtol=1e-8))["tank.pressure"]
+    )
 
 
 @pytest.mark.parametrize("kind", ["harmonic", "ramp", "smooth", "linear"])
@@ -266,19 +301,27 @@ def test_slopes_of_schedules_are_those_of_their_values(kind):
         at = lambda s, row=row: piece_value(pieces, row, s)  # noqa: E731
         assert at(t) == pytest.approx(2.0 * value(one, t) + 0.5)
         h = 1e-4
-        first, second = (at(t + h) - at(t - h)) / (2 * h), (at(t + h) - 2 * at(t) + at(t - h)) / h**2
+        first, second = (
+            (at(t + h) - at(t - h)) / (2 * h),
+            (at(t + h) - 2 * at(t) + at(t - h)) / h**2,
+        )
         assert piece_slopes(pieces, row, t) == pytest.approx((first, second), rel=1e-5, abs=1e-5)
 
 
 def test_a_spool_that_swings_opens_each_way_by_the_positive_part_and_steps_end_where_it_is_centred():
     nodes = {
-        "P": reservoir(AMBIENT + 2e6), "T": reservoir(AMBIENT),
-        "A": reservoir(AMBIENT + 1e6), "B": reservoir(AMBIENT + 1e6),
-    }  # fmt: skip
+        "P": reservoir(AMBIENT + 2e6),
+        "T": reservoir(AMBIENT),
+        "A": reservoir(AMBIENT + 1e6),
+        "B": reservoir(AMBIENT + 1e6),
+    }
     spool = {
-        "type": "spool-valve", "ports": {one: one for one in "PTAB"}, "discharge_coefficient": 0.6, "area": 1e-5,
+        "type": "spool-valve",
+        "ports": {one: one for one in "PTAB"},
+        "discharge_coefficient": 0.6,
+        "area": 1e-5,
         "position": {"mean": 0.1, "amplitude": 0.4, "period": 0.5},
-    }  # fmt: skip
+    }
     case = scene(nodes, {"spool": spool}, 1.0, {"step": 0.01}, ["spool.flow_A"], every=0.01)
     result = run(case)
     x = 0.1 + 0.4 * np.sin(2 * np.pi * result.t / 0.5)
@@ -288,7 +331,9 @@ def test_a_spool_that_swings_opens_each_way_by_the_positive_part_and_steps_end_w
     assert np.abs(np.abs(found) - np.abs(wanted)).max() < 1e-9 * full
     up = math.asin(0.25)
     zeros = [
-        (angle + 2 * math.pi * k) * 0.5 / (2 * math.pi) for k in (0, 1) for angle in (math.pi + up, 2 * math.pi - up)
+        (angle + 2 * math.pi * k) * 0.5 / (2 * math.pi)
+        for k in (0, 1)
+        for angle in (math.pi + up, 2 * math.pi - up)
     ]
     assert [t for t, jump in breaks_of(case) if not jump] == pytest.approx(sorted(zeros))
 
@@ -311,7 +356,9 @@ FAULTS = {
 def test_a_wave_that_is_none_is_refused_by_name(text):
     case = scene(
         {"a": reservoir(2e5), "b": reservoir(1e5)},
-        {"v": {"type": "valve", "from": "a", "to": "b", "area": 1e-4, "opening": FAULTS[text]}}, 1.0, {},
-    )  # fmt: skip
+        {"v": {"type": "valve", "from": "a", "to": "b", "area": 1e-4, "opening": FAULTS[text]}},
+        1.0,
+        {},
+    )
     with pytest.raises(CaseError, match=text):
         load(case)

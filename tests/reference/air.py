@@ -37,7 +37,13 @@ class AirOil:
         """
         x, atm, end = max(p - self.floor, 1e-3), ATM - self.floor, self.saturation - self.floor
         left = (1.0 - x / end) / (1.0 - atm / end) if x < end else 0.0
-        return self.fraction / (1.0 - self.fraction) * self.liquid(ATM) * (atm / x) ** (1.0 / self.exponent) * left
+        return (
+            self.fraction
+            / (1.0 - self.fraction)
+            * self.liquid(ATM)
+            * (atm / x) ** (1.0 / self.exponent)
+            * left
+        )
 
     def density(self, p):
         return self.rho / (self.liquid(p) + self.gas(p))
@@ -46,12 +52,18 @@ class AirOil:
         """Effective bulk modulus -V dp/dV [Pa]: 1/K_eff = (1 - g) / K_l + g / (n p) + g / (p_sat - p)."""
         g = self.gas(p) / (self.liquid(p) + self.gas(p))
         dissolving = g / (self.saturation - p) if g > 0.0 else 0.0
-        return 1.0 / ((1.0 - g) / (self.liquid(p) * self.modulus) + g / (self.exponent * (p - self.floor)) + dissolving)
+        return 1.0 / (
+            (1.0 - g) / (self.liquid(p) * self.modulus)
+            + g / (self.exponent * (p - self.floor))
+            + dissolving
+        )
 
 
 def orifice(area: float, up: float, down: float, oil: AirOil) -> float:
     """Mass flow through an orifice of effective area `area` [m2] at the upstream density [kg/s]."""
-    return math.copysign(area * math.sqrt(2.0 * oil.density(max(up, down)) * abs(up - down)), up - down)
+    return math.copysign(
+        area * math.sqrt(2.0 * oil.density(max(up, down)) * abs(up - down)), up - down
+    )
 
 
 def follow(rates, start, times, atol, breaks=(), step=np.inf):
@@ -59,7 +71,9 @@ def follow(rates, start, times, atol, breaks=(), step=np.inf):
     y, found = np.array(start, dtype=float), np.empty((len(start), len(times)))
     edges = [times[0], *breaks, times[-1]]
     for low, high in zip(edges, edges[1:], strict=False):
-        run = solve_ivp(rates, (low, high), y, "DOP853", rtol=1e-12, atol=atol, dense_output=True, max_step=step)
+        run = solve_ivp(
+            rates, (low, high), y, "DOP853", rtol=1e-12, atol=atol, dense_output=True, max_step=step
+        )
         inside = (times >= low) & (times <= high)
         found[:, inside], y = run.sol(times[inside]), run.y[:, -1]
     return found
@@ -67,7 +81,8 @@ def follow(rates, start, times, atol, breaks=(), step=np.inf):
 
 HEAT = 287.05 * 293.15
 SMALL = (
-    1e-3  # relative to upstream pressure: below it an odd quintic replaces the root, with two continuous derivatives
+    # relative to upstream pressure: below it an odd quintic replaces the root, with two continuous derivatives
+    1e-3
 )
 QUINTIC = np.linalg.solve([[1, 1, 1], [1, 3, 5], [0, 6, 20]], [1.0, 0.5, -0.25])
 

@@ -3,14 +3,30 @@
 from reference.scenes import AMBIENT, reservoir, scene
 
 VALVE = {"type": "valve", "from": "pool.near", "to": "river", "area": 0.05}
-PIPE = {"type": "pipe", "from": "pool.near", "to": "river", "length": 10.0, "diameter": 0.3, "cells": 5,
-        "wave_speed": 100.0, "friction": {"model": "steady", "factor": 0.02}}  # fmt: skip
+PIPE = {
+    "type": "pipe",
+    "from": "pool.near",
+    "to": "river",
+    "length": 10.0,
+    "diameter": 0.3,
+    "cells": 5,
+    "wave_speed": 100.0,
+    "friction": {"model": "steady", "factor": 0.02},
+}
 POOL = {
-    "type": "basin", "size": [4.0, 3.0], "cells": [8, 12], "level": 0.5, "manning": 0.02,
-    "bed": "0.6*exp(-((x-2)^2 + (y-1.4)^2))", "start": {"level": "0.5 + where(y < 1.2, 0.2, 0) + 0.02*x"},
-    "patches": {"near": {"side": "west"}, "far": {"side": "east", "boundary": "open"},
-                "top": {"side": "north", "span": [1.0, 2.0], "boundary": "open"}},
-}  # fmt: skip
+    "type": "basin",
+    "size": [4.0, 3.0],
+    "cells": [8, 12],
+    "level": 0.5,
+    "manning": 0.02,
+    "bed": "0.6*exp(-((x-2)^2 + (y-1.4)^2))",
+    "start": {"level": "0.5 + where(y < 1.2, 0.2, 0) + 0.02*x"},
+    "patches": {
+        "near": {"side": "west"},
+        "far": {"side": "east", "boundary": "open"},
+        "top": {"side": "north", "span": [1.0, 2.0], "boundary": "open"},
+    },
+}
 PROBES = ["pool.near.head", "near.flow", "pool.depth@1.1,1.3", "pool.u@3,2.9"]
 
 
@@ -27,16 +43,38 @@ MESH = {"cells": [60, 50], "holes": [[1.8, 1.2, 2.6, 1.8]]}  # 2880 cells: twelv
 
 
 def liquid(law="linear", scheme="muscl", boundary="open", **mesh):
-    block = {"type": "basin", "physics": "liquid", "size": [0.4, 0.5], "cells": [7, 15],
-             "pressure": 1e7, "thickness": 0.1,
-             "patches": {"near": {"side": "west", "span": [0.1, 0.3]},
-                         "far": {"side": "north", "boundary": boundary}}, **mesh}  # fmt: skip
+    block = {
+        "type": "basin",
+        "physics": "liquid",
+        "size": [0.4, 0.5],
+        "cells": [7, 15],
+        "pressure": 1e7,
+        "thickness": 0.1,
+        "patches": {
+            "near": {"side": "west", "span": [0.1, 0.3]},
+            "far": {"side": "north", "boundary": boundary},
+        },
+        **mesh,
+    }
     valve = {"type": "valve", "from": "pool.near", "to": "river", "area": 1e-4}
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8, "initial": "rest"}
     probes = ["near.flow", "pool.pressure@0.2,0.3", "pool.near.pressure"]
-    fluid = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0}
-    return scene({"pool": block, "river": reservoir(2e7)}, {"near": valve}, 3e-4, numerics, probes, every=1e-4,
-                 fluid=fluid | {"law": law})  # fmt: skip
+    fluid = {
+        "name": "user",
+        "density": 1000.0,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 2300.0,
+    }
+    return scene(
+        {"pool": block, "river": reservoir(2e7)},
+        {"near": valve},
+        3e-4,
+        numerics,
+        probes,
+        every=1e-4,
+        fluid=fluid | {"law": law},
+    )
 
 
 def dyed(scheme="muscl", mesh=None, **dye):
@@ -47,25 +85,49 @@ def dyed(scheme="muscl", mesh=None, **dye):
 
 
 def carried(scheme="muscl", diffusivity=0.0):
-    sheet = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [11, 12],
-             "velocity": {"expression": "swirl", "period": 1.0},
-             "scalars": {"dye": "exp(-20*((x-0.3)^2+(y-0.5)^2))"}}  # fmt: skip
+    sheet = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [1.0, 1.0],
+        "cells": [11, 12],
+        "velocity": {"expression": "swirl", "period": 1.0},
+        "scalars": {"dye": "exp(-20*((x-0.3)^2+(y-0.5)^2))"},
+    }
     numerics = {"scheme": scheme, "method": "ssp-rk3", "courant": 0.8}
     dye = {"unit": "mg/l", "diffusivity": diffusivity}
-    return scene({"sheet": sheet}, {}, 0.25, numerics, ["sheet.dye@0.3,0.5"], every=0.05, scalars={"dye": dye})
+    return scene(
+        {"sheet": sheet},
+        {},
+        0.25,
+        numerics,
+        ["sheet.dye@0.3,0.5"],
+        every=0.05,
+        scalars={"dye": dye},
+    )
 
 
 def lined(**numerics):
     """Case of delay lines between a basin, a chamber and a demand that stops, with jumps within steps."""
     case = water(
-        PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.3, probes=["pool.near.head", "air.pressure"], **numerics
+        PIPE | {"pipe_model": "delay-line", "to": "air"},
+        end=0.3,
+        probes=["pool.near.head", "air.pressure"],
+        **numerics,
     )
     del case["nodes"]["river"]
     case["nodes"] |= {
         "air": {"type": "chamber", "volume": 50.0},
-        "gate": {"type": "junction", "demand": {"time": [0.0, 0.0503], "value": [0.02, 0.0], "kind": "step"}},
+        "gate": {
+            "type": "junction",
+            "demand": {"time": [0.0, 0.0503], "value": [0.02, 0.0], "kind": "step"},
+        },
     }
-    case["links"]["far"] = PIPE | {"from": "air", "to": "gate", "length": 7.0, "pipe_model": "delay-line"}
+    case["links"]["far"] = PIPE | {
+        "from": "air",
+        "to": "gate",
+        "length": 7.0,
+        "pipe_model": "delay-line",
+    }
     return case
 
 

@@ -12,7 +12,8 @@ from reference.scenes import AMBIENT, reservoir, scene, valve
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
-SIDES = {"west": (0, 0), "east": (0, 1), "south": (1, 0), "north": (1, 1)}  # axis, and end of the rectangle along it
+# axis, and end of the rectangle along it
+SIDES = {"west": (0, 0), "east": (0, 1), "south": (1, 0), "north": (1, 1)}
 
 
 def model_of(case: dict) -> Model:
@@ -33,7 +34,12 @@ def straight(speed: float, end: float = 10.0) -> dict:
 
 def slowing(deceleration: float, duration: float = 10.0) -> dict:
     """Travel that comes to rest after `duration` by a constant deceleration."""
-    return {"start": 0.0, "duration": duration, "value": [0.0, 0.5 * deceleration * duration**2], "exponent": 2}
+    return {
+        "start": 0.0,
+        "duration": duration,
+        "value": [0.0, 0.5 * deceleration * duration**2],
+        "exponent": 2,
+    }
 
 
 def turning(angle, axis=(0, 0, 1), **more) -> dict:
@@ -53,8 +59,11 @@ def cart(mass=100.0, axis=(1, 0, 0), **more) -> dict:
 def on_sides(points: np.ndarray, ends: np.ndarray, size, sides=SIDES) -> dict[str, np.ndarray]:
     """Lines of each side of the rectangle (0, 0) to `size` : name -> int[k, 2]; ends : lines on its outline."""
     middle = points[ends].mean(axis=1)
-    return {side: ends[np.abs(middle[:, axis] - far * size[axis]) < 1e-9]
-            for side, (axis, far) in SIDES.items() if side in sides}  # fmt: skip
+    return {
+        side: ends[np.abs(middle[:, axis] - far * size[axis]) < 1e-9]
+        for side, (axis, far) in SIDES.items()
+        if side in sides
+    }
 
 
 def halved(size, cells) -> tuple[np.ndarray, list, dict]:
@@ -65,7 +74,11 @@ def halved(size, cells) -> tuple[np.ndarray, list, dict]:
 
 
 def run_in_two_parts(
-    case: dict, folder: Path, after: float, between: Callable[[Path], object] = lambda run: None, ok: bool = True
+    case: dict,
+    folder: Path,
+    after: float,
+    between: Callable[[Path], object] = lambda run: None,
+    ok: bool = True,
 ):
     """Run a case with an interruption and a resumption into `run`, and without into `whole`, where nothing is drawn.
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-OWN = "~/.cache/ms-playwright/chromium-*/chrome-linux*/chrome"  # folder of the browsers that Playwright installs
+# folder of the browsers that Playwright installs
+OWN = "~/.cache/ms-playwright/chromium-*/chrome-linux*/chrome"
 
 
 def chromium() -> str | None:
@@ -23,7 +24,9 @@ def chromium() -> str | None:
 @contextlib.contextmanager
 def browser():
     """Yield a started browser; skip the test if Playwright or Chromium is missing."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright here to drive a browser")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="no Playwright here to drive a browser"
+    )
     if (where := chromium()) is None:
         pytest.skip("no Chromium here: chromium, google-chrome or Playwright's own")
     with playwright.sync_playwright() as driver:
@@ -49,7 +52,9 @@ MM = 72.0 / 25.4  # points per millimetre
 
 def pages(pdf: bytes) -> list[list[tuple[float, str]]]:
     """Pieces of text of each page with their distances from the top edge [mm]."""
-    objects = {int(one[1]): one[2] for one in re.finditer(rb"\n(\d+) 0 obj\n(.*?)\nendobj", pdf, re.S)}
+    objects = {
+        int(one[1]): one[2] for one in re.finditer(rb"\n(\d+) 0 obj\n(.*?)\nendobj", pdf, re.S)
+    }
     fonts: dict[int, dict[int, str]] = {}
     found = []
     for page in objects.values():
@@ -59,7 +64,9 @@ def pages(pdf: bytes) -> list[list[tuple[float, str]]]:
         names = {name.decode(): int(at) for name, at in re.findall(rb"/(F\d+) (\d+) 0 R", page)}
         for at in names.values():
             if at not in fonts:
-                fonts[at] = letters(stream(objects, int(re.search(rb"/ToUnicode (\d+)", objects[at])[1])))
+                fonts[at] = letters(
+                    stream(objects, int(re.search(rb"/ToUnicode (\d+)", objects[at])[1]))
+                )
         text = stream(objects, int(re.search(rb"/Contents (\d+)", page)[1]))
         known = {name: fonts[at] for name, at in names.items()}
         found.append([((height - y) / MM, words) for y, words in pieces(text, known)])
@@ -79,7 +86,9 @@ def letters(table: str) -> dict[int, str]:
         found |= {int(a, 16): chr(int(b[:4], 16)) for a, b in re.findall(r"<(\w+)> <(\w+)>", block)}
     for block in re.findall(r"beginbfrange(.*?)endbfrange", table, re.S):
         for a, b, c in re.findall(r"<(\w+)> <(\w+)> <(\w+)>", block):
-            found |= {int(a, 16) + k: chr(int(c[:4], 16) + k) for k in range(int(b, 16) - int(a, 16) + 1)}
+            found |= {
+                int(a, 16) + k: chr(int(c[:4], 16) + k) for k in range(int(b, 16) - int(a, 16) + 1)
+            }
     return found
 
 
@@ -100,7 +109,9 @@ def pieces(text: str, fonts: dict[str, dict[int, str]]) -> list[tuple[float, str
             place = matrix(operands) @ at
         elif token == "Tj":
             glyphs = operands[-1].strip("<>")
-            words += "".join(font.get(int(glyphs[k : k + 4], 16), "?") for k in range(0, len(glyphs), 4))
+            words += "".join(
+                font.get(int(glyphs[k : k + 4], 16), "?") for k in range(0, len(glyphs), 4)
+            )
         elif token == "ET":
             found.append((float(place[2, 1]), words))
             words = ""
@@ -113,4 +124,6 @@ def pieces(text: str, fonts: dict[str, dict[int, str]]) -> list[tuple[float, str
 
 def matrix(operands: list[str]) -> np.ndarray:
     """Matrix [a b 0; c d 0; e f 1] of six numbers."""
-    return np.array([*map(float, operands[-6:])]).reshape(3, 2) @ np.eye(2, 3) + np.diag([0.0, 0.0, 1.0])
+    return np.array([*map(float, operands[-6:])]).reshape(3, 2) @ np.eye(2, 3) + np.diag(
+        [0.0, 0.0, 1.0]
+    )

@@ -9,9 +9,13 @@ from fvsolve.features.basins.advection import AdvectionGrid, GridFlows
 from fvsolve.features.basins.transport.lower import face_flows, grid_flows
 
 SCHEMES = {
-    "upwind": (rec.UPWIND, 0), "minmod": (rec.MUSCL, rec.MINMOD), "van-leer": (rec.MUSCL, rec.VAN_LEER),
-    "monotonized-central": (rec.MUSCL, rec.MONOTONIZED_CENTRAL), "upwind5": (rec.LINEAR, 0), "weno5": (rec.WENO5, 0),
-}  # fmt: skip
+    "upwind": (rec.UPWIND, 0),
+    "minmod": (rec.MUSCL, rec.MINMOD),
+    "van-leer": (rec.MUSCL, rec.VAN_LEER),
+    "monotonized-central": (rec.MUSCL, rec.MONOTONIZED_CENTRAL),
+    "upwind5": (rec.LINEAR, 0),
+    "weno5": (rec.WENO5, 0),
+}
 NONE = np.zeros(0)
 
 
@@ -19,7 +23,15 @@ class Carried:
     """Rectangle with given flows through its faces, and the rates of a scalar by a scheme."""
 
     def __init__(
-        self, scheme, mesh, flow_x, flow_y, outside=0.0, bounds=(-np.inf, np.inf), depth=NONE, diffusivity=0.0
+        self,
+        scheme,
+        mesh,
+        flow_x,
+        flow_y,
+        outside=0.0,
+        bounds=(-np.inf, np.inf),
+        depth=NONE,
+        diffusivity=0.0,
     ):
         grid = mesh.grid
         self.mesh, self.nx, self.ny, self.diffusivity = mesh, grid.nx, grid.ny, diffusivity
@@ -28,7 +40,9 @@ class Carried:
         self.outside = np.broadcast_to(outside, 2 * (self.nx + self.ny)).astype(float).copy()
         self.scheme, self.limiter = SCHEMES[scheme]
         size = self.nx, self.ny
-        self.work = np.full(max(advection.advection_work(*size), fifth_order.fifth_order_work(*size)), np.nan)
+        self.work = np.full(
+            max(advection.advection_work(*size), fifth_order.fifth_order_work(*size)), np.nan
+        )
         self.other = np.full(advection.diffusion_work(*size), np.nan)
         self.fastest = self.greatest_rate()
 
@@ -41,7 +55,10 @@ class Carried:
 
     def greatest_rate(self):
         """Greatest rate |u| kx + |v| ky over the cells, with the greater velocity of two opposite faces [1/s]."""
-        u, v = (np.abs(f.reshape(shape)) for f, shape in ((self.flow_x, (self.ny, -1)), (self.flow_y, (-1, self.nx))))
+        u, v = (
+            np.abs(f.reshape(shape))
+            for f, shape in ((self.flow_x, (self.ny, -1)), (self.flow_y, (-1, self.nx)))
+        )
         u, v = np.maximum(u[:, 1:], u[:, :-1]), np.maximum(v[1:], v[:-1])
         rates = self.kx * self.ky[:, None] * (u + v)
         depth = self.depth.reshape(rates.shape) if self.depth.size else 1.0
@@ -53,7 +70,7 @@ class Carried:
         if self.scheme in (rec.LINEAR, rec.WENO5):
             fifth_order.add_fifth_order(
                 self.scheme, self.grid, *field, self.bounds, self.fastest, s, self.work, rate
-            )  # fmt: skip
+            )
         if self.diffusivity:
             advection.grid_diffusion(self.grid, self.diffusivity, *field, s, self.other, rate)
         return rate
@@ -114,7 +131,9 @@ def enters(come, excess, slender, diffusivity, outside, depth, s):
     return come * own + excess
 
 
-def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring):
+def ring_rates(
+    nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, ax, ay, s, ring
+):
     """Inflow through every face of the boundary by advection and diffusion : ring float64[ring] [m2/s times value].
 
     ax, ay : excesses that `add_fifth_order` leaves in work[n:], in the order of flow_x and then of flow_y. They are
@@ -130,7 +149,9 @@ def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outsi
             h = depth[k] if depth.size > 0 else 1.0
             more = turn * ax[face] if ax.size > 0 else 0.0
             at = side * ny + j
-            ring[at] = enters(turn * flow_x[face], more, 0.5 * ky[j] / kx[i], diffusivity, outside[at], h, s[k])
+            ring[at] = enters(
+                turn * flow_x[face], more, 0.5 * ky[j] / kx[i], diffusivity, outside[at], h, s[k]
+            )
     for i in range(nx):
         for side in range(2):
             turn, face = (factor, i) if side == 0 else (-factor, last + i)
@@ -138,4 +159,6 @@ def ring_rates(nx, ny, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outsi
             h = depth[k] if depth.size > 0 else 1.0
             more = turn * ay[face] if ay.size > 0 else 0.0
             at = 2 * ny + side * nx + i
-            ring[at] = enters(turn * flow_y[face], more, 0.5 * kx[i] / ky[j], diffusivity, outside[at], h, s[k])
+            ring[at] = enters(
+                turn * flow_y[face], more, 0.5 * kx[i] / ky[j], diffusivity, outside[at], h, s[k]
+            )

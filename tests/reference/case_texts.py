@@ -76,13 +76,18 @@ from = "t"
 to = "gate"
 Kv = 1
 """
-CHAMBER = TANK.replace("tank", "chamber").replace("area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"')
+CHAMBER = TANK.replace("tank", "chamber").replace(
+    "area = 1\nlevel = 1", 'volume = 1\ninitial_pressure = "0 bar"'
+)
 
 
 def two_tanks():
     return {
         "fluid": {"name": "user", "density": 1000, "bulk_modulus": 2e9},
-        "nodes": {"a": {"type": "tank", "area": 1, "level": 2}, "b": {"type": "tank", "area": 1, "level": 1}},
+        "nodes": {
+            "a": {"type": "tank", "area": 1, "level": 2},
+            "b": {"type": "tank", "area": 1, "level": 1},
+        },
         "links": {"hole": {"type": "orifice", "from": "a", "to": "b", "area": 0.01}},
         "numerics": {"end": 10},
     }

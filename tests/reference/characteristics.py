@@ -52,11 +52,16 @@ class ValvePipe:
 
     def steady_mass_flow(self) -> float:
         """Mass flow at the start [kg/s], by bisection on the balance of the drops."""
-        low, high = 0.0, self.flow_area(-1.0) * math.sqrt(2 * self.density * (self.upstream - self.outside))
+        low, high = (
+            0.0,
+            self.flow_area(-1.0) * math.sqrt(2 * self.density * (self.upstream - self.outside)),
+        )
         for _ in range(200):
             m = (low + high) / 2
             at_valve = self.upstream - self.length * float(self.gradient(np.float64(m)))
-            most = self.flow_area(-1.0) * math.sqrt(2 * self.density * max(at_valve - self.outside, 0.0))
+            most = self.flow_area(-1.0) * math.sqrt(
+                2 * self.density * max(at_valve - self.outside, 0.0)
+            )
             low, high = (m, high) if most > m else (low, m)
         return (low + high) / 2
 
@@ -153,7 +158,9 @@ class Network:
                 break
         return dict(zip(names, p, strict=True)), m
 
-    def gate_pressure(self, demand: float, opening: Callable[[float], float], reach: float, end: float):
+    def gate_pressure(
+        self, demand: float, opening: Callable[[float], float], reach: float, end: float
+    ):
         """Times [s] and pressure at the gate [Pa] for a valve that follows `opening` from t = 0.
 
         The start is steady with the outflow `demand` [kg/s].

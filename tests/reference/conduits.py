@@ -44,7 +44,9 @@ def uniform_depth(q: float, n: float, slope: float, d: float) -> float:
     return brentq(lambda h: slope_of_friction(q, n, h, d) - slope, 1e-6 * d, 0.9 * d, xtol=1e-14)
 
 
-def backwater(q: float, n: float, slope: float, d: float, end: float, x: np.ndarray, loss: float = 0.0) -> np.ndarray:
+def backwater(
+    q: float, n: float, slope: float, d: float, end: float, x: np.ndarray, loss: float = 0.0
+) -> np.ndarray:
     """Depths at distances x upstream of a place with the depth `end`, by gradually varied flow.
 
     loss : coefficient of minor losses over the length [1/m], of q^2 / (2 g A^2)
@@ -67,7 +69,13 @@ def bore(h: float, q: float, d: float, a: float) -> tuple[float, float]:
 
     def momentum(behind):
         above = (behind - full) / slot
-        return crown + G * above * (full + 0.5 * slot * above) - low - q * q / before - q * q / (behind - before)
+        return (
+            crown
+            + G * above * (full + 0.5 * slot * above)
+            - low
+            - q * q / before
+            - q * q / (behind - before)
+        )
 
     behind = brentq(momentum, full * (1.0 + 1e-9), 2.0 * full, xtol=1e-15)
     return d + (behind - full) / slot, q / (behind - before)
@@ -107,4 +115,9 @@ class DamBreak:
         if s <= -celerity(self.left, self.d):
             return self.left
         total = riemann(self.left, self.d)
-        return brentq(lambda h: total - riemann(h, self.d) - celerity(h, self.d) - s, self.h, self.left, xtol=1e-12)
+        return brentq(
+            lambda h: total - riemann(h, self.d) - celerity(h, self.d) - s,
+            self.h,
+            self.left,
+            xtol=1e-12,
+        )

@@ -9,7 +9,9 @@ from scipy.integrate import quad, solve_ivp
 AMBIENT, RHO, BETA, MU = 101325.0, 870.0, 1.2e9, 0.028
 
 
-def valve_flow(area: float, share: float, p_up: float, p_down: float, rho: float, coefficient: float = 0.61) -> float:
+def valve_flow(
+    area: float, share: float, p_up: float, p_down: float, rho: float, coefficient: float = 0.61
+) -> float:
     """Mass flow [kg/s] by q = share Cd A sqrt(2 dp / rho), and by the polynomial of docs/parts.md in transition flow.
 
     Transition flow is below Reynolds number 10 of the full area.
@@ -65,13 +67,25 @@ class Jack:
         volumes = self.volumes(x)
         leak = self.leakage * (p_a - p_b) * self.density(max(p_a, p_b))
         into = [m + side * leak for m, side in zip(flows(t, p_a, p_b), (-1, 1), strict=True)]
-        squeeze = [1.0, 1.0] if self.law == "log" else [1.0 + (p - AMBIENT) / BETA for p in (p_a, p_b)]
+        squeeze = (
+            [1.0, 1.0] if self.law == "log" else [1.0 + (p - AMBIENT) / BETA for p in (p_a, p_b)]
+        )
         swept = (self.areas[0] * v, -self.areas[1] * v)
-        rise = [BETA / volumes[i] * (into[i] / self.density((p_a, p_b)[i]) - squeeze[i] * swept[i]) for i in (0, 1)]
-        force = self.thrust(p_a, p_b) - self.friction * v - self.stiffness * (x - self.free) - self.damping * v
+        rise = [
+            BETA / volumes[i] * (into[i] / self.density((p_a, p_b)[i]) - squeeze[i] * swept[i])
+            for i in (0, 1)
+        ]
+        force = (
+            self.thrust(p_a, p_b)
+            - self.friction * v
+            - self.stiffness * (x - self.free)
+            - self.damping * v
+        )
         return [*rise, v, (force + push(t, x, v)) / self.mass]
 
-    def trajectory(self, times, flows=lambda t, a, b: (0.0, 0.0), push=lambda t, x, v: 0.0, breaks=()):
+    def trajectory(
+        self, times, flows=lambda t, a, b: (0.0, 0.0), push=lambda t, x, v: 0.0, breaks=()
+    ):
         """(p_A, p_B, x, v) at times : float64[4, n], by SciPy's DOP853 with rtol 1e-12, restarted at `breaks`.
 
         The steps are short, because longer steps jump over the short laminar flow of an edge that opens.
@@ -79,8 +93,17 @@ class Jack:
         y = np.array([*self.pressures, self.x, self.v])
         found, edges = np.empty((4, len(times))), [times[0], *breaks, times[-1]]
         for low, high in zip(edges, edges[1:], strict=False):
-            run = solve_ivp(self.rates, (low, high), y, "DOP853", args=(flows, push), rtol=1e-12, dense_output=True,
-                            atol=[1e-4, 1e-4, 1e-14, 1e-12], max_step=(times[-1] - times[0]) / 3000)  # fmt: skip
+            run = solve_ivp(
+                self.rates,
+                (low, high),
+                y,
+                "DOP853",
+                args=(flows, push),
+                rtol=1e-12,
+                dense_output=True,
+                atol=[1e-4, 1e-4, 1e-14, 1e-12],
+                max_step=(times[-1] - times[0]) / 3000,
+            )
             inside = (times >= low) & (times <= high)
             found[:, inside] = run.sol(times[inside])
             y = run.y[:, -1]
@@ -107,7 +130,11 @@ class Jack:
 
         def speed_part(angle: float) -> float:
             x = middle + half * math.sin(angle)
-            return half * math.cos(angle) / math.sqrt(max(2.0 * (work(x) + energy) / self.mass, 1e-300))
+            return (
+                half
+                * math.cos(angle)
+                / math.sqrt(max(2.0 * (work(x) + energy) / self.mass, 1e-300))
+            )
 
         edge = math.pi / 2
         return 2.0 * quad(speed_part, -edge, edge, epsabs=0, epsrel=1e-12, limit=200)[0], low, high
@@ -118,7 +145,12 @@ class Jack:
         reach = 1e-7
         while work(self.x + side * reach) + energy > 0.0:
             reach *= 1.5
-        return brentq(lambda x: work(x) + energy, self.x + side * reach / 1.5, self.x + side * reach, xtol=1e-17)
+        return brentq(
+            lambda x: work(x) + energy,
+            self.x + side * reach / 1.5,
+            self.x + side * reach,
+            xtol=1e-17,
+        )
 
     def fluid_energy(self, x, p_a, p_b):
         """Energy V (beta (exp(p / beta) - 1) - p) of both chambers, p above ambient [J] (design.md, Ledgers)."""
@@ -130,26 +162,55 @@ class Jack:
     def nodes(self) -> dict:
         return {
             "ground": {"type": "frame"},
-            "load": {"type": "mass", "mass": self.mass, "initial_position": self.x, "initial_velocity": self.v},
+            "load": {
+                "type": "mass",
+                "mass": self.mass,
+                "initial_position": self.x,
+                "initial_velocity": self.v,
+            },
         }
 
     def links(self) -> dict:
         found = {
             "cyl": {
-                "type": "cylinder", "ports": {"rod": "load", "case": "ground"}, "stroke": self.stroke,
-                "area_A": self.areas[0], "area_B": self.areas[1], "dead_volume_A": self.dead[0],
-                "dead_volume_B": self.dead[1], "initial_pressure_A": self.pressures[0],
-                "initial_pressure_B": self.pressures[1], "leakage": self.leakage,
-                "viscous_friction": self.friction, **self.extra,
+                "type": "cylinder",
+                "ports": {"rod": "load", "case": "ground"},
+                "stroke": self.stroke,
+                "area_A": self.areas[0],
+                "area_B": self.areas[1],
+                "dead_volume_A": self.dead[0],
+                "dead_volume_B": self.dead[1],
+                "initial_pressure_A": self.pressures[0],
+                "initial_pressure_B": self.pressures[1],
+                "leakage": self.leakage,
+                "viscous_friction": self.friction,
+                **self.extra,
             }
-        }  # fmt: skip
+        }
         if self.stiffness:
-            found["spring"] = {"type": "spring", "from": "ground", "to": "load", "stiffness": self.stiffness,
-                               "free_length": self.free}  # fmt: skip
+            found["spring"] = {
+                "type": "spring",
+                "from": "ground",
+                "to": "load",
+                "stiffness": self.stiffness,
+                "free_length": self.free,
+            }
         if self.damping:
-            found["damper"] = {"type": "damper", "from": "ground", "to": "load", "damping": self.damping}
+            found["damper"] = {
+                "type": "damper",
+                "from": "ground",
+                "to": "load",
+                "damping": self.damping,
+            }
         return found
 
     def fluid(self) -> dict:
-        return {"name": "user", "density": RHO, "bulk_modulus": BETA, "viscosity": MU, "vapor_pressure": 1.0,
-                "law": self.law, "pressure": AMBIENT}  # fmt: skip
+        return {
+            "name": "user",
+            "density": RHO,
+            "bulk_modulus": BETA,
+            "viscosity": MU,
+            "vapor_pressure": 1.0,
+            "law": self.law,
+            "pressure": AMBIENT,
+        }

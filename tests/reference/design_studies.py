@@ -5,13 +5,23 @@ from reference.scenes import area, junction, lake, pipe, reservoir, scene, valve
 
 def throttled() -> dict:
     """Case of a lake, a main and an open tap, with limits on the pressure in the main."""
-    nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=10.0), "air": reservoir(1e5, elevation=10.0)}
+    nodes = {
+        "lake": lake(50.0, elevation=0.0),
+        "gate": junction(elevation=10.0),
+        "air": reservoir(1e5, elevation=10.0),
+    }
     rough = {"model": "quasi-steady", "roughness": 1e-4}
-    links = {"main": pipe("lake", "gate", 500.0, 0.2, 1000.0, 10, friction=rough),
-             "tap": valve("gate", "air", 0.02 * area(0.2))}  # fmt: skip
-    limits = {"top": {"on": "main", "quantity": "gauge_pressure", "maximum": "8 bar"},
-              "dry": {"on": "main", "minimum": "vacuum"}}  # fmt: skip
-    return scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate.pressure"], limits=limits)
+    links = {
+        "main": pipe("lake", "gate", 500.0, 0.2, 1000.0, 10, friction=rough),
+        "tap": valve("gate", "air", 0.02 * area(0.2)),
+    }
+    limits = {
+        "top": {"on": "main", "quantity": "gauge_pressure", "maximum": "8 bar"},
+        "dry": {"on": "main", "minimum": "vacuum"},
+    }
+    return scene(
+        nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate.pressure"], limits=limits
+    )
 
 
 STUDY = """

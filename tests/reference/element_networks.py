@@ -11,7 +11,14 @@ def network(nodes, links, end=1.0, probes=None, **more):
         nodes = GROUND | {name: {"type": "terminal"} for name in nodes.split()}
     numerics = {"end": end, "rtol": 1e-11, **more.pop("numerics", {})}
     output = {"every": end / 40} | ({"probes": probes} if probes else {})
-    return {"schema": 1, "nodes": nodes, "links": links, "numerics": numerics, "output": output, **more}
+    return {
+        "schema": 1,
+        "nodes": nodes,
+        "links": links,
+        "numerics": numerics,
+        "output": output,
+        **more,
+    }
 
 
 def two_port(kind, start, stop, **keys):

@@ -43,24 +43,65 @@ class Field:
 
     def shallow(self, scheme, plan, y, reflect=NONE, flow=NONE, wide=WIDE):
         """Return (rates, greatest rate); work starts as NaN, to detect values that are read before they are written."""
-        work, found = np.full(work_size(surface_mesh, self.integers), np.nan), np.full_like(y, np.nan)
-        kerbs, wide = surface_mesh.kerbs_of(self.mesh, plan[1] - plan[0]), min(wide, surface_mesh.MOST_OVERSHOOT)
-        water, states = surface_mesh.MeshWater(G, scheme, wide, plan, kerbs, None), tuple(np.ascontiguousarray(y))
+        work, found = (
+            np.full(work_size(surface_mesh, self.integers), np.nan),
+            np.full_like(y, np.nan),
+        )
+        kerbs, wide = (
+            surface_mesh.kerbs_of(self.mesh, plan[1] - plan[0]),
+            min(wide, surface_mesh.MOST_OVERSHOOT),
+        )
+        water, states = (
+            surface_mesh.MeshWater(G, scheme, wide, plan, kerbs, None),
+            tuple(np.ascontiguousarray(y)),
+        )
         rate = water_mesh_rates(
-            water, self.floats, self.integers, reflect, states, flow, NONE, work, tuple(found), self.band, None, None
+            water,
+            self.floats,
+            self.integers,
+            reflect,
+            states,
+            flow,
+            NONE,
+            work,
+            tuple(found),
+            self.band,
+            None,
+            None,
         )
         return found, rate
 
     def liquid(self, law, scheme, y, reflect=NONE, wide=WIDE, table=None):
-        work, found = np.full(work_size(liquid_mesh, self.integers), np.nan), np.full_like(y, np.nan)
-        fluid = LiquidScheme(C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide)
+        work, found = (
+            np.full(work_size(liquid_mesh, self.integers), np.nan),
+            np.full_like(y, np.nan),
+        )
+        fluid = LiquidScheme(
+            C, RHO, table, table is not None or law == LAW_LOG, scheme, 0, 0.0, wide
+        )
         states = tuple(np.ascontiguousarray(y))
         return found, mesh_rates(
-            fluid, self.bounded, self.integers, reflect, states, NONE, NONE, work, tuple(found), self.band, None, None
+            fluid,
+            self.bounded,
+            self.integers,
+            reflect,
+            states,
+            NONE,
+            NONE,
+            work,
+            tuple(found),
+            self.band,
+            None,
+            None,
         )
 
-    def advection(self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=WIDE, bounds=FREE):
-        work, found = np.full(advection_faces.work_size(self.integers), np.nan), np.full_like(s, np.nan)
+    def advection(
+        self, scheme, flow, s, outside=None, depth=NONE, diffusivity=0.0, wide=WIDE, bounds=FREE
+    ):
+        work, found = (
+            np.full(advection_faces.work_size(self.integers), np.nan),
+            np.full_like(s, np.nan),
+        )
         outside = np.zeros(len(self.edge)) if outside is None else outside
         flows, mesh = advection_faces.MeshFlows(1.0, flow, outside), (self.floats, self.integers)
         return found, advection_faces.advection_rates(
@@ -97,7 +138,12 @@ def triangles(path, nx, ny, size=(1.0, 1.0), shake=0.2, angle=0.0, quads=False) 
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     cells = corner_lists(mesh)
     cut = (
-        cells if quads else [c for k, (p, q, r, s) in enumerate(cells) for c in
-        ([[p, q, r], [p, r, s]] if k % 2 else [[p, q, s], [q, r, s]])]
-    )  # fmt: skip
+        cells
+        if quads
+        else [
+            c
+            for k, (p, q, r, s) in enumerate(cells)
+            for c in ([[p, q, r], [p, r, s]] if k % 2 else [[p, q, s], [q, r, s]])
+        ]
+    )
     return Field(read(write(path / f"{nx}x{ny}{quads}.vtk", points @ turn.T, cut)))

@@ -58,7 +58,8 @@ class Rays:
     pipes: dict[str, Pipe]
     reservoirs: dict[str, Schedule] = field(default_factory=dict)
     demands: dict[str, Schedule] = field(default_factory=dict)
-    outlets: dict[str, tuple[Schedule, float]] = field(default_factory=dict)  # flow area Cd A [m2], pressure
+    # flow area Cd A [m2], pressure
+    outlets: dict[str, tuple[Schedule, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._known: dict[tuple, float] = {}
@@ -80,7 +81,9 @@ class Rays:
         return (forward + backward) / 2, (forward - backward) / (2 * p.impedance * self.density)
 
     def _closed_node(self, node: str, t: float) -> float:
-        ends = [(n, e) for n, p in self.pipes.items() for e in ("start", "end") if getattr(p, e) == node]
+        ends = [
+            (n, e) for n, p in self.pipes.items() for e in ("start", "end") if getattr(p, e) == node
+        ]
         admittance = sum(1 / self.pipes[n].impedance for n, _ in ends)
         brought = sum(self._incoming(n, e, t) / self.pipes[n].impedance for n, e in ends)
         brought -= self.density * self.demands.get(node, held(0.0))(t)

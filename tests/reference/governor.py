@@ -65,7 +65,10 @@ def plant(reaches: int, end: float):
     """Time [s], head before the turbine [m], speed [rpm], opening and level of the shaft [m] : float64[n] each."""
     x, q0, level = steady()
     step = LENGTH / SPEED_OF_SOUND / reaches
-    wave, drag = SPEED_OF_SOUND / (GRAVITY * PENSTOCK), FACTOR * LENGTH / reaches / (2 * GRAVITY * BORE * PENSTOCK**2)
+    wave, drag = (
+        SPEED_OF_SOUND / (GRAVITY * PENSTOCK),
+        FACTOR * LENGTH / reaches / (2 * GRAVITY * BORE * PENSTOCK**2),
+    )
     head, flow = np.linspace(level, LAKE - LOSS * q0 * q0, reaches + 1), np.full(reaches + 1, q0)
     tunnel, turns, rows, states = q0, TURNS, [], np.array([x, x, x])
 
@@ -81,13 +84,18 @@ def plant(reaches: int, end: float):
         first = masses(level, tunnel, flow[0])
         new_level = level + step * first[0]
         second = masses(new_level, tunnel + step * first[1], (new_level - back[1]) / wave)
-        level, tunnel = level + step * 0.5 * (first[0] + second[0]), tunnel + step * 0.5 * (first[1] + second[1])
+        level, tunnel = (
+            level + step * 0.5 * (first[0] + second[0]),
+            tunnel + step * 0.5 * (first[1] + second[1]),
+        )
         load = np.interp([t, t + step], *LOAD)
         push = (torque_of(states[1], flow[-1], turns, head[-1] - TAIL) - load[0]) / INERTIA
         moved = governor(states, turns)
         guess, later_states = turns + step * push * 30 / pi, states + step * moved
         q = net_flow(later_states[1], guess, ahead[-2] - TAIL, wave)
-        later = (torque_of(later_states[1], q, guess, ahead[-2] - wave * q - TAIL) - load[1]) / INERTIA
+        later = (
+            torque_of(later_states[1], q, guess, ahead[-2] - wave * q - TAIL) - load[1]
+        ) / INERTIA
         states = states + step * 0.5 * (moved + governor(later_states, guess))
         turns += step * 0.5 * (push + later) * 30 / pi
         q = net_flow(states[1], turns, ahead[-2] - TAIL, wave)
@@ -101,8 +109,25 @@ if __name__ == "__main__":
     print("steady", steady())
     for reaches in (30, 60, 120):
         t, head, turns, opening, level = plant(reaches, 100.0)
-        print(reaches, "head", head.max(), t[head.argmax()], head.min(), "speed", turns.max(), t[turns.argmax()])
-        print("  least speed", turns.min(), t[turns.argmin()], "least opening", opening.min(), "level", level.max())
+        print(
+            reaches,
+            "head",
+            head.max(),
+            t[head.argmax()],
+            head.min(),
+            "speed",
+            turns.max(),
+            t[turns.argmax()],
+        )
+        print(
+            "  least speed",
+            turns.min(),
+            t[turns.argmin()],
+            "least opening",
+            opening.min(),
+            "level",
+            level.max(),
+        )
         for at in (4.0, 7.0, 10.0, 20.0, 60.0, 99.0):
             k = int(round(at / (t[1] - t[0])))
             print("  ", t[k], head[k], turns[k], opening[k], level[k])

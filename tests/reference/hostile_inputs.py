@@ -28,7 +28,13 @@ class Input(NamedTuple):
 
 def places(table: Any, path: tuple = ()) -> Iterator[tuple]:
     """Key paths of all values of nested tables and lists; of a list the first three items."""
-    items = table.items() if isinstance(table, dict) else enumerate(table[:3]) if isinstance(table, list) else ()
+    items = (
+        table.items()
+        if isinstance(table, dict)
+        else enumerate(table[:3])
+        if isinstance(table, list)
+        else ()
+    )
     for key, value in items:
         yield (*path, key)
         yield from places(value, (*path, key))
@@ -47,19 +53,65 @@ def number_of(value: Any) -> tuple[float, str] | None:
     return None
 
 
-SCALES = {"zero": 0.0, "negative": -1.0, "million": 1e6, "millionth": 1e-6, "1e30": 1e30, "1e-30": 1e-30, "1e99": 1e99}
-NUMBERS = {"1e300": 1e300, "1e-300": 1e-300, "least": 5e-324, "nan": float("nan"), "inf": float("inf"), "-0": -0.0,
-           "2**62": 2**62, "2**63": 2**63, "2**64": 2**64, "huge": HUGE, "-huge": -HUGE}  # fmt: skip
+SCALES = {
+    "zero": 0.0,
+    "negative": -1.0,
+    "million": 1e6,
+    "millionth": 1e-6,
+    "1e30": 1e30,
+    "1e-30": 1e-30,
+    "1e99": 1e99,
+}
+NUMBERS = {
+    "1e300": 1e300,
+    "1e-300": 1e-300,
+    "least": 5e-324,
+    "nan": float("nan"),
+    "inf": float("inf"),
+    "-0": -0.0,
+    "2**62": 2**62,
+    "2**63": 2**63,
+    "2**64": 2**64,
+    "huge": HUGE,
+    "-huge": -HUGE,
+}
 OTHERS = {
-    "text": "abc", "empty text": "", "flag": True, "table": {"a": 1.0}, "empty table": {}, "list": [1.0, 2.0],
-    "empty list": [], "list of lists": [[1.0], [2.0]], "list of tables": [{"a": 1}], "date": datetime.date(2026, 1, 1),
-    "schedule": {"time": [0.0, 1.0], "value": [1.0, 0.0]}, "formula": "sin(t)", "file": {"file": "nothing.csv"},
-    "control": {"control": "nothing"}, "signal": {"signal": "nothing"}, "5 kg": "5 kg", "3 barg": "3 barg",
-    "1e400 m": "1e400 m", "blanks": " " * 1000, "snowman": "\N{SNOWMAN}", "null character": "\0",
-    "long": "x" * 100_000, "blank text": "1" + " " * 100_000 + "x", "number": 5.0, "whole": 5, "digits": "1" * 100_000,
-    "digits m": "1" * 100_000 + " m", "brackets": "(" * 10_000, "plus": "1+" * 50_000 + "1", "commas": "," * 100_000,
-    "points": "." * 100_000, "path": "../../../../etc/passwd", "device": "/dev/zero", "folder": ".", "none": None,
-}  # fmt: skip
+    "text": "abc",
+    "empty text": "",
+    "flag": True,
+    "table": {"a": 1.0},
+    "empty table": {},
+    "list": [1.0, 2.0],
+    "empty list": [],
+    "list of lists": [[1.0], [2.0]],
+    "list of tables": [{"a": 1}],
+    "date": datetime.date(2026, 1, 1),
+    "schedule": {"time": [0.0, 1.0], "value": [1.0, 0.0]},
+    "formula": "sin(t)",
+    "file": {"file": "nothing.csv"},
+    "control": {"control": "nothing"},
+    "signal": {"signal": "nothing"},
+    "5 kg": "5 kg",
+    "3 barg": "3 barg",
+    "1e400 m": "1e400 m",
+    "blanks": " " * 1000,
+    "snowman": "\N{SNOWMAN}",
+    "null character": "\0",
+    "long": "x" * 100_000,
+    "blank text": "1" + " " * 100_000 + "x",
+    "number": 5.0,
+    "whole": 5,
+    "digits": "1" * 100_000,
+    "digits m": "1" * 100_000 + " m",
+    "brackets": "(" * 10_000,
+    "plus": "1+" * 50_000 + "1",
+    "commas": "," * 100_000,
+    "points": "." * 100_000,
+    "path": "../../../../etc/passwd",
+    "device": "/dev/zero",
+    "folder": ".",
+    "none": None,
+}
 REMOVED = ("missing", "renamed")
 SCALED = 0.5  # share of the changes of numbers by a factor
 
@@ -95,10 +147,23 @@ def changes(value: Any) -> list[str]:
 
 def tables() -> dict[str, tuple[dict, Path]]:
     """Shipped cases: name -> (table, folder)."""
-    return {path.stem: (tomllib.loads(path.read_text(encoding="utf-8")), path.parent) for path in CASES}
+    return {
+        path.stem: (tomllib.loads(path.read_text(encoding="utf-8")), path.parent) for path in CASES
+    }
 
 
-NAMED = ("nodes", "links", "signals", "controls", "scalars", "reactions", "limits", "routes", "expect", "defaults")
+NAMED = (
+    "nodes",
+    "links",
+    "signals",
+    "controls",
+    "scalars",
+    "reactions",
+    "limits",
+    "routes",
+    "expect",
+    "defaults",
+)
 
 
 def kinds_of_keys(known: dict[str, tuple[dict, Path]]) -> dict[tuple, dict[str, list[tuple]]]:
@@ -112,7 +177,11 @@ def kinds_of_keys(known: dict[str, tuple[dict, Path]]) -> dict[tuple, dict[str, 
             kind = tuple(0 if isinstance(key, int) else key for key in path)
             if len(path) > 1 and path[0] in NAMED:
                 part = table[path[0]].get(path[1])
-                kind = (path[0], str(part.get("type", "")) if isinstance(part, dict) else "", *kind[2:])
+                kind = (
+                    path[0],
+                    str(part.get("type", "")) if isinstance(part, dict) else "",
+                    *kind[2:],
+                )
             result.setdefault(kind, {}).setdefault(name, []).append(path)
     return result
 
@@ -128,8 +197,12 @@ def mutants(draw: random.Random, count: int) -> Iterator[Input]:
         value: Any = table
         for key in path:
             value = value[key]
-        change = draw.choice(list(SCALES) if number_of(value) and draw.random() < SCALED else changes(value))
-        yield Input(f"{name} {'.'.join(map(str, path))} {change}", mutant(table, path, change), folder)
+        change = draw.choice(
+            list(SCALES) if number_of(value) and draw.random() < SCALED else changes(value)
+        )
+        yield Input(
+            f"{name} {'.'.join(map(str, path))} {change}", mutant(table, path, change), folder
+        )
 
 
 SCENE = """[fluid]
@@ -238,7 +311,11 @@ def repeated(name: str, size: int, before: bool) -> Input:
     """Text with a repeated unit; before : True if it stands before a valid scene, else after it."""
     first, unit, last = REPEATED[name]
     count = size // len(unit)
-    middle = "".join(unit.replace("{n}", str(n)) for n in range(count)) if "{n}" in unit else unit * count
+    middle = (
+        "".join(unit.replace("{n}", str(n)) for n in range(count))
+        if "{n}" in unit
+        else unit * count
+    )
     text = first + middle + last
     text = text + SCENE if before else f"{SCENE}{text}"
     return Input(f"text {name} {size} {'before' if before else 'after'}", text=text)
@@ -246,14 +323,22 @@ def repeated(name: str, size: int, before: bool) -> Input:
 
 def texts(draw: random.Random, count: int) -> Iterator[Input]:
     """Texts of files: repeated units, noise in a scene, and bytes."""
-    every = [(name, size, before) for name in REPEATED for size in SIZES for before in (True, False)]
+    every = [
+        (name, size, before) for name in REPEATED for size in SIZES for before in (True, False)
+    ]
     draw.shuffle(every)
     for n in range(count):
         if n < len(every):
             yield repeated(*every[n])
         elif n % 2:
-            at, noise = draw.randrange(len(SCENE)), "".join(chr(draw.choice(range(1, 0x2FF))) for _ in range(8))
-            yield Input(f"text noise {at} {noise!r}", text=SCENE[:at] + noise + SCENE[at + draw.randrange(20) :])
+            at, noise = (
+                draw.randrange(len(SCENE)),
+                "".join(chr(draw.choice(range(1, 0x2FF))) for _ in range(8)),
+            )
+            yield Input(
+                f"text noise {at} {noise!r}",
+                text=SCENE[:at] + noise + SCENE[at + draw.randrange(20) :],
+            )
         else:
             content = draw.randbytes(draw.randrange(200))
             yield Input(f"text bytes {content!r}", text=content)

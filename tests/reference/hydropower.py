@@ -81,7 +81,10 @@ def plant(reaches: int, end: float):
     area, bore = pi / 4 * TUNNEL_BORE**2, pi / 4 * BORE**2
     q0, level, before = steady()
     step = LENGTH / SPEED_OF_SOUND / reaches
-    wave, drag = SPEED_OF_SOUND / (GRAVITY * bore), FACTOR * LENGTH / reaches / (2 * GRAVITY * BORE * bore**2)
+    wave, drag = (
+        SPEED_OF_SOUND / (GRAVITY * bore),
+        FACTOR * LENGTH / reaches / (2 * GRAVITY * BORE * bore**2),
+    )
     head, flow = np.linspace(level, before, reaches + 1), np.full(reaches + 1, q0)
     tunnel, omega, t, rows = q0, TURNS * pi / 30, 0.0, []
     for k in range(int(end / step) + 1):
@@ -91,18 +94,30 @@ def plant(reaches: int, end: float):
         ahead = head + wave * flow - drag * flow * np.abs(flow)
 
         def masses(level, tunnel, q):
-            loss = TUNNEL_FACTOR * TUNNEL / TUNNEL_BORE / (2 * GRAVITY * area**2) * tunnel * abs(tunnel)
+            loss = (
+                TUNNEL_FACTOR
+                * TUNNEL
+                / TUNNEL_BORE
+                / (2 * GRAVITY * area**2)
+                * tunnel
+                * abs(tunnel)
+            )
             return (tunnel - q) / SHAFT, GRAVITY * area / TUNNEL * (LAKE - level - loss)
 
         first = masses(level, tunnel, flow[0])
         new_level = level + step * first[0]
         second = masses(new_level, tunnel + step * first[1], (new_level - back[1]) / wave)
-        level, tunnel = level + step * 0.5 * (first[0] + second[0]), tunnel + step * 0.5 * (first[1] + second[1])
+        level, tunnel = (
+            level + step * 0.5 * (first[0] + second[0]),
+            tunnel + step * 0.5 * (first[1] + second[1]),
+        )
         x_new, turns = float(np.interp(t + step, *VANES)), omega * 30 / pi
         push = torque_of(x, flow[-1], turns, head[-1] - TAIL) / INERTIA if t >= TRIP else 0.0
         guess = turns + step * push * 30 / pi
         q = net_flow(x_new, guess, ahead[-2] - TAIL, wave)
-        later = torque_of(x_new, q, guess, ahead[-2] - wave * q - TAIL) / INERTIA if t >= TRIP else 0.0
+        later = (
+            torque_of(x_new, q, guess, ahead[-2] - wave * q - TAIL) / INERTIA if t >= TRIP else 0.0
+        )
         omega += step * 0.5 * (push + later)
         q = net_flow(x_new, omega * 30 / pi, ahead[-2] - TAIL, wave)
         inner_head, inner_flow = 0.5 * (ahead[:-2] + back[2:]), 0.5 * (ahead[:-2] - back[2:]) / wave
@@ -118,7 +133,15 @@ if __name__ == "__main__":
         print("steady", steady())
         for reaches in (60, 120, 240):
             t, head, flow, turns, level = plant(reaches, 120.0)
-            print(reaches, "head", head.max(), t[head.argmax()], "speed", turns.max(), t[turns.argmax()])
+            print(
+                reaches,
+                "head",
+                head.max(),
+                t[head.argmax()],
+                "speed",
+                turns.max(),
+                t[turns.argmax()],
+            )
             print("  level", level.max(), t[level.argmax()], level.min(), "least head", head.min())
             for at in (4.0, 7.2, 10.0, 15.0, 60.0, 119.0):
                 k = int(round(at / (t[1] - t[0])))

@@ -16,7 +16,9 @@ from scipy.optimize import brentq
 class Isentrope:
     """Isentrope of the liquid `name` between two pressures [Pa], by Chebyshev polynomials of degree 80."""
 
-    def __init__(self, name: str, temperature: float, pressure: float, low: float, high: float) -> None:
+    def __init__(
+        self, name: str, temperature: float, pressure: float, low: float, high: float
+    ) -> None:
         state = AbstractState("HEOS", name)
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
         entropy, self.low, self.high = state.smass(), low, high
@@ -26,7 +28,9 @@ class Isentrope:
             return state.rhomass(), state.speed_sound()
 
         def fitted(values) -> Chebyshev:
-            return Chebyshev.interpolate(lambda p: np.array([values(*at(q)) for q in p]), 80, (low, high))
+            return Chebyshev.interpolate(
+                lambda p: np.array([values(*at(q)) for q in p]), 80, (low, high)
+            )
 
         self.rho, self.c = fitted(lambda rho, c: rho), fitted(lambda rho, c: c)
         self.w = fitted(lambda rho, c: 1.0 / (rho * c)).integ()
@@ -52,14 +56,24 @@ class Riemann:
     def middle(self) -> tuple[float, float]:
         """Pressure [Pa] and velocity [m/s] between the two waves."""
         f, (pl, ul), (pr, ur) = self.fluid, self.left, self.right
-        p = brentq(lambda p: ul - ur - f.behind(p, pl) - f.behind(p, pr), f.low, f.high, xtol=1e-6, rtol=1e-15)
+        p = brentq(
+            lambda p: ul - ur - f.behind(p, pl) - f.behind(p, pr),
+            f.low,
+            f.high,
+            xtol=1e-6,
+            rtol=1e-15,
+        )
         return p, ul - f.behind(p, pl)
 
     def at(self, rays: np.ndarray) -> np.ndarray:
         """Density [kg/m3] and mass flow density [kg/(m2 s)] on rays x / t : float64[2, n]."""
         p, u = self.middle()
-        found = [self._wave(*self.right, p, u, ray, 1.0) if ray > u else self._wave(*self.left, p, u, ray, -1.0)
-                 for ray in rays]  # fmt: skip
+        found = [
+            self._wave(*self.right, p, u, ray, 1.0)
+            if ray > u
+            else self._wave(*self.left, p, u, ray, -1.0)
+            for ray in rays
+        ]
         rho = self.fluid.rho(np.array(found)[:, 0])
         return np.array([rho, rho * np.array(found)[:, 1]])
 

@@ -85,12 +85,25 @@ def slam(source, g, impedance, delay, far, span, time, t_end, kinks):
     now, y, held = 0.0, [1.0], 1
     times, rows, events = [], [], []
     while now < t_end - 1e-12:
-        end = next(k for k in [*sorted({*kinks, *np.arange(delay, t_end, delay)}), t_end] if k > now + 1e-12)
+        end = next(
+            k
+            for k in [*sorted({*kinks, *np.arange(delay, t_end, delay)}), t_end]
+            if k > now + 1e-12
+        )
         end = min(end, now + delay)
         watch = stop_events(push, held, 0)
         rate = (lambda s, z: [0.0]) if held else (lambda s, z: [push(s, z) / time])
-        step = solve_ivp(rate, (now, end), y, events=watch, method="DOP853", rtol=1e-9, atol=1e-10, dense_output=True,
-                         max_step=0.02)  # fmt: skip
+        step = solve_ivp(
+            rate,
+            (now, end),
+            y,
+            events=watch,
+            method="DOP853",
+            rtol=1e-9,
+            atol=1e-10,
+            dense_output=True,
+            max_step=0.02,
+        )
         pieces.append((step.t[-1], step.sol))
         for s in np.linspace(now, step.t[-1], 100)[:-1]:
             x = min(max(step.sol(s)[0], 0.0), 1.0)
@@ -116,7 +129,9 @@ def leaves_with_column(source, kink, g, beyond, span, disc, inertia, friction, f
     """
     start, s = brentq(lambda t: source(t) - beyond, kink - 1.0, kink, xtol=1e-15), 1e-4
     rise, root = (source(start + 1e-3) - source(start)) / 1e-3, math.sqrt(g * beyond)
-    lag, w, zeta = (disc.get(k, 0.0) for k in ("time_constant", "natural_frequency", "damping_ratio"))
+    lag, w, zeta = (
+        disc.get(k, 0.0) for k in ("time_constant", "natural_frequency", "damping_ratio")
+    )
     w *= 2.0 * math.pi
 
     def rates(t, y):
@@ -124,7 +139,11 @@ def leaves_with_column(source, kink, g, beyond, span, disc, inertia, friction, f
         drop = flow * abs(flow) / (g * x * x)
         drive = ((source(t) if felt == "source" else drop) - beyond) / span - x
         braked = (source(t) - drop - friction * flow * abs(flow)) / inertia
-        return [drive / lag, braked, 0.0] if lag else [speed, braked, w * (w * drive - 2.0 * zeta * speed)]
+        return (
+            [drive / lag, braked, 0.0]
+            if lag
+            else [speed, braked, w * (w * drive - 2.0 * zeta * speed)]
+        )
 
     if lag:
         x = 0.5 * rise * s**2 / (span * lag + (0.0 if felt == "source" else inertia * root))
@@ -145,7 +164,10 @@ def rates_of(source, lifted, g, stroke, inertia, friction):
 
     def rates(t, y):
         drop = (y[1] / y[0]) ** 2 / g
-        return [lifted(t, drop) / stroke, (source(t) - drop - friction * y[1] * abs(y[1])) / inertia]
+        return [
+            lifted(t, drop) / stroke,
+            (source(t) - drop - friction * y[1] * abs(y[1])) / inertia,
+        ]
 
     return rates
 
@@ -161,12 +183,15 @@ def stem_leaves_with_column(source, lifted, g, stroke, inertia, friction, start,
     steep = (lifted(start + s, drop) - lifted(start, source(start))) / s
     felt = lifted(start, 1.0) - lifted(start, 0.0)  # slope over the drop
     root = math.sqrt(g * drop)
-    x = 0.5 * steep * s**2 / (stroke + felt * inertia * root)  # stroke x' = steep s - felt inertia root x'
+    # stroke x' = steep s - felt inertia root x'
+    x = 0.5 * steep * s**2 / (stroke + felt * inertia * root)
 
     rates = rates_of(source, lifted, g, stroke, inertia, friction)
     y, now, found = [x, root * x], start + s, {}
     for end in [*(k for k in kinks if k > now), max(at)]:
-        step = solve_ivp(rates, (now, end), y, method="Radau", rtol=1e-10, atol=1e-14, dense_output=True)
+        step = solve_ivp(
+            rates, (now, end), y, method="Radau", rtol=1e-10, atol=1e-14, dense_output=True
+        )
         found |= {t: step.sol(t) for t in at if now <= t <= end}
         now, y = end, step.y[:, -1]
     return np.array([found[t] for t in at]).T

@@ -7,5 +7,14 @@ EXACT = {"pipe_model": "finite-volume", "scheme": "upwind", "method": "euler", "
 
 
 def line(one: str, other: str, length: float, bore: float = 0.3, **keys) -> dict:
-    return {"type": "pipe", "from": one, "to": other, "length": length, "diameter": bore, "wave_speed": SPEED,
-            "friction": NO_FRICTION, "cells": 10, **keys}  # fmt: skip
+    return {
+        "type": "pipe",
+        "from": one,
+        "to": other,
+        "length": length,
+        "diameter": bore,
+        "wave_speed": SPEED,
+        "friction": NO_FRICTION,
+        "cells": 10,
+        **keys,
+    }

@@ -5,9 +5,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fvsolve.core.kernels.dtypes import LINEAR, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.core.kernels.dtypes import (
+    LINEAR,
+    MINMOD,
+    MONOTONIZED_CENTRAL,
+    MUSCL,
+    UPWIND,
+    VAN_LEER,
+    WENO5,
+)
 from fvsolve.features.basins.liquid import liquid_grid
-from fvsolve.features.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, side_kinds, work_size
+from fvsolve.features.basins.liquid.liquid_sides import (
+    LiquidGrid,
+    LiquidScheme,
+    side_kinds,
+    work_size,
+)
 
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}
 LIMITERS = {"minmod": MINMOD, "van-leer": VAN_LEER, "monotonized-central": MONOTONIZED_CENTRAL}
@@ -31,7 +44,8 @@ class Box:
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Edges of columns and of rows [m]."""
         x, y = (
-            size * np.arange(n + 1) / n + size * self.stretch * np.sin(2 * np.pi * np.arange(n + 1) / n) / (2 * np.pi)
+            size * np.arange(n + 1) / n
+            + size * self.stretch * np.sin(2 * np.pi * np.arange(n + 1) / n) / (2 * np.pi)
             for n, size in zip((self.nx, self.ny), self.size, strict=True)
         )
         return x, y
@@ -43,8 +57,12 @@ class Box:
         if isinstance(reflect, float):
             reflect = np.full(2 * (self.nx + self.ny), reflect)
         small = 1e-18 * C**2 * (1.0 if self.log else RHO**2)
-        fluid = LiquidScheme(C, RHO, table, self.log, SCHEMES[self.scheme], LIMITERS[self.limiter], small, 1.0)
-        grid = LiquidGrid(self.nx, self.ny, 0, self.ny, kx, ky, reflect, side_kinds(reflect, self.nx, self.ny))
+        fluid = LiquidScheme(
+            C, RHO, table, self.log, SCHEMES[self.scheme], LIMITERS[self.limiter], small, 1.0
+        )
+        grid = LiquidGrid(
+            self.nx, self.ny, 0, self.ny, kx, ky, reflect, side_kinds(reflect, self.nx, self.ny)
+        )
         work, found = np.full(work_size(self.nx), np.nan), np.full((3, self.nx * self.ny), np.nan)
         states = tuple(np.ascontiguousarray(state).reshape(3, -1))
         kernel = liquid_grid.nonlinear_grid_rates if self.log else liquid_grid.linear_grid_rates
@@ -66,7 +84,10 @@ class Box:
         """Cell averages of function(x, y) -> (r, m, n) by Gauss points."""
         nodes, weights = np.polynomial.legendre.leggauss(points)
         (x, wx), (y, wy) = (
-            ((e[:-1, None] + np.diff(e)[:, None] * (nodes + 1) / 2).ravel(), np.tile(weights / 2, len(e) - 1))
+            (
+                (e[:-1, None] + np.diff(e)[:, None] * (nodes + 1) / 2).ravel(),
+                np.tile(weights / 2, len(e) - 1),
+            )
             for e in self.edges()
         )
         values = np.array(np.broadcast_arrays(*function(*np.meshgrid(x, y)))) * np.outer(wy, wx)

@@ -102,7 +102,9 @@ class SimpleWave:
         stretch = 1 + self.slope(x) * t / 2
         rho = self._rho(x)
         width = np.diff(edges)
-        mean = [((q * stretch) @ weights) * half[:, 0] / width for q in (rho, rho * self.velocity(x))]
+        mean = [
+            ((q * stretch) @ weights) * half[:, 0] / width for q in (rho, rho * self.velocity(x))
+        ]
         return mean[0], mean[1]
 
     def breaks(self, x: Array) -> float:

@@ -48,5 +48,7 @@ def courant_limit(method: str, unit: np.ndarray, steps: int) -> float:
     low, high = 0.0, 8.0
     for _ in range(40):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if growth(method, middle * unit, steps) <= THRESHOLD else (low, middle)
+        low, high = (
+            (middle, high) if growth(method, middle * unit, steps) <= THRESHOLD else (low, middle)
+        )
     return low

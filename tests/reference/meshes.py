@@ -22,7 +22,10 @@ def write(path, points, cells, groups=None, **options):
     groups = groups or {}
     points = np.asarray(points, float)
     points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-    lines = [(np.reshape(ends, (-1, 2)), k + 1 if name else 0) for k, (name, ends) in enumerate(groups.items())]
+    lines = [
+        (np.reshape(ends, (-1, 2)), k + 1 if name else 0)
+        for k, (name, ends) in enumerate(groups.items())
+    ]
     blocks = [("line", ends) for ends, _ in lines]
     tags = [np.full(len(ends), tag) for ends, tag in lines]
     for kind, count in (("triangle", 3), ("quad", 4)):
@@ -44,7 +47,9 @@ def corner_lists(mesh):
 
 def delaunay(seed=3, count=60):
     """Random points in the unit square with its corners, and their Delaunay triangles."""
-    points = np.vstack([[(0, 0), (1, 0), (0, 1), (1, 1)], np.random.default_rng(seed).random((count, 2))])
+    points = np.vstack(
+        [[(0, 0), (1, 0), (0, 1), (1, 1)], np.random.default_rng(seed).random((count, 2))]
+    )
     return points, Delaunay(points).simplices
 
 
@@ -117,16 +122,22 @@ $EndElements
 Box = tuple[float, float, float, float]
 
 
-def triangles(size: Sequence[float], spacing: float, holes: Sequence[Box] = ()) -> tuple[np.ndarray, np.ndarray]:
+def triangles(
+    size: Sequence[float], spacing: float, holes: Sequence[Box] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Points float64[p, 2] and anticlockwise triangles int[n, 3] of a rectangle with rectangular holes [m].
 
     Edges of the rectangle and of the holes are divided evenly; the inner points form a lattice of equilateral
     triangles.
     """
     outlines = [(0.0, 0.0, *size), *holes]
-    edge = np.unique(np.round(np.concatenate([around(box, spacing) for box in outlines]), 9), axis=0)
+    edge = np.unique(
+        np.round(np.concatenate([around(box, spacing) for box in outlines]), 9), axis=0
+    )
     x, y = np.meshgrid(
-        np.arange(0.0, size[0], spacing), np.arange(0.0, size[1], 0.5 * np.sqrt(3.0) * spacing), indexing="ij"
+        np.arange(0.0, size[0], spacing),
+        np.arange(0.0, size[1], 0.5 * np.sqrt(3.0) * spacing),
+        indexing="ij",
     )
     x = x + 0.5 * spacing * (np.arange(x.shape[1]) % 2)
     inner = np.column_stack([x.ravel(), y.ravel()])
@@ -168,7 +179,9 @@ def boundary(cells: np.ndarray) -> np.ndarray:
     return found[count == 1]
 
 
-def write_msh(path: Path, points: np.ndarray, cells: np.ndarray, groups: dict[str, Callable]) -> None:
+def write_msh(
+    path: Path, points: np.ndarray, cells: np.ndarray, groups: dict[str, Callable]
+) -> None:
     """Write a Gmsh file of triangles.
 
     groups : name -> predicate of the midpoints (x, y) of boundary edges; the first group whose predicate is true
@@ -182,12 +195,16 @@ def write_msh(path: Path, points: np.ndarray, cells: np.ndarray, groups: dict[st
     for k, rule in reversed(list(enumerate(groups.values()))):
         tag[rule(x, y)] = k + 1
     names = [*groups, "wall"]
-    field = {name: np.array([k + 1, 1]) for k, name in enumerate(names)} | {"cells": np.array([len(names) + 1, 2])}
+    field = {name: np.array([k + 1, 1]) for k, name in enumerate(names)} | {
+        "cells": np.array([len(names) + 1, 2])
+    }
     tags = [tag, np.full(len(cells), len(names) + 1)]
     meshio.Mesh(
-        np.column_stack([points, np.zeros(len(points))]), [("line", lines), ("triangle", cells)],
-        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}, field_data=field,
-    ).write(path, file_format="gmsh22", binary=False)  # fmt: skip
+        np.column_stack([points, np.zeros(len(points))]),
+        [("line", lines), ("triangle", cells)],
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data=field,
+    ).write(path, file_format="gmsh22", binary=False)
 
 
 BLOCKS = ((18.0, 6.0, 24.0, 12.0), (18.0, 18.0, 24.0, 24.0), (33.0, 12.0, 39.0, 18.0))
@@ -196,6 +213,8 @@ BLOCKS = ((18.0, 6.0, 24.0, 12.0), (18.0, 18.0, 24.0, 24.0), (33.0, 12.0, 39.0, 
 def flood_plain(path: Path) -> None:
     """Write the mesh of cases/flooding.toml: 60 m by 30 m, three houses, west edge `breach`, east edge `drain`."""
     points, cells = triangles((60.0, 30.0), 1.5, BLOCKS)
-    groups = {"breach": lambda x, y: (x < 1e-6) & (np.abs(y - 15.0) < 3.0), "drain": lambda x,
-              y: (x > 60.0 - 1e-6) & (np.abs(y - 15.0) < 5.0)}  # fmt: skip
+    groups = {
+        "breach": lambda x, y: (x < 1e-6) & (np.abs(y - 15.0) < 3.0),
+        "drain": lambda x, y: (x > 60.0 - 1e-6) & (np.abs(y - 15.0) < 5.0),
+    }
     write_msh(path, points, cells, groups)

@@ -43,6 +43,9 @@ def place_in_list(mark, values: dict) -> tuple[int, int]:
     """Length of the list of a mark `parametrize`, and the index of the values of a test in it."""
     names, rows = mark.args[0], list(mark.args[1])
     names = [name.strip() for name in names.split(",")] if isinstance(names, str) else names
-    rows = [row.values if isinstance(row, ParameterSet) else (row,) if len(names) == 1 else row for row in rows]
+    rows = [
+        row.values if isinstance(row, ParameterSet) else (row,) if len(names) == 1 else row
+        for row in rows
+    ]
     same = [all(own is values[name] for name, own in zip(names, row, strict=True)) for row in rows]
     return len(rows), same.index(True)

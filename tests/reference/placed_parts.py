@@ -6,21 +6,47 @@ from reference.scenes import area, junction, lake, pipe, reservoir, scene, step,
 
 DIAMETER, SPEED, CELLS = 0.4, 1000.0, 60
 ROUGH = {"model": "quasi-steady", "roughness": 2e-4}
-HILL = {"chainage": [1000.0, 1750.0, 2200.0, 2300.0, 4000.0], "elevation": [30.0, 42.0, 65.0, 31.0, 20.0]}
+HILL = {
+    "chainage": [1000.0, 1750.0, 2200.0, 2300.0, 4000.0],
+    "elevation": [30.0, 42.0, 65.0, 31.0, 20.0],
+}
 LENGTH = 3000.0
 
 
 def line(nodes: dict, links: dict, **more) -> dict:
     """Case of a lake, given nodes and links up to a gate, and a valve that closes to 20 %."""
-    nodes = {"lake": lake(110.0, elevation=30.0), "gate": junction(elevation=20.0),
-             "sea": reservoir(2e5, elevation=20.0)} | nodes  # fmt: skip
+    nodes = {
+        "lake": lake(110.0, elevation=30.0),
+        "gate": junction(elevation=20.0),
+        "sea": reservoir(2e5, elevation=20.0),
+    } | nodes
     links = links | {"tap": valve("gate", "sea", 0.02 * area(DIAMETER), step(0.5, 1.0, 0.2))}
-    return scene(nodes, links, 6.0, {"scheme": "weno5", "method": "rk4", "step": 0.02},
-                 ["gate.pressure", "tap.flow"], every=0.1, **more)  # fmt: skip
+    return scene(
+        nodes,
+        links,
+        6.0,
+        {"scheme": "weno5", "method": "rk4", "step": 0.02},
+        ["gate.pressure", "tap.flow"],
+        every=0.1,
+        **more,
+    )
 
 
 def main(**more) -> dict:
-    return pipe("lake", "gate", LENGTH, DIAMETER, SPEED, CELLS, friction=ROUGH, profile=HILL, minor_loss=3.0) | more
+    return (
+        pipe(
+            "lake",
+            "gate",
+            LENGTH,
+            DIAMETER,
+            SPEED,
+            CELLS,
+            friction=ROUGH,
+            profile=HILL,
+            minor_loss=3.0,
+        )
+        | more
+    )
 
 
 VENT = {"type": "air-valve", "inlet": 0.05, "outlet": 0.05}
@@ -41,5 +67,10 @@ def placed(turned: bool = False, bends: list | None = None, **more) -> dict:
         one |= {"from": "gate", "to": "lake", "profile": mirrored}
     said = {name: {"on": "main", "at": at[name]} for name in at}
     nodes = {"top": VENT | said["top"]}
-    links = {"safe": SAFE | said["safe"], "hole": HOLE | said["hole"], "main": one, "half": GATE | said["half"]}
+    links = {
+        "safe": SAFE | said["safe"],
+        "hole": HOLE | said["hole"],
+        "main": one,
+        "half": GATE | said["half"],
+    }
     return line(nodes, links, **more)

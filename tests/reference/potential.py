@@ -17,7 +17,9 @@ def added(side, depth, low, square, gravity, turns, is_round, n=40):
     The result of a box is per length of its second side; that of a cylinder of diameter `side` is its total.
     low : height of the bed over the axis of rotation; square : w^2
     """
-    coarse, fine = (of_mesh(side, depth, low, square / gravity, turns, is_round, k) for k in (n, 2 * n))
+    coarse, fine = (
+        of_mesh(side, depth, low, square / gravity, turns, is_round, k) for k in (n, 2 * n)
+    )
     return (4.0 * fine - coarse) / 3.0 * (np.pi if is_round else 1.0)
 
 
@@ -28,21 +30,34 @@ def of_mesh(side, depth, low, per, turns, is_round, n):
     """
     wide = 0.5 * side if is_round else side
     many = int(np.clip(n * depth / wide, 8, 3 * n))
-    x, z = np.linspace(wide - side if not is_round else 0.0, wide, n + 1), np.linspace(0.0, depth, many + 1)
+    x, z = (
+        np.linspace(wide - side if not is_round else 0.0, wide, n + 1),
+        np.linspace(0.0, depth, many + 1),
+    )
     x = x if is_round else x - 0.5 * (x[0] + x[-1])
-    hx, hz, node = x[1] - x[0], z[1] - z[0], np.arange((n + 1) * (many + 1)).reshape(many + 1, n + 1)
+    hx, hz, node = (
+        x[1] - x[0],
+        z[1] - z[0],
+        np.arange((n + 1) * (many + 1)).reshape(many + 1, n + 1),
+    )
     i, j = (one.ravel() for one in np.meshgrid(np.arange(n), np.arange(many)))
     corners = np.stack([node[j, i], node[j, i + 1], node[j + 1, i + 1], node[j + 1, i]], axis=1)
     own, load = np.zeros((i.size, 4, 4)), np.zeros(node.size)
     for a in GAUSS:
         for b in GAUSS:
-            at = 0.25 * np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)])
+            at = 0.25 * np.array(
+                [(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)]
+            )
             dx = 0.5 / hx * np.array([b - 1, 1 - b, 1 + b, -1 - b])
             dz = 0.5 / hz * np.array([a - 1, -1 - a, 1 + a, 1 - a])
             r = x[i] + 0.5 * hx * (a + 1.0) if is_round else np.ones(i.size)
             own += 0.25 * hx * hz * r[:, None, None] * (np.outer(dx, dx) + np.outer(dz, dz))
             own += 0.25 * hx * hz / r[:, None, None] * np.outer(at, at) if is_round else 0.0
-    rows, columns, values = [np.repeat(corners, 4, axis=1)], [np.tile(corners, (1, 4))], [own.reshape(-1, 16)]
+    rows, columns, values = (
+        [np.repeat(corners, 4, axis=1)],
+        [np.tile(corners, (1, 4))],
+        [own.reshape(-1, 16)],
+    )
     for a in GAUSS:
         two = 0.5 * np.array([1.0 - a, 1.0 + a])
         far, high = x[:-1] + 0.5 * hx * (a + 1.0), z[:-1] + 0.5 * hz * (a + 1.0) + low
@@ -59,6 +74,8 @@ def of_mesh(side, depth, low, per, turns, is_round, n):
             if turns:
                 np.add.at(load, node[0, k : n + k], 0.5 * hx * two[k] * far * r)
     places = tuple(np.concatenate([one.ravel() for one in part]) for part in (rows, columns))
-    matrix = coo_array((np.concatenate([one.ravel() for one in values]), places), shape=(node.size,) * 2).tocsr()
+    matrix = coo_array(
+        (np.concatenate([one.ravel() for one in values]), places), shape=(node.size,) * 2
+    ).tocsr()
     free = np.setdiff1d(node, node[:, 0]) if is_round else node.ravel()
     return load[free] @ spsolve(matrix[free][:, free].tocsc(), load[free])

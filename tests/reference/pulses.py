@@ -25,8 +25,14 @@ def pressure(x: float, t: float) -> float:
     total = 0.0
     for k in range(10):
         sign = (-1.0) ** k
-        ahead, behind = t - (LENGTH - x + 2 * k * LENGTH) / SPEED, t - (LENGTH + x + 2 * k * LENGTH) / SPEED
-        total += sign * ((float(pulse(ahead)) if ahead > 0 else 0.0) - (float(pulse(behind)) if behind > 0 else 0.0))
+        ahead, behind = (
+            t - (LENGTH - x + 2 * k * LENGTH) / SPEED,
+            t - (LENGTH + x + 2 * k * LENGTH) / SPEED,
+        )
+        total += sign * (
+            (float(pulse(ahead)) if ahead > 0 else 0.0)
+            - (float(pulse(behind)) if behind > 0 else 0.0)
+        )
     return 3e5 - z * total
 
 
@@ -37,7 +43,9 @@ def case(cells: int = 20, exact: bool = True, points: int = FINE, **numerics) ->
     links = {"main": scenes.pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells)}
     nodes = {"lake": scenes.reservoir(3e5), "gate": scenes.junction(table(points))}
     more = {"exact": {"name": "rays"}} if exact else {}
-    return scenes.scene(nodes, links, END, given, ["gate.pressure", "main.pressure@0.37"], every=0.005, **more)
+    return scenes.scene(
+        nodes, links, END, given, ["gate.pressure", "main.pressure@0.37"], every=0.005, **more
+    )
 
 
 def front(cells: int = 50, **numerics) -> dict:
@@ -45,4 +53,6 @@ def front(cells: int = 50, **numerics) -> dict:
     given = {"scheme": "upwind", "method": "verner-7", "courant": 0.5, "end": 0.07, **numerics}
     links = {"main": scenes.pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells)}
     nodes = {"lake": scenes.reservoir(3e5), "gate": scenes.junction(scenes.step(0.02, 0.05, 0.0))}
-    return scenes.scene(nodes, links, given["end"], given, ["gate.pressure"], every=0.005, exact={"name": "rays"})
+    return scenes.scene(
+        nodes, links, given["end"], given, ["gate.pressure"], every=0.005, exact={"name": "rays"}
+    )

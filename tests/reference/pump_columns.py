@@ -26,7 +26,14 @@ def column(lift: float, end: float, probes, numerics=None, **keys) -> dict:
     nodes = {"sump": lake(0.0), "out": junction(), "top": lake(lift)}
     rigid = {"type": "rigid-column", "from": "out", "to": "top", "length": LENGTH, "diameter": BORE}
     rigid["friction"] = {"model": "steady", "factor": FACTOR}
-    return scene(nodes, {"pump": pump("sump", "out", **keys), "main": rigid}, end, numerics or TIGHT, probes, 0.05)
+    return scene(
+        nodes,
+        {"pump": pump("sump", "out", **keys), "main": rigid},
+        end,
+        numerics or TIGHT,
+        probes,
+        0.05,
+    )
 
 
 def column_truth(lift, n0, q0, trip, end, head=head, torque=torque, check=False):
@@ -40,7 +47,13 @@ def column_truth(lift, n0, q0, trip, end, head=head, torque=torque, check=False)
 
     stop = lambda t, y: y[1]  # noqa: E731
     stop.terminal, stop.direction = check, -1
-    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14, "dense_output": True, "events": stop}
+    options = {
+        "method": "DOP853",
+        "rtol": 1e-12,
+        "atol": 1e-14,
+        "dense_output": True,
+        "events": stop,
+    }
     return solve_ivp(rate, (trip, end), [n0, q0], **options)
 
 

@@ -40,7 +40,9 @@ def head(n: float, q: float) -> float:
 def torque(n: float, q: float) -> float:
     """Torque at positive speed and flow [N m], large enough that the efficiency is at most that of the rated point."""
     v = q / FLOWS[0]
-    by_table = (n * n + v * v) * float(np.interp(math.atan2(v, n), np.linspace(0.0, math.pi / 2, len(WB)), WB))
+    by_table = (n * n + v * v) * float(
+        np.interp(math.atan2(v, n), np.linspace(0.0, math.pi / 2, len(WB)), WB)
+    )
     return RATED * max(by_table, v * head(n, q) / HEADS[0] / n)
 
 
@@ -78,10 +80,14 @@ def pump_flow(n: float, lift: float) -> float:
 
 def gas_head(volume: float, first: float) -> float:
     """Gauge head of the air in the vessel [m], which is `first` at the volume GAS."""
-    return ((AMBIENT + RHO * GRAVITY * first) * (GAS / volume) ** POLYTROPIC - AMBIENT) / (RHO * GRAVITY)
+    return ((AMBIENT + RHO * GRAVITY * first) * (GAS / volume) ** POLYTROPIC - AMBIENT) / (
+        RHO * GRAVITY
+    )
 
 
-def at_vessel(n: float, meet: float, impedance: float, known: float, first: float, dt: float) -> tuple[float, float]:
+def at_vessel(
+    n: float, meet: float, impedance: float, known: float, first: float, dt: float
+) -> tuple[float, float]:
     """Flow into the main [m3/s] and head [m] at a vessel behind the pump.
 
     The new air volume is `known` minus dt / 2 times the inflow of the vessel.
@@ -115,13 +121,20 @@ def run(reaches: int, end: float, vessel: bool = False) -> dict[str, np.ndarray]
             now = new_q * np.abs(new_q)
             cp = plus[:-1] - 0.5 * impedance * drag * (loss[:-1] + now[1:])
             cm = minus[1:] + 0.5 * impedance * drag * (loss[1:] + now[:-1])
-            new_h[1:-1], new_q[1:-1] = 0.5 * (cp[:-1] + cm[1:]), 0.5 * (cp[:-1] - cm[1:]) / impedance
+            new_h[1:-1], new_q[1:-1] = (
+                0.5 * (cp[:-1] + cm[1:]),
+                0.5 * (cp[:-1] - cm[1:]) / impedance,
+            )
             new_h[-1], new_q[-1] = TOP, (cp[-1] - TOP) / impedance
             if t > TRIP + 0.5 * dt:
                 now_pumped = pump_flow(new_n, new_h[0] - SUMP)
-                new_n = n - 0.5 * dt / (INERTIA * OMEGA) * (torque(n, pumped) + torque(new_n, now_pumped))
+                new_n = n - 0.5 * dt / (INERTIA * OMEGA) * (
+                    torque(n, pumped) + torque(new_n, now_pumped)
+                )
             if vessel:
-                new_q[0], new_h[0] = at_vessel(new_n, cm[0], impedance, air - 0.5 * dt * enters, first, dt)
+                new_q[0], new_h[0] = at_vessel(
+                    new_n, cm[0], impedance, air - 0.5 * dt * enters, first, dt
+                )
             else:
                 new_q[0], new_h[0] = at_pump(new_n, cm[0], impedance)
         q, h, n, pumped = new_q, new_h, new_n, pump_flow(new_n, new_h[0] - SUMP)

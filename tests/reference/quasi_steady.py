@@ -11,8 +11,16 @@ HAZEN = {"model": "hazen-williams", "coefficient": 120.0}
 
 
 def pipe(start, end, length=100.0, diameter=0.05, friction=FACTOR, **more):
-    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter, "friction": friction,
-            "pipe_model": "quasi-steady", **more}  # fmt: skip
+    return {
+        "type": "pipe",
+        "from": start,
+        "to": end,
+        "length": length,
+        "diameter": diameter,
+        "friction": friction,
+        "pipe_model": "quasi-steady",
+        **more,
+    }
 
 
 def colebrook(reynolds, roughness):
@@ -31,21 +39,41 @@ def loss_of(friction, flow, length=100.0, diameter=0.05, minor=2.0):
     velocity = flow / area(diameter)
     other = minor * velocity**2 / (2.0 * GRAVITY)
     if friction["model"] == "hazen-williams":
-        return other + 4.727 * 0.3048**-0.685 * length * (flow / friction["coefficient"]) ** 1.852 / diameter**4.871
+        return (
+            other
+            + 4.727
+            * 0.3048**-0.685
+            * length
+            * (flow / friction["coefficient"]) ** 1.852
+            / diameter**4.871
+        )
     if friction["model"] == "chezy-manning":
-        return other + length * (velocity * friction["coefficient"] / (diameter / 4.0) ** (2.0 / 3.0)) ** 2
+        return (
+            other
+            + length * (velocity * friction["coefficient"] / (diameter / 4.0) ** (2.0 / 3.0)) ** 2
+        )
     law = swamee_jain if friction["model"] == "swamee-jain" else colebrook
-    factor = friction.get("factor") or law(velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter)
+    factor = friction.get("factor") or law(
+        velocity * diameter * RHO / 1e-3, friction["roughness"] / diameter
+    )
     return other + factor * length / diameter * velocity**2 / (2.0 * GRAVITY)
 
 
 def main(start: str, end: str, length: float, diameter: float, coefficient: float = 110.0) -> dict:
-    return pipe(start, end, length, diameter, {"model": "hazen-williams", "coefficient": coefficient})
+    return pipe(
+        start, end, length, diameter, {"model": "hazen-williams", "coefficient": coefficient}
+    )
 
 
 def altitude(tank_name: str, **levels: float) -> dict:
-    return {"type": "altitude-valve", "from": f"{tank_name}-inlet", "to": tank_name, "diameter": 0.2,
-            "loss_coefficient": 1e-4, **levels}  # fmt: skip
+    return {
+        "type": "altitude-valve",
+        "from": f"{tank_name}-inlet",
+        "to": tank_name,
+        "diameter": 0.2,
+        "loss_coefficient": 1e-4,
+        **levels,
+    }
 
 
 def restated(case: dict) -> dict:

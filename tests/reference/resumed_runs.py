@@ -32,9 +32,14 @@ def killed_and_resumed(whole: Path, moment: float, pictures: bool = False) -> Pa
     """Folder of a run of the case of `whole` that is killed after `moment` [s], then resumed in this process."""
     script, broken = whole.parent / "dying.py", whole.parent / "broken"
     script.write_text(DYING)
-    died = subprocess.run([sys.executable, *map(str, (script, whole / "case.toml", broken, moment, pictures))])
+    died = subprocess.run(
+        [sys.executable, *map(str, (script, whole / "case.toml", broken, moment, pictures))]
+    )
     assert died.returncode == 9 and moment <= reached(broken) < fvsolve.open_run(whole).t[-1]
-    assert fvsolve.run(whole / "case.toml", out=broken, resume=True, pictures=pictures).reason == "finished"
+    assert (
+        fvsolve.run(whole / "case.toml", out=broken, resume=True, pictures=pictures).reason
+        == "finished"
+    )
     return broken
 
 
@@ -47,15 +52,27 @@ def reached(folder) -> float:
         return 0.0
 
 
-WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")  # work of the run, not its results
+# work of the run, not its results
+WORK = ("rhs", "ended", "seconds", "seconds_setup", "seconds_total", "cost")
 
 
 def long_run(**numerics) -> dict:
     """Case with about a second of steps."""
     case = branched(fields=20)
-    case["nodes"]["tower"] = {"type": "tank", "area": 2.0, "level": 5.0, "height": 30.0, "elevation": 10.0}
-    case["links"]["riser"] = {"type": "valve", "from": "fork", "to": "tower", "area": 0.01,
-                              "discharge_coefficient": 0.6}  # fmt: skip
+    case["nodes"]["tower"] = {
+        "type": "tank",
+        "area": 2.0,
+        "level": 5.0,
+        "height": 30.0,
+        "elevation": 10.0,
+    }
+    case["links"]["riser"] = {
+        "type": "valve",
+        "from": "fork",
+        "to": "tower",
+        "area": 0.01,
+        "discharge_coefficient": 0.6,
+    }
     case["numerics"] = {"end": 2500.0, "scheme": "muscl", "method": "ssp-rk3", **numerics}
     case["output"] |= {"every": 0.1, "probes": [*case["output"]["probes"], "tower.level"]}
     return case

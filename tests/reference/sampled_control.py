@@ -5,18 +5,35 @@ from scipy.linalg import expm
 
 from reference.scenes import WATER
 
-LIMIT = 10.809425555853  # gain from which the sampled PI on two lags is unstable, by the spectral radius of its map
+# gain from which the sampled PI on two lags is unstable, by the spectral radius of its map
+LIMIT = 10.809425555853
 
 
 def two_lags(gain, end, period=0.1, method="dormand-prince", **more):
     """Case of a PI with samples on the plant 1 / ((0.5 s + 1)(0.1 s + 1)), whose setpoint steps at 0.05 s."""
     setpoint = {"time": [0.0, 0.05], "value": [0.0, 1.0], "kind": "step"}
-    loop = {"type": "pi", "input": "controls.plant", "setpoint": setpoint, "gain": gain, "integral_time": 0.4, **more}
-    plant = {"type": "transfer-function", "input": "controls.loop", "numerator": [1.0], "denominator": [0.05, 0.6, 1.0]}
+    loop = {
+        "type": "pi",
+        "input": "controls.plant",
+        "setpoint": setpoint,
+        "gain": gain,
+        "integral_time": 0.4,
+        **more,
+    }
+    plant = {
+        "type": "transfer-function",
+        "input": "controls.loop",
+        "numerator": [1.0],
+        "denominator": [0.05, 0.6, 1.0],
+    }
     loop |= {"period": period} if period else {}
-    return {"schema": 1, "fluid": WATER, "controls": {"plant": plant, "loop": loop},
-            "numerics": {"end": end, "rtol": 1e-10, "method": method},
-            "output": {"every": 0.05, "probes": ["controls.plant.output", "controls.loop.output"]}}  # fmt: skip
+    return {
+        "schema": 1,
+        "fluid": WATER,
+        "controls": {"plant": plant, "loop": loop},
+        "numerics": {"end": end, "rtol": 1e-10, "method": method},
+        "output": {"every": 0.05, "probes": ["controls.plant.output", "controls.loop.output"]},
+    }
 
 
 def sampled_plant(period):

@@ -11,9 +11,18 @@ from typing import Any
 AMBIENT = 101325.0
 GRAVITY = 9.80665
 RHO = 1000.0
-WATER = MappingProxyType({"name": "user", "density": RHO, "bulk_modulus": 2.2e9, "viscosity": 1e-3,
-                          "vapor_pressure": 2300.0, "law": "linear"})  # fmt: skip
-SHARP = MappingProxyType({"scheme": "upwind", "method": "euler", "courant": 1.0})  # exact: one cell per step
+WATER = MappingProxyType(
+    {
+        "name": "user",
+        "density": RHO,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 2300.0,
+        "law": "linear",
+    }
+)
+# exact: one cell per step
+SHARP = MappingProxyType({"scheme": "upwind", "method": "euler", "courant": 1.0})
 SMOOTH = MappingProxyType({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
 NO_FRICTION = MappingProxyType({"model": "none"})
 
@@ -23,14 +32,25 @@ def area(diameter: float) -> float:
 
 
 def scene(
-    nodes: dict, links: dict, end: float, numerics: dict, probes: Any = (), every: float = 0.01, **top: Any
+    nodes: dict,
+    links: dict,
+    end: float,
+    numerics: dict,
+    probes: Any = (),
+    every: float = 0.01,
+    **top: Any,
 ) -> dict:
     """Complete case that shares no object with its arguments; `top` adds or replaces top-level tables."""
     case = {
-        "schema": 1, "ambient_pressure": AMBIENT, "gravity": GRAVITY, "fluid": WATER, "nodes": nodes, "links": links,
+        "schema": 1,
+        "ambient_pressure": AMBIENT,
+        "gravity": GRAVITY,
+        "fluid": WATER,
+        "nodes": nodes,
+        "links": links,
         "numerics": {"end": end, **numerics},
         "output": {"every": every, "probes": list(probes)} if probes else {"every": every},
-    }  # fmt: skip
+    }
     return copied({**case, **top})
 
 
@@ -62,12 +82,25 @@ def chamber(volume: float, pressure: float | None = None, **more: Any) -> dict:
     return {"type": "chamber", "volume": volume, **given, **more}
 
 
-def pipe(start: str, end: str, length: float, diameter: float, wave_speed: float, cells: int, **more: Any) -> dict:
-    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter, "wave_speed": wave_speed,
-            "cells": cells, "friction": NO_FRICTION, **more}  # fmt: skip
+def pipe(
+    start: str, end: str, length: float, diameter: float, wave_speed: float, cells: int, **more: Any
+) -> dict:
+    return {
+        "type": "pipe",
+        "from": start,
+        "to": end,
+        "length": length,
+        "diameter": diameter,
+        "wave_speed": wave_speed,
+        "cells": cells,
+        "friction": NO_FRICTION,
+        **more,
+    }
 
 
-def stiff_pipe(start: str, end: str, length: float, diameter: float, cells: int, **more: Any) -> dict:
+def stiff_pipe(
+    start: str, end: str, length: float, diameter: float, cells: int, **more: Any
+) -> dict:
     """Pipe with a rigid wall, whose wave speed is the speed of sound of the fluid."""
     found = pipe(start, end, length, diameter, 0.0, cells, wall="rigid", **more)
     del found["wave_speed"]
@@ -76,8 +109,15 @@ def stiff_pipe(start: str, end: str, length: float, diameter: float, cells: int,
 
 def valve(start: str, end: str, flow_area: float, opening: Any = 1.0, **more: Any) -> dict:
     """Valve with the effective area Cd A [m2]."""
-    return {"type": "valve", "from": start, "to": end, "area": flow_area / 0.61, "discharge_coefficient": 0.61,
-            "opening": opening, **more}  # fmt: skip
+    return {
+        "type": "valve",
+        "from": start,
+        "to": end,
+        "area": flow_area / 0.61,
+        "discharge_coefficient": 0.61,
+        "opening": opening,
+        **more,
+    }
 
 
 def step(time: float, before: float, after: float) -> dict:
@@ -94,7 +134,9 @@ def smooth_step(t: float, start: float, duration: float) -> float:
     return s**5 * (126 + s * (-420 + s * (540 + s * (-315 + 70 * s))))
 
 
-def smooth_ramp(start: float, duration: float, before: float, after: float, points: int = 1201) -> dict:
+def smooth_ramp(
+    start: float, duration: float, before: float, after: float, points: int = 1201
+) -> dict:
     """Table of `smooth_step` with an interpolation error of about 1e-8."""
     times = [start + duration * i / (points - 1) for i in range(points)]
     values = [before + (after - before) * smooth_step(t, start, duration) for t in times]
@@ -112,7 +154,15 @@ def inflow(flow: Any, **more: Any) -> dict:
 def still(**top) -> dict:
     """Case of a tank that fills from a reservoir: the smallest run, without pipes and fields."""
     nodes = {"lake": reservoir(1.5e5), "pond": tank(1.0, 1.0)}
-    return scene(nodes, {"gate": valve("lake", "pond", 0.001)}, 1.0, {"rtol": 1e-6}, ["pond.level"], 0.1, **top)
+    return scene(
+        nodes,
+        {"gate": valve("lake", "pond", 0.001)},
+        1.0,
+        {"rtol": 1e-6},
+        ["pond.level"],
+        0.1,
+        **top,
+    )
 
 
 BRANCHED_PROBES = ["gate.pressure", "gate.head", "valve.flow", "main.velocity@0.5"]
@@ -121,15 +171,30 @@ BRANCHED_PROBES = ["gate.pressure", "gate.head", "valve.flow", "main.velocity@0.
 def branched(fields: int = 5, **top) -> dict:
     """Case of a main that forks into a dead end and a valve that shuts between 0.1 and 0.2 s."""
     nodes = {
-        "lake": lake(60.0, elevation=40.0), "fork": junction(elevation=10.0), "end": junction(elevation=20.0),
-        "gate": junction(elevation=0.0), "air": reservoir(AMBIENT, elevation=0.0),
-    }  # fmt: skip
-    sizes = {"main": ("lake", "fork", 600.0, 30), "branch": ("fork", "end", 200.0, 10),
-             "last": ("fork", "gate", 300.0, 15)}  # fmt: skip
-    links = {name: pipe(start, end, length, 0.3, 1200.0, cells, friction={"model": "steady", "factor": 0.02})
-             for name, (start, end, length, cells) in sizes.items()}  # fmt: skip
-    links["valve"] = {"type": "valve", "from": "gate", "to": "air", "area": 0.005,
-                      "opening": {"time": [0.1, 0.2], "value": [1.0, 0.0]}}  # fmt: skip
+        "lake": lake(60.0, elevation=40.0),
+        "fork": junction(elevation=10.0),
+        "end": junction(elevation=20.0),
+        "gate": junction(elevation=0.0),
+        "air": reservoir(AMBIENT, elevation=0.0),
+    }
+    sizes = {
+        "main": ("lake", "fork", 600.0, 30),
+        "branch": ("fork", "end", 200.0, 10),
+        "last": ("fork", "gate", 300.0, 15),
+    }
+    links = {
+        name: pipe(
+            start, end, length, 0.3, 1200.0, cells, friction={"model": "steady", "factor": 0.02}
+        )
+        for name, (start, end, length, cells) in sizes.items()
+    }
+    links["valve"] = {
+        "type": "valve",
+        "from": "gate",
+        "to": "air",
+        "area": 0.005,
+        "opening": {"time": [0.1, 0.2], "value": [1.0, 0.0]},
+    }
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.8}
     case = scene(nodes, links, 1.0, numerics, BRANCHED_PROBES, 0.01, title="A fork", **top)
     case["output"]["fields"] = fields

@@ -16,7 +16,8 @@ SUPPLY, SUMP = AMBIENT + 140e5, AMBIENT
 EDGE = 40e-3 / 60.0 / math.sqrt(2.0 * 35e5 / RHO)  # Cd A of an edge [m2]
 FREQUENCY, FASTEST, UNDERLAP = 2.0 * math.pi * 60.0, 1.0 / 15e-3, 0.02
 GAIN, INTEGRAL, TRACKING = 20.0, 0.3, 0.05
-SLOW = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * EDGE / math.pi) * RHO * NU  # flow below which an edge is laminar [kg/s]
+# flow below which an edge is laminar [kg/s]
+SLOW = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * EDGE / math.pi) * RHO * NU
 STEP, LOADED, END = 0.2, 1.2, 2.0
 SCALE = np.array([1e-2, 0.1, 1e-3, 1e-3, 0.1, 10.0, 0.1])
 
@@ -64,7 +65,17 @@ def axis(compiled=lambda function: function, damping=0.8, fastest=FASTEST):
 def start() -> np.ndarray:
     """State at rest, with 70 bar above ambient in both chambers."""
     full = RHO * (1.0 + 70e5 / BETA)
-    return np.array([0.05, 0.0, full * (DEAD + AREA_A * 0.05), full * (DEAD + AREA_B * (STROKE - 0.05)), 0, 0, 0.0])
+    return np.array(
+        [
+            0.05,
+            0.0,
+            full * (DEAD + AREA_A * 0.05),
+            full * (DEAD + AREA_B * (STROKE - 0.05)),
+            0,
+            0,
+            0.0,
+        ]
+    )
 
 
 def trajectory(times: np.ndarray, rtol: float = 1e-12) -> np.ndarray:
@@ -87,9 +98,16 @@ def trajectory(times: np.ndarray, rtol: float = 1e-12) -> np.ndarray:
         last = np.nextafter(end, 0.0)
         while t < end:
             part = solve_ivp(
-                follow, (t, end), y, method="DOP853", rtol=rtol, atol=rtol * SCALE, max_step=2e-3,
-                events=leaves if at_stop else reaches, dense_output=True,
-            )  # fmt: skip
+                follow,
+                (t, end),
+                y,
+                method="DOP853",
+                rtol=rtol,
+                atol=rtol * SCALE,
+                max_step=2e-3,
+                events=leaves if at_stop else reaches,
+                dense_output=True,
+            )
             inside = times[(times >= t) & (times < part.t[-1])]
             found += [part.sol(inside)] if inside.size else []
             t, y = part.t[-1], part.y[:, -1].copy()

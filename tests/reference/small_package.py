@@ -40,7 +40,11 @@ def package(tmp_path):
         (room / "__init__.py").touch()
     for module in (jit, errors):
         shutil.copy(module.__file__, folder)
-    shutil.copytree(Path(store.__file__).parent, folder / "compile", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(store.__file__).parent,
+        folder / "compile",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
     (core / "kernels" / "law.py").write_text(LAW.format(factor=2.0))
     (core / "steppers" / "loop.py").write_text(LOOP)
     return folder
@@ -51,7 +55,14 @@ def python(package: Path, code: str, told: str = "", **environment: str) -> list
     stated = {"FVSOLVE_CACHE": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
     stated["PYTHONDONTWRITEBYTECODE"] = "1"  # bytecode files do not show an edit within a second
     inherited = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-    done = subprocess.run([sys.executable, "-c", code], env=inherited | stated | environment, cwd=package.parent,
-                          capture_output=True, text=True)  # fmt: skip
-    assert done.returncode == 0 and (re.search(told, done.stderr) if told else done.stderr == ""), done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=inherited | stated | environment,
+        cwd=package.parent,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0 and (re.search(told, done.stderr) if told else done.stderr == ""), (
+        done.stderr
+    )
     return done.stdout.split()

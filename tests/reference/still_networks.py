@@ -8,7 +8,9 @@ from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, ta
 ROUGH = {"model": "steady", "roughness": 2.6e-4}
 
 
-def town(friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: str = "linear") -> dict:
+def town(
+    friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: str = "linear"
+) -> dict:
     """Case of a loop with slopes, a demand, valves, a rigid column, still tanks and a tank with balanced flows."""
     nodes = {
         "hill": lake(60.0),
@@ -31,14 +33,26 @@ def town(friction: dict, numerics: dict, end: float = 60.0, demand=0.02, law: st
         "bc": pipe("c", "b", 315.7, 0.2, 1200.0, 13, **rough),
         "ac": pipe("a", "c", 402.0, 0.25, 900.0, 19, **rough),
         "cl": pipe("c", "low", 150.0, 0.3, 1150.0, 7, **rough),
-        "column": {"type": "rigid-column", "from": "hill", "to": "low", "length": 500.0, "diameter": 0.2, **rough},
+        "column": {
+            "type": "rigid-column",
+            "from": "hill",
+            "to": "low",
+            "length": 500.0,
+            "diameter": 0.2,
+            **rough,
+        },
         "tap": valve("c", "out", 0.002),
         "shut": valve("still", "a", 0.01, 0.0),
         "gap": valve("one", "two", 1e-4),
         "bar": valve("two", "b", 0.01, 0.0),
     }
     settings = {"courant": 0.9, "method": "ssp-rk3", **numerics}
-    probes = [f"{n}.pressure" for n in "abc"] + ["middle.level", "still.level", "one.level", "two.level"]
+    probes = [f"{n}.pressure" for n in "abc"] + [
+        "middle.level",
+        "still.level",
+        "one.level",
+        "two.level",
+    ]
     probes += ["tap.flow", "shut.flow", "gap.flow", "column.flow"]
     for name in ("in", "on", "ha", "ab", "bc", "ac", "cl"):
         probes += [f"{name}.{what}@{x}" for what in ("pressure", "flow") for x in (0.0, 0.31, 1.0)]

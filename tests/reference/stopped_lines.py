@@ -66,14 +66,18 @@ def smooth(number: float, start: float, duration: float, t: float) -> float:
     """Pressure at the end of a line whose flow stops along the polynomial of `ninth`, as an integral over jumps [-]."""
     found, places, weights = 0.0, *np.polynomial.legendre.leggauss(36)
     fronts = [t - start - 2.0 * k for k in range(int(t / 2.0) + 1)]
-    cuts = np.unique(np.clip([0.0, duration, *fronts, *[f - 0.02 * duration for f in fronts]], 0.0, duration))
+    cuts = np.unique(
+        np.clip([0.0, duration, *fronts, *[f - 0.02 * duration for f in fronts]], 0.0, duration)
+    )
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
         v = 0.5 * (1.0 + places)  # denser nodes near `high`, where the age of a jump is small
         sigma, w = high - (high - low) * v**2, (high - low) * v * weights
         age = t - start - sigma
         here = age > 0.0
-        found += sum(w_ * ninth(s_ / duration) / duration * laminar_jump(number, a_)
-                     for w_, s_, a_ in zip(w[here], sigma[here], age[here], strict=True))  # fmt: skip
+        found += sum(
+            w_ * ninth(s_ / duration) / duration * laminar_jump(number, a_)
+            for w_, s_, a_ in zip(w[here], sigma[here], age[here], strict=True)
+        )
     return float(found)
 
 
@@ -86,5 +90,10 @@ def creep_jump(elements, t: float) -> float:
         return (1 if k == 0 else 2 * (-1) ** k) / (s * root) * mpmath.exp(-2 * k * s * (root - 1))
 
     late = [t - 2.0 * k for k in range(1 + int(t // 2))]
-    return float(sum(mpmath.invertlaplace(lambda s, k=k: passage(s, k), one, method="dehoog")
-                     for k, one in enumerate(late) if one > 0.0))  # fmt: skip
+    return float(
+        sum(
+            mpmath.invertlaplace(lambda s, k=k: passage(s, k), one, method="dehoog")
+            for k, one in enumerate(late)
+            if one > 0.0
+        )
+    )

@@ -46,7 +46,10 @@ def gate(width, sill, opening, contraction=0.61, coefficient=0.577):
         free = y * h * math.sqrt(2.0 * G / (h + y))
         sequent = 0.5 * y * (math.sqrt(1.0 + 8.0 * free * free / (G * y**3)) - 1.0)
         fold = minimize_scalar(
-            lambda q: lower_depth(h, q), bounds=(0.0, free), method="bounded", options={"xatol": 1e-9}
+            lambda q: lower_depth(h, q),
+            bounds=(0.0, free),
+            method="bounded",
+            options={"xatol": 1e-9},
         )
 
         def drowned(depth):

@@ -47,7 +47,9 @@ def test_characteristics_rays_and_allievi_agree_on_a_closing_valve():
 def test_friction_characteristics_are_second_order():
     case = valve_pipe(darcy(0.02, D, RHO))
     _, best = case.richardson(800, 4.0)
-    errors = [np.max(np.abs(case.valve_pressure(n, 4.0)[1][:: n // 50] - best[::16])) for n in (100, 200)]
+    errors = [
+        np.max(np.abs(case.valve_pressure(n, 4.0)[1][:: n // 50] - best[::16])) for n in (100, 200)
+    ]
     assert observed_order(errors, [2.0, 1.0]) == approx(2.0, abs=0.25)
     assert errors[-1] < 1e-4 * 1e6
 
@@ -72,8 +74,11 @@ def test_gradients_are_the_textbook_ones():
 
 
 def test_rays_through_a_junction_scatter_by_impedances():
-    pipes = {"one": Pipe("a", "mid", 100.0, 0.3, 1000.0), "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
-             "three": Pipe("mid", "c", 300.0, 0.25, 900.0)}  # fmt: skip
+    pipes = {
+        "one": Pipe("a", "mid", 100.0, 0.3, 1000.0),
+        "two": Pipe("mid", "b", 300.0, 0.2, 1100.0),
+        "three": Pipe("mid", "c", 300.0, 0.25, 900.0),
+    }
     rays = Rays(RHO, pipes, {"a": step(0.01, 0.0, 1.0), "b": held(0.0), "c": held(0.0)})
     back, passed = scattered([p.impedance for p in pipes.values()])
     assert rays.pressure("mid", 0.15) == approx(1 + back)
@@ -83,7 +88,12 @@ def test_rays_through_a_junction_scatter_by_impedances():
 
 def test_rays_keep_the_mass_of_a_pipe():
     pipes = {"one": Pipe("a", "b", 100.0, 0.3, 1000.0)}
-    rays = Rays(RHO, pipes, {"a": held(0.0)}, demands={"b": lambda t: 0.01 * math.sin(20 * t) ** 2 if t > 0 else 0.0})
+    rays = Rays(
+        RHO,
+        pipes,
+        {"a": held(0.0)},
+        demands={"b": lambda t: 0.01 * math.sin(20 * t) ** 2 if t > 0 else 0.0},
+    )
 
     def stored(t: float) -> float:
         return (
@@ -94,14 +104,20 @@ def test_rays_keep_the_mass_of_a_pipe():
         )
 
     assert pipes["one"].impedance == approx(1000.0 / (math.pi / 4 * 0.09))
-    net = quad(lambda t: RHO * (rays.inside("one", 0, t)[1] - rays.inside("one", 1, t)[1]), 0, 0.35, limit=400)[0]
+    net = quad(
+        lambda t: RHO * (rays.inside("one", 0, t)[1] - rays.inside("one", 1, t)[1]),
+        0,
+        0.35,
+        limit=400,
+    )[0]
     assert stored(0.35) == approx(net, rel=1e-6)
 
 
 def test_gaussian_averages_are_those_of_quadrature():
     edges = np.linspace(0, 10, 12)
     by_quad = [
-        quad(lambda x: math.exp(-((x - 4) ** 2)), a, b)[0] / (b - a) for a, b in zip(edges, edges[1:], strict=False)
+        quad(lambda x: math.exp(-((x - 4) ** 2)), a, b)[0] / (b - a)
+        for a, b in zip(edges, edges[1:], strict=False)
     ]
     assert gaussian_averages(edges, 4.0, 1.0) == approx(by_quad, rel=1e-10)
 
@@ -111,7 +127,12 @@ SOFT = LogFluid(1000.0, 1e5, 1e5)
 
 @pytest.mark.parametrize(
     "left, right",
-    [((1.3e5, 0.0), (1e5, 0.0)), ((1e5, 1.0), (1e5, -1.0)), ((1e5, -1.0), (1.1e5, 1.0)), ((0.9e5, 0.5), (1.2e5, -0.3))],
+    [
+        ((1.3e5, 0.0), (1e5, 0.0)),
+        ((1e5, 1.0), (1e5, -1.0)),
+        ((1e5, -1.0), (1.1e5, 1.0)),
+        ((0.9e5, 0.5), (1.2e5, -0.3)),
+    ],
     ids=["dam", "clash", "parting", "mixed"],
 )
 def test_exact_riemann_solution_conserves_mass_and_momentum(left, right):
@@ -122,7 +143,8 @@ def test_exact_riemann_solution_conserves_mass_and_momentum(left, right):
     def total(field) -> float:
         cuts = [-span, *breaks, span]
         return sum(
-            quad(lambda x: field(*riemann.at(x)), a, b, epsrel=1e-12)[0] for a, b in zip(cuts, cuts[1:], strict=False)
+            quad(lambda x: field(*riemann.at(x)), a, b, epsrel=1e-12)[0]
+            for a, b in zip(cuts, cuts[1:], strict=False)
         )
 
     rho_l, rho_r = SOFT.rho(left[0]), SOFT.rho(right[0])
@@ -154,7 +176,10 @@ def test_a_stopped_stream_exceeds_joukowsky_by_a_quarter_of_its_mach_number():
 
 def test_a_simple_wave_satisfies_the_balance_laws():
     wave = SimpleWave(
-        SOFT, 1e5, lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9), lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9)
+        SOFT,
+        1e5,
+        lambda x: 0.5 * np.exp(-((x - 20) ** 2) / 9),
+        lambda x: -(x - 20) / 9 * np.exp(-((x - 20) ** 2) / 9),
     )
     edges, dt = np.linspace(0, 160, 8001), 1e-3
     t = 0.5 * wave.breaks(edges)
@@ -172,7 +197,12 @@ def test_draining_forms_agree_with_integration(area, growth):
     k = 0.01 * math.sqrt(2 * vessels.GRAVITY)
     end = 0.95 * (2 * area * math.sqrt(2) + 2 / 3 * growth * 2**1.5) / k
     run = solve_ivp(
-        lambda t, h: -k * np.sqrt(h) / (area + growth * h), (0, end), [2.0], "DOP853", rtol=1e-12, atol=1e-14
+        lambda t, h: -k * np.sqrt(h) / (area + growth * h),
+        (0, end),
+        [2.0],
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-14,
     )
     assert vessels.tapered(area, growth, 0.01, 2.0, [end])[0] == approx(run.y[0, -1], rel=1e-9)
     if growth == 0:
@@ -197,7 +227,12 @@ def test_network_characteristics_are_those_of_a_single_pipe():
 
 
 def test_steady_flows_of_a_loop_balance_at_every_node_and_around_it():
-    rows = [("r", "a", 300.0, 0.4), ("a", "b", 500.0, 0.3), ("a", "g", 400.0, 0.2), ("b", "g", 300.0, 0.25)]
+    rows = [
+        ("r", "a", 300.0, 0.4),
+        ("a", "b", 500.0, 0.3),
+        ("a", "g", 400.0, 0.2),
+        ("b", "g", 300.0, 0.25),
+    ]
     lines = [Line(*row, 0.5 / row[3] ** 5) for row in rows]
     p, m = Network(lines, 1.852, A, RHO, "r", 1e6, "g", 1e5).steady(50.0)
     assert [m[0], m[1] + m[2], m[3] + m[2]] == approx([50.0, 50.0, 50.0], rel=1e-12)
@@ -207,7 +242,9 @@ def test_steady_flows_of_a_loop_balance_at_every_node_and_around_it():
         assert {**p, "r": 1e6}[a] - p[b] == approx(drop, rel=1e-9)
 
 
-def rusanov(rho: np.ndarray, flux: np.ndarray, dx: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+def rusanov(
+    rho: np.ndarray, flux: np.ndarray, dx: float, end: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Density and mass flux of the balance laws by the scheme of Rusanov, without wave curves or invariants."""
     u, t = np.array([rho, flux]), 0.0
     while t < end:
@@ -228,7 +265,9 @@ def test_the_exact_riemann_solution_is_the_limit_of_a_crude_scheme(left, right):
         x = (np.arange(cells) + 0.5) / cells * 40 - 20
         rho = np.where(x < 0, SOFT.rho(left[0]), SOFT.rho(right[0]))
         found = rusanov(rho, rho * np.where(x < 0, left[1], right[1]), 40 / cells, 1.2)
-        exact = np.array([(SOFT.rho(p), SOFT.rho(p) * u) for p, u in (riemann.at(s / 1.2) for s in x)]).T
+        exact = np.array(
+            [(SOFT.rho(p), SOFT.rho(p) * u) for p, u in (riemann.at(s / 1.2) for s in x)]
+        ).T
         errors.append(np.mean(np.abs(found[1] - exact[1])) / np.ptp(exact[1]))
     assert errors[1] < 0.02
     assert observed_order(errors, [2.0, 1.0]) > 0.4

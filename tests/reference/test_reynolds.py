@@ -29,11 +29,15 @@ def on_interval(of: Callable, a: float, b: float) -> float:
 def inside(of: Callable, corners: np.ndarray) -> float:
     """Integral of a function of x and y over a quadrilateral; corners : float64[4, 2], counter-clockwise."""
     s, t = np.meshgrid(POINTS, POINTS, indexing="ij")
-    shape = np.array([(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)]) / 4
+    shape = (
+        np.array([(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)]) / 4
+    )
     along_s = np.array([-(1 - t), 1 - t, 1 + t, -(1 + t)]) / 4
     along_t = np.array([-(1 - s), -(1 + s), 1 + s, 1 - s]) / 4
     x, y = (np.tensordot(corners[:, k], shape, 1) for k in (0, 1))
-    xs, ys, xt, yt = (np.tensordot(corners[:, k], slope, 1) for slope in (along_s, along_t) for k in (0, 1))
+    xs, ys, xt, yt = (
+        np.tensordot(corners[:, k], slope, 1) for slope in (along_s, along_t) for k in (0, 1)
+    )
     return float(np.sum(np.outer(WEIGHTS, WEIGHTS) * (xs * yt - xt * ys) * of(x, y)))
 
 
@@ -47,10 +51,13 @@ def around(of: Callable, corners: np.ndarray, speeds: np.ndarray | None = None) 
         start, end = corners[k], corners[(k + 1) % 4]
         share = 0.5 * (POINTS + 1)
         x, y = (start[i] + share * (end[i] - start[i]) for i in (0, 1))
-        normal = np.array([end[1] - start[1], start[0] - end[0]])  # outward normal with the length of the side
+        # outward normal with the length of the side
+        normal = np.array([end[1] - start[1], start[0] - end[0]])
         carried = of(x, y)
         if speeds is not None:
-            carried = carried * (np.outer(speeds[k], 1 - share) + np.outer(speeds[(k + 1) % 4], share))
+            carried = carried * (
+                np.outer(speeds[k], 1 - share) + np.outer(speeds[(k + 1) % 4], share)
+            )
         total += 0.5 * float(np.sum(WEIGHTS * (normal @ carried)))
     return total
 
@@ -138,10 +145,13 @@ def test_a_volume_of_matter_72_to_75(material):
     The integrand is the divergence of phi v, or the substantial derivative of phi plus phi times the divergence of v.
     """
     within = inside(lambda x, y: phi_rate(x, y, T), corners(T))
-    assert_allclose(material, within + around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)  # (72), (73)
+    # (72), (73)
+    assert_allclose(material, within + around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)
     together = inside(lambda x, y: phi_rate(x, y, T) + spread(x, y), corners(T))
     assert_allclose(material, together, rtol=1e-8)  # (75)
-    substantial = inside(lambda x, y: followed(x, y) + phi(x, y, T) * divergence(x, y, T), corners(T))
+    substantial = inside(
+        lambda x, y: followed(x, y) + phi(x, y, T) * divergence(x, y, T), corners(T)
+    )
     assert_allclose(material, substantial, rtol=1e-8)  # (74)
 
 

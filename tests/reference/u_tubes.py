@@ -2,7 +2,8 @@
 
 from reference.scenes import scene
 
-HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # half distance of arms, depth of the duct, level above the duct [m]
+# half distance of arms, depth of the duct, level above the duct [m]
+HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8
 TANK, BORE, LOSS = 1.2, 0.6, 3.0  # area of tanks [m2], bore of the duct [m], loss [-]
 ROLL = {"mean": 0.0, "amplitude": 0.05, "period": 7.0}  # [rad], [s]
 SOLID = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
@@ -23,10 +24,34 @@ def u_tube(turned=False, swap=False, angle=ROLL, **column):
     return scene(
         {
             "hull": hull(kind="revolute", axis=named(1, 0, 0), angle=angle),
-            "port": {"type": "tank", "on": "hull", "at": named(0, HALF, -DEPTH), "area": TANK, "level": LEVEL},
-            "starboard": {"type": "tank", "on": "hull", "at": named(0, -HALF, -DEPTH), "area": TANK, "level": LEVEL},
+            "port": {
+                "type": "tank",
+                "on": "hull",
+                "at": named(0, HALF, -DEPTH),
+                "area": TANK,
+                "level": LEVEL,
+            },
+            "starboard": {
+                "type": "tank",
+                "on": "hull",
+                "at": named(0, -HALF, -DEPTH),
+                "area": TANK,
+                "level": LEVEL,
+            },
         },
-        {"duct": {"type": "rigid-column", "from": ends[0], "to": ends[1], "length": 2 * HALF, "diameter": BORE,
-                  "minor_loss": LOSS, **column}},
-        20.0, {"method": "dormand-prince", "rtol": 1e-9}, ["duct.flow", "port.level", "starboard.level"], every=0.1,
-    )  # fmt: skip
+        {
+            "duct": {
+                "type": "rigid-column",
+                "from": ends[0],
+                "to": ends[1],
+                "length": 2 * HALF,
+                "diameter": BORE,
+                "minor_loss": LOSS,
+                **column,
+            }
+        },
+        20.0,
+        {"method": "dormand-prince", "rtol": 1e-9},
+        ["duct.flow", "port.level", "starboard.level"],
+        every=0.1,
+    )

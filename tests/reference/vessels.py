@@ -39,19 +39,26 @@ def tapered(foot: float, growth: float, flow_area: float, level: float, t: Array
     found = []
     for left in total - speed * np.asarray(t, float):
         found.append(
-            brentq(lambda r, v=left: volume_time(r) - v, 0, math.sqrt(level) * (1 + 1e-12), xtol=1e-15) ** 2
+            brentq(
+                lambda r, v=left: volume_time(r) - v, 0, math.sqrt(level) * (1 + 1e-12), xtol=1e-15
+            )
+            ** 2
             if left > 0
             else 0.0
         )
     return np.array(found)
 
 
-def filling(volume: float, modulus: float, flow_area: float, density: float, drop: float, t: Array) -> Array:
+def filling(
+    volume: float, modulus: float, flow_area: float, density: float, drop: float, t: Array
+) -> Array:
     """Missing pressure in a chamber that fills from a fixed pressure through an orifice [Pa]."""
     return falling_root(drop, modulus / volume * flow_area * math.sqrt(2 / density), t)
 
 
-def chambers_levelling(volumes, modulus: float, flow_area: float, density: float, drop: float, t: Array) -> Array:
+def chambers_levelling(
+    volumes, modulus: float, flow_area: float, density: float, drop: float, t: Array
+) -> Array:
     """Difference of pressure of two chambers joined by an orifice [Pa]."""
     compliance = modulus * (1 / volumes[0] + 1 / volumes[1])
     return falling_root(drop, compliance * flow_area * math.sqrt(2 / density), t)

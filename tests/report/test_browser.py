@@ -21,11 +21,15 @@ PARTS = ("#section-0", "#history-0", "#history-1")
 def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "closure"
     nodes = {"top": lake("45 m"), "gate": junction(), "outfall": lake("0 m")}
-    links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
-             "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
+    links = {
+        "main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
+        "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0)),
+    }
     probes = ["gate.head", *(f"main.head@{k / 10}" for k in range(1, 10)), "valve.flow"]
-    limits = {HIGH: {"on": "main", "quantity": "head", "maximum": 5e3},
-              "low": {"on": "main", "quantity": "head", "minimum": -20.0}}  # fmt: skip
+    limits = {
+        HIGH: {"on": "main", "quantity": "head", "maximum": 5e3},
+        "low": {"on": "main", "quantity": "head", "minimum": -20.0},
+    }
     case = scene(nodes, links, 3.0, {}, probes, title=TITLE, limits=limits)
     case["output"] |= {"fields": 6, "units": {"flow": "l/s"}}
     fvsolve.run(case, out=folder, pictures=False)
@@ -57,12 +61,28 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     for id in PARTS:
         assert page.locator(f"{id} .scatterlayer path.js-line").count() >= 1
     names = legend(page, "#section-0").all_text_contents()
-    assert {"maximum head", "minimum head", "initial head", "pipe", "vapour line", "head now"} <= set(names)
+    assert {
+        "maximum head",
+        "minimum head",
+        "initial head",
+        "pipe",
+        "vapour line",
+        "head now",
+    } <= set(names)
     assert f"{HIGH}, maximum" in names
     beyond = f"{HIGH}, maximum: from 5000 m"
-    assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {"top", "valve", beyond}
+    assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {
+        "top",
+        "valve",
+        beyond,
+    }
     legend(page, "#section-0").get_by_text("vapour line").click()
-    assert page.evaluate("document.querySelector('#section-0').data.map(one => one.visible)").count("legendonly") == 1
+    assert (
+        page.evaluate("document.querySelector('#section-0').data.map(one => one.visible)").count(
+            "legendonly"
+        )
+        == 1
+    )
     before = heads(page)
     page.click(".player button")
     until(page, "Number(document.querySelector('.player input').value) >= 2")
@@ -72,7 +92,9 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     page.evaluate("Plotly.relayout('history-0', {'xaxis.range[0]': 0.4, 'xaxis.range[1]': 1.2})")
     until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
     name = "a <b>bold</b> & $x$ &lt; </script>"
-    page.evaluate("name => Plotly.relayout('history-1', {'xaxis.title.text': name})", escape_markup(name))
+    page.evaluate(
+        "name => Plotly.relayout('history-1', {'xaxis.title.text': name})", escape_markup(name)
+    )
     assert page.locator("#history-1 .xtitle").all_text_contents() == [name]
     assert said == [] and asked == [report.as_uri()]
 
@@ -82,7 +104,9 @@ def test_a_phone_reads_it_without_scrolling_aside(report, chromium):
     assert page.evaluate("document.documentElement.scrollWidth") == 390 and said == []
     legends_are_clear(page)
     boxes = [page.locator(id).bounding_box() for id in PARTS]
-    assert all(box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["height"] >= 250 for box in boxes)
+    assert all(
+        box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["height"] >= 250 for box in boxes
+    )
 
 
 def test_paper_holds_whole_figures(report, chromium):
@@ -95,7 +119,9 @@ def test_paper_holds_whole_figures(report, chromium):
     assert page.locator("#section-0 .nsewdrag").bounding_box()["height"] > 300
     legends_are_clear(page)
     page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert page.locator("#section-0 .main-svg").first.bounding_box()["height"] == 920.0 and said == []
+    assert (
+        page.locator("#section-0 .main-svg").first.bounding_box()["height"] == 920.0 and said == []
+    )
 
 
 @pytest.mark.parametrize("width", [390, 1000])
@@ -103,7 +129,10 @@ def test_no_name_over_a_section_covers_another(chromium, tmp_path, width):
     """Places come closer towards the end, where names are left of their places; names never overlap, also on paper."""
     names = [f"place-{k}" for k in range(13)]
     nodes = {name: junction() for name in names} | {names[0]: lake("45 m"), names[-1]: lake("40 m")}
-    links = {f"pipe-{k}": pipe(a, b, 20.0 + 480.0 * 0.7**k, 0.3, 1000.0, 2) for k, (a, b) in enumerate(pairwise(names))}
+    links = {
+        f"pipe-{k}": pipe(a, b, 20.0 + 480.0 * 0.7**k, 0.3, 1000.0, 2)
+        for k, (a, b) in enumerate(pairwise(names))
+    }
     case = scene(nodes, links, 0.1, {}, [], routes={"line": {"pipes": [*links]}})
     fvsolve.run(case, out=tmp_path / "run", pictures=False)
     page, _, _ = browser.opened(chromium, write_report(tmp_path / "run")[0], width)
@@ -118,16 +147,24 @@ def test_no_name_over_a_section_covers_another(chromium, tmp_path, width):
 
 
 @pytest.mark.parametrize("words", [0, 30, 60, 90])
-def test_no_page_of_paper_but_the_last_is_half_empty_and_each_has_title_and_number(report, chromium, words):
+def test_no_page_of_paper_but_the_last_is_half_empty_and_each_has_title_and_number(
+    report, chromium, words
+):
     """Up to 1080 words precede the figures."""
     page, _, _ = browser.opened(chromium, report, 1280)
     if int(chromium.version.partition(".")[0]) < 131:
         pytest.skip("this Chromium writes nothing on the margins of pages")
-    page.evaluate("n => document.querySelector('#verdict').append(...Array(n).fill('word '.repeat(12)))", words)
+    page.evaluate(
+        "n => document.querySelector('#verdict').append(...Array(n).fill('word '.repeat(12)))",
+        words,
+    )
     found = browser.pages(page.pdf(prefer_css_page_size=True))
     assert len(found) > 3
     for number, one in enumerate(found, 1):
-        over, under = ("".join(text for y, text in one if low < y < high) for low, high in ((0, 18), (281, 297)))
+        over, under = (
+            "".join(text for y, text in one if low < y < high)
+            for low, high in ((0, 18), (281, 297))
+        )
         assert (over, under) == (TITLE, f"{number} / {len(found)}")
     ends = [max(y for y, _ in one if 18.0 < y < 281.0) for one in found]
     assert all((end - 18.0) / 263.0 > 0.5 for end in ends[:-1]), ends

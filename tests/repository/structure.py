@@ -43,13 +43,15 @@ class Limit(NamedTuple):
 # 53 characters, 1 circle. The issue's goal of 4 comment lines was reached, then raised.
 LIMITS = {
     "files imported by run valve-closure": Limit(limit=180, goal=130, slack=7),
-    "lines of these files": Limit(limit=39_000, goal=35_000, slack=1500),
+    "lines of these files": Limit(limit=45_000, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
     "cells of the hub matrix": Limit(limit=159, goal=70, slack=6),
     "cells of the hub matrix, code alone": Limit(limit=125, goal=70, slack=6),
-    "functions per 1000 code lines": Limit(limit=97.2, goal=75, slack=2),
-    "characters of the mean code line": Limit(limit=53.5, goal=46, slack=1),
-    "comment lines per 100 code lines of kernels and steppers": Limit(limit=5.3, goal=5.5, slack=0.2),
+    "functions per 1000 code lines": Limit(limit=77.4, goal=75, slack=2),
+    "characters of the mean code line": Limit(limit=43.6, goal=46, slack=1),
+    "comment lines per 100 code lines of kernels and steppers": Limit(
+        limit=5.8, goal=5.5, slack=0.2
+    ),
     "circles of imports": Limit(limit=1, goal=0, slack=0),
 }
 
@@ -182,7 +184,9 @@ def imported_files() -> tuple[str, ...]:
             done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, check=True)
         status, compiled, files = json.loads(done.stdout.splitlines()[-1])
         if status:
-            raise RuntimeError(f"fvsolve run valve-closure ended with exit status {status}: {done.stderr}")
+            raise RuntimeError(
+                f"fvsolve run valve-closure ended with exit status {status}: {done.stderr}"
+            )
         if not compiled:
             break
     return tuple(sorted(Path(file).relative_to(PACKAGE).as_posix() for file in files))
@@ -212,18 +216,24 @@ def without_comments(source: str) -> str:
 
 def words_in(source: str) -> dict[str, Counter[str]]:
     """Words of each feature in a text, with their numbers; features without a word are left out."""
-    found = {name: Counter(re.findall(rf"\b(?:{words})\b", source)) for name, words in FEATURES.items()}
+    found = {
+        name: Counter(re.findall(rf"\b(?:{words})\b", source)) for name, words in FEATURES.items()
+    }
     return {name: words for name, words in found.items() if words}
 
 
-def hub_matrix(root: Path, hubs: list[str], code_alone: bool = False) -> dict[tuple[str, str], Counter[str]]:
+def hub_matrix(
+    root: Path, hubs: list[str], code_alone: bool = False
+) -> dict[tuple[str, str], Counter[str]]:
     """Cells of the hub matrix that are not empty: (hub, feature) -> words with their numbers.
 
     Words are counted in the whole text, as in the count of issue 61, or without comments and docstrings.
     """
     missing = [hub for hub in hubs if not (root / hub).is_file()]
     if missing:
-        raise FileNotFoundError(f"{', '.join(missing)}: unknown hub. If it moved, update HUBS in {Path(__file__).name}")
+        raise FileNotFoundError(
+            f"{', '.join(missing)}: unknown hub. If it moved, update HUBS in {Path(__file__).name}"
+        )
     matrix = {}
     for hub in hubs:
         source = (root / hub).read_text(encoding="utf8")
@@ -240,18 +250,25 @@ def imports(package: str) -> dict[str, set[str]]:
     circle, with them the one of issue 61.
     """
     graph = grimp.build_graph(package, exclude_type_checking_imports=False, cache_dir=None)
-    return {module: graph.find_modules_directly_imported_by(module) for module in sorted(graph.modules)}
+    return {
+        module: graph.find_modules_directly_imported_by(module) for module in sorted(graph.modules)
+    }
 
 
 def circles(arrows: dict[str, set[str]]) -> list[list[str]]:
     """Circles of imports: strongly connected sets of more than one module."""
     modules = list(arrows)
     number = {module: k for k, module in enumerate(modules)}
-    pairs = [(number[module], number[other]) for module, others in arrows.items() for other in others]
+    pairs = [
+        (number[module], number[other]) for module, others in arrows.items() for other in others
+    ]
     begin, end = np.array(pairs, dtype=int).reshape(-1, 2).T
     graph = csr_array((np.ones(len(pairs)), (begin, end)), shape=(len(modules), len(modules)))
     _, labels = connected_components(graph, directed=True, connection="strong")
-    sets = [[module for module in modules if labels[number[module]] == k] for k in range(labels.max() + 1)]
+    sets = [
+        [module for module in modules if labels[number[module]] == k]
+        for k in range(labels.max() + 1)
+    ]
     return [members for members in sets if len(members) > 1]
 
 
@@ -285,7 +302,9 @@ def limits_in(source: str) -> dict[str, Limit]:
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and node.targets[0].id == "LIMITS":
             return {
-                key.value: Limit(**{word.arg: ast.literal_eval(word.value) for word in call.keywords})
+                key.value: Limit(
+                    **{word.arg: ast.literal_eval(word.value) for word in call.keywords}
+                )
                 for key, call in zip(node.value.keys, node.value.values, strict=True)
             }
     return {}
@@ -316,7 +335,9 @@ def table() -> str:
     for name, measure in MEASURES.items():
         rows.append((name, shown(measure()), shown(LIMITS[name].limit), shown(LIMITS[name].goal)))
     width = max(len(row[0]) for row in rows)
-    return "\n".join(f"{name:{width}}" + "".join(f"{text:>8}" for text in texts) for name, *texts in rows)
+    return "\n".join(
+        f"{name:{width}}" + "".join(f"{text:>8}" for text in texts) for name, *texts in rows
+    )
 
 
 def matrix_text() -> str:

@@ -21,7 +21,16 @@ MASSES = {"mass_dynamics"}
 BODIES = {"body_kinematics", "mass_matrix", "moving_frames", "bushings_and_pins"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
 MEMORY = {"relaxation"}  # of unsteady friction
-IMPLICIT = {"newton", "dirk", "irk", "ros", "structure", "linear_dense", "linear_banded", "linear_sparse"}
+IMPLICIT = {
+    "newton",
+    "dirk",
+    "irk",
+    "ros",
+    "structure",
+    "linear_dense",
+    "linear_banded",
+    "linear_sparse",
+}
 CAVITIES = {"cavitating_pipes", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
 SCALARS = {"scalar_transport"}
@@ -56,7 +65,10 @@ def tanks(**numerics) -> dict:
 
 def line(**numerics) -> dict:
     nodes = {"lake": reservoir(1e6), "gate": junction(), "end": chamber(0.1)}
-    links = {"main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20), "hole": valve("gate", "end", 0.01)}
+    links = {
+        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 20),
+        "hole": valve("gate", "end", 0.01),
+    }
     return scene(nodes, links, 1.0, numerics, ["gate.pressure"])
 
 
@@ -71,7 +83,14 @@ def test_two_tanks_are_two_states_and_no_more():
     model = fvsolve.build(fvsolve.load(tanks()))
     assert model.state_names == ["high.mass", "low.mass"]
     rows = {name: len(rows) for name in rec.RECORDS if len(rows := getattr(model.tables, name))}
-    assert rows == {"settings": 1, "layout": 1, "nodes": 2, "valves": 1, "schedules": 1, "probes": 1}
+    assert rows == {
+        "settings": 1,
+        "layout": 1,
+        "nodes": 2,
+        "valves": 1,
+        "schedules": 1,
+        "probes": 1,
+    }
     assert (
         model.new_out().size == rec.OUT_HEAD + 4 * 2 + 3
     )  # pressure, supply, net flow, code of isolated nodes; three of the valve
@@ -110,8 +129,10 @@ def test_a_scene_without_pipes_has_the_same_rates_as_with_a_pipe(law):
     """The second case adds a pipe at rest, from a reservoir to a junction behind a shut valve."""
     alone = tanks() | {"fluid": {**tanks()["fluid"], "law": law}}
     nodes = alone["nodes"] | {"a": reservoir(101325.0 + 9806.65 * 4.0), "b": junction()}
-    links = alone["links"] | {"line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
-                              "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6}}  # fmt: skip
+    links = alone["links"] | {
+        "line": pipe("a", "b", 10.0, 0.1, 1000.0, 8),
+        "way": valve("b", "high", 0.0, opening=0.0) | {"area": 1e-6},
+    }
     both = alone | {"nodes": nodes, "links": links, "numerics": {"end": 10.0, "scheme": "upwind5"}}
     one, other = (fvsolve.build(fvsolve.load(case)) for case in (alone, both))
     y = np.array([-30.0, 20.0])
@@ -132,21 +153,28 @@ PATCHES = {"sea": {"side": "east", "boundary": "open"}, "gate": {"side": "west"}
 
 def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
     """Case of a basin, with a dye unless it is a liquid: alone, or with links that carry no flow into it."""
-    shape = {"type": "basin", "physics": physics, "size": [2.0, 2.0], "cells": [8, 8]} | POOLS[physics]
+    shape = {"type": "basin", "physics": physics, "size": [2.0, 2.0], "cells": [8, 8]} | POOLS[
+        physics
+    ]
     shape |= {} if physics == "transport" else {"patches": PATCHES}
     nodes, joined = {"pool": shape}, {}
     if links:
         nodes |= {"a": reservoir(2e5), "b": reservoir(1e5)}
         joined = {"hole": valve("a", "b", 0.01)}
-        if physics == "liquid":  # faces of water that a link joins have rates of their own, also while it is shut
+        # faces of water that a link joins have rates of their own, also while it is shut
+        if physics == "liquid":
             joined |= {"shut": valve("pool.gate", "a", 0.01, opening=0.0)}
     case = scene(nodes, joined, 1e-3, numerics, fluid={**WATER, "law": law})
     return case if physics == "liquid" else case | {"scalars": {"dye": {}}}
 
 
-@pytest.mark.parametrize(("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")])
+@pytest.mark.parametrize(
+    ("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")]
+)
 def test_an_isolated_basin_has_the_same_rates_as_with_a_link(physics, law):
-    alone, both = (fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True))
+    alone, both = (
+        fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True)
+    )
     assert alone.functions.cast.alone and not both.functions.cast.alone
     y = fvsolve.initial_state(alone).y
     y += 1e-3 * np.cos(np.arange(y.size)) * np.abs(y).max()
@@ -155,8 +183,14 @@ def test_an_isolated_basin_has_the_same_rates_as_with_a_link(physics, law):
 
 
 def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
-    network, fifth = {"restrictions", "linear_nodes", "basin_patches", "reconstruction"}, {"fifth_order"}
-    muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
+    network, fifth = (
+        {"restrictions", "linear_nodes", "basin_patches", "reconstruction"},
+        {"fifth_order"},
+    )
+    muscl, weno5 = (
+        files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s))))
+        for s in ("muscl", "weno5")
+    )
     assert muscl & (network | fifth) == {"reconstruction"}
     assert weno5 & (network | fifth) == fifth | {"reconstruction"}
 

@@ -74,7 +74,9 @@ def test_networks_that_are_written_twice_have_equal_extremes():
         case["numerics"]["pipe_model"] = model
         random = np.random.default_rng(number if seed == 2 else [seed, number, 7])
         other = restated_networks.restated(case, random)
-        apart = restated_networks.difference(restated_networks.extremes(case), restated_networks.extremes(other))
+        apart = restated_networks.difference(
+            restated_networks.extremes(case), restated_networks.extremes(other)
+        )
         assert apart <= restated_networks.BOUND, (seed, number, model)
 
 
@@ -88,7 +90,9 @@ def test_bands_of_random_networks_hold_the_true_peaks(model: str):
     for k in (1, 22):
         network = exact_networks.random_network((1, k))
         truth = exact_networks.solution(network)
-        network_bands.compare(count, str(k), network_bands.case_with(network, truth, model, (1, k)), network, truth)
+        network_bands.compare(
+            count, str(k), network_bands.case_with(network, truth, model, (1, k)), network, truth
+        )
     assert count.bands >= 20 and not count.missed and not count.wrong
 
 
@@ -179,12 +183,18 @@ def test_equal_dumps_have_no_difference(dumps):
     assert dumps.compare(run(), run(), dumps.Names()) == []
 
 
-@pytest.mark.parametrize("place", [("start", "dydt"), (SUMMARY, "extremes", "gate.pressure", "least")])
+@pytest.mark.parametrize(
+    "place", [("start", "dydt"), (SUMMARY, "extremes", "gate.pressure", "least")]
+)
 def test_a_single_bit_is_a_difference(place, dumps):
     new = run()
     new[place] = np.nextafter(new[place], 3.0)
     (listed,) = dumps.compare(run(), new, dumps.Names())
-    assert listed.place.startswith("/".join(place)) and listed.old != listed.new and "0x1." in listed.old
+    assert (
+        listed.place.startswith("/".join(place))
+        and listed.old != listed.new
+        and "0x1." in listed.old
+    )
 
 
 def test_the_first_number_that_differs_is_reported(dumps):
@@ -196,7 +206,10 @@ def test_the_first_number_that_differs_is_reported(dumps):
 
 def test_kinds_of_numbers_and_shapes_count(dumps):
     new = run() | {(SUMMARY, "steps"): 3.0, ("history.csv", "gate.pressure [Pa]"): np.array([1e5])}
-    assert {one.new for one in dumps.compare(run(), new, dumps.Names())} == {"3.0 (0x1.8000000000000p+1)", "float64[1]"}
+    assert {one.new for one in dumps.compare(run(), new, dumps.Names())} == {
+        "3.0 (0x1.8000000000000p+1)",
+        "float64[1]",
+    }
 
 
 def test_a_place_that_lacks_is_a_difference_on_either_side(dumps):
@@ -212,7 +225,12 @@ def test_names_of_the_map_are_equal(dumps):
     new = moved(run(), (*above, "least"), (*above, "minimum"))
     new = moved(new, ("history.csv", "gate.pressure [Pa]"), ("history.csv", "gate.p [Pa]"))
     new[SUMMARY, "expectations", "0", "text"] = "max(gate.p) - min_pressure"
-    lines = ["# words", "", "public\textremes.least\textremes.minimum", "public\tmin_p\tmin_pressure"]
+    lines = [
+        "# words",
+        "",
+        "public\textremes.least\textremes.minimum",
+        "public\tmin_p\tmin_pressure",
+    ]
     names = dumps.Names([*lines, "public\tpressure\tp", "public\tverdicts.least\tverdicts.minimum"])
     assert dumps.compare(run(), new, names) == []
     assert names.unused() == ["verdicts.least"]
@@ -235,10 +253,20 @@ def test_names_that_change_places_are_distinguished(dumps):
 
 
 def test_texts_for_people_may_have_other_words(dumps):
-    new = run() | {(SUMMARY, "warnings", "0", "text"): "a full tank", (SUMMARY, "reason"): "stopped: look at the step"}
+    new = run() | {
+        (SUMMARY, "warnings", "0", "text"): "a full tank",
+        (SUMMARY, "reason"): "stopped: look at the step",
+    }
     assert dumps.compare(run(), new, dumps.Names()) == []
     assert len(dumps.compare(run(), new | {(SUMMARY, "reason"): "finished"}, dumps.Names())) == 1
-    assert len(dumps.compare(run(), new | {(SUMMARY, "expectations", "0", "text"): "max(x)"}, dumps.Names())) == 1
+    assert (
+        len(
+            dumps.compare(
+                run(), new | {(SUMMARY, "expectations", "0", "text"): "max(x)"}, dumps.Names()
+            )
+        )
+        == 1
+    )
 
 
 def test_names_of_python_are_located_from_both_ends(dumps):

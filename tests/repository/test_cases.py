@@ -27,7 +27,8 @@ def test_the_promised_cases_are_there():
 def test_a_shipped_case_satisfies_its_claims(path):
     written = tomllib.loads(path.read_text(encoding="utf-8"))
     assert written.get("title") and written.get("expect")
-    assert {"scheme", "method"} <= written["numerics"].keys()  # a change of a default must not change results
+    # a change of a default must not change results
+    assert {"scheme", "method"} <= written["numerics"].keys()
     result = fvsolve.run(path)
     assert result.ok, result.reason
     assert result.expectations
@@ -65,7 +66,9 @@ def edge(share: float, up: float, down: float, fluid: AirOil, viscosity: float) 
     size = 2.0 * fluid.density(max(up, down)) * (HOLE * share) ** 2 * abs(up - down)
     slow = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * 12e-6 / math.pi) * viscosity
     x = size / slow**2
-    return math.copysign(math.sqrt(size) if x >= 1 else slow * x * (45 - 18 * x**2 + 5 * x**4) / 32, up - down)
+    return math.copysign(
+        math.sqrt(size) if x >= 1 else slow * x * (45 - 18 * x**2 + 5 * x**4) / 32, up - down
+    )
 
 
 def rates(t, y, fluid, viscosity):
@@ -73,7 +76,10 @@ def rates(t, y, fluid, viscosity):
     p_a, p_b, x, v = y
     s = float(np.interp(t, BREAKS, OPENING))
     feed, drain = (p_a, p_b) if s > 0 else (p_b, p_a)
-    into, out = edge(abs(s), ENDS[0], feed, fluid, viscosity), edge(abs(s), drain, ENDS[1], fluid, viscosity)
+    into, out = (
+        edge(abs(s), ENDS[0], feed, fluid, viscosity),
+        edge(abs(s), drain, ENDS[1], fluid, viscosity),
+    )
     flows = (into, -out) if s > 0 else (-out, into)
     volumes = DEAD + AREAS[0] * x, DEAD + AREAS[1] * (STROKE - x)
     swept = AREAS[0] * v, -AREAS[1] * v
@@ -87,11 +93,19 @@ def test_the_drive_moves_as_by_scipy():
     result = fvsolve.run(CASE)
     fluid, viscosity = oil()
     start = [*START, 0.06, 0.0]
-    truth = follow(lambda t, y: rates(t, y, fluid, viscosity), start, result.t, [1.0, 1.0, 1e-12, 1e-10], BREAKS, 1e-3)
+    truth = follow(
+        lambda t, y: rates(t, y, fluid, viscosity),
+        start,
+        result.t,
+        [1.0, 1.0, 1e-12, 1e-10],
+        BREAKS,
+        1e-3,
+    )
     truth[:2] = (truth[:2] - ATM) / 1e5
     truth[2] *= 1e3
     probes = ("cyl.A.gauge_pressure", "cyl.B.gauge_pressure", "load.position", "load.velocity")
-    for probe, one, near in zip(probes, truth, (1e-3, 1e-3, 1e-3, 3e-6), strict=True):  # [bar], [bar], [mm], [m/s]
+    # [bar], [bar], [mm], [m/s]
+    for probe, one, near in zip(probes, truth, (1e-3, 1e-3, 1e-3, 3e-6), strict=True):
         assert result[probe] == approx(one, abs=near), probe
 
 
@@ -101,12 +115,19 @@ def truth_behind_the_shut_spool() -> np.ndarray:
     fluid, viscosity = oil()
     apart = np.array([0.0, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4])
     near = np.ravel([(t - apart, t + apart) for t in (102.5e-3, 180e-3)])
-    times, rate = np.union1d([0.0, *near, *BREAKS], [0.103, 0.181]), lambda t, y: rates(t, y, fluid, viscosity)
-    truth = follow(rate, [*START, 0.06, 0.0], times, [1.0, 1.0, 1e-12, 1e-10], sorted({*BREAKS, *near}), 1e-3)
+    times, rate = (
+        np.union1d([0.0, *near, *BREAKS], [0.103, 0.181]),
+        lambda t, y: rates(t, y, fluid, viscosity),
+    )
+    truth = follow(
+        rate, [*START, 0.06, 0.0], times, [1.0, 1.0, 1e-12, 1e-10], sorted({*BREAKS, *near}), 1e-3
+    )
     return truth[1, np.searchsorted(times, [0.103, 0.181])]
 
 
-@pytest.mark.parametrize("method", ["auto", "tsitouras", "verner-7", "rodas-4", "rodas-5p", "radau-iia-5", "esdirk-5"])
+@pytest.mark.parametrize(
+    "method", ["auto", "tsitouras", "verner-7", "rodas-4", "rodas-5p", "radau-iia-5", "esdirk-5"]
+)
 def test_flow_that_turns_laminar_as_the_spool_shuts_is_seen(method, truth_behind_the_shut_spool):
     """The flow is laminar for 15 us within a long step; five of these methods once agreed on an error of 20 Pa."""
     result = fvsolve.run(CASE, set={"numerics.method": method, "numerics.rtol": 1e-7})
@@ -125,12 +146,20 @@ def test_air_slows_the_swinging_by_the_root_of_the_bulk_modulus():
         hold = (AREAS[0] - AREAS[1]) * 5e5 - 1e4 * (0.06 - 0.01)
         end = 20 * 2 * math.pi / omega
         changes = {
-            "fluid.air_fraction": fraction, "links.spool.position": 0.0, "links.cyl.viscous_friction": 0.0,
-            "links.cyl.initial_pressure_A": p, "links.cyl.initial_pressure_B": p, "nodes.load.initial_velocity": 1e-4,
+            "fluid.air_fraction": fraction,
+            "links.spool.position": 0.0,
+            "links.cyl.viscous_friction": 0.0,
+            "links.cyl.initial_pressure_A": p,
+            "links.cyl.initial_pressure_B": p,
+            "nodes.load.initial_velocity": 1e-4,
             "links.push": {"type": "force", "from": "ground", "to": "load", "force": -hold},
-            "numerics.end": end, "output.every": end / 2000, "numerics.rtol": 1e-10,
-        }  # fmt: skip
-        plain = {key: value for key, value in tomllib.loads(CASE.read_text()).items() if key != "expect"}
+            "numerics.end": end,
+            "output.every": end / 2000,
+            "numerics.rtol": 1e-10,
+        }
+        plain = {
+            key: value for key, value in tomllib.loads(CASE.read_text()).items() if key != "expect"
+        }
         result = fvsolve.run(plain, set=changes)
         x = result["load.position"] - 60.0
         up = np.flatnonzero((x[:-1] <= 0) & (x[1:] > 0))[1:]

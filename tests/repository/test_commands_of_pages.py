@@ -26,9 +26,12 @@ COMMAND = re.compile(r"(?:^|[\s/!])(fvsolve (?!is |in |runs$|fvsolve )[a-z-]+.*)
 CODE = re.compile(rf"(?<!`)`((?:fvsolve |--|(?:{'|'.join(COMMANDS)}) [^`]*--)[^`]+)`(?!`)")
 ENDS = {"|", ">", ">>", "&&", "||", ";", "&"}  # of a command in a shell
 CHOICES = {
-    "--goal": GOALS, "--refine": WAYS, "--reference": REFERENCE_KINDS, "--scheme": SCHEMES,
+    "--goal": GOALS,
+    "--refine": WAYS,
+    "--reference": REFERENCE_KINDS,
+    "--scheme": SCHEMES,
     "--method": {*METHODS, "auto"},
-}  # fmt: skip
+}
 OTHER_PROGRAMS = {
     "--full",
     "--site",
@@ -42,14 +45,24 @@ OTHER_PROGRAMS = {
 
 def complete_commands(text: str) -> list[str]:
     """Commands in code blocks, with continued lines joined."""
-    blocks = [body for kind, body in BLOCK.findall(text) if not kind.startswith(("python", "toml", "json"))]
+    blocks = [
+        body
+        for kind, body in BLOCK.findall(text)
+        if not kind.startswith(("python", "toml", "json"))
+    ]
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
-    return [match[1] for line in lines if not line.lstrip().startswith("#") and (match := COMMAND.search(line))]
+    return [
+        match[1]
+        for line in lines
+        if not line.lstrip().startswith("#") and (match := COMMAND.search(line))
+    ]
 
 
 def usage_texts(text: str) -> list[str]:
     """Code outside of blocks that begins with the name of the program or with an option."""
-    return [code.replace("\\|", "|").replace("\n", " ") for code in CODE.findall(BLOCK.sub("", text))]
+    return [
+        code.replace("\\|", "|").replace("\n", " ") for code in CODE.findall(BLOCK.sub("", text))
+    ]
 
 
 @cache
@@ -59,13 +72,23 @@ def commands() -> dict:
 
 def options(names) -> set[str]:
     parameters = [parameter for name in names for parameter in commands()[name].params]
-    return {option for parameter in parameters for option in (*parameter.opts, *parameter.secondary_opts)}
+    return {
+        option
+        for parameter in parameters
+        for option in (*parameter.opts, *parameter.secondary_opts)
+    }
 
 
 def wrong_choices(words: list[str]) -> list[str]:
     """Values that an option does not know; words in capitals and names of files stand for others."""
-    pairs = [(option, value) for option, value in zip(words, words[1:], strict=False) if option in CHOICES]
-    values = [(option, one) for option, value in pairs for one in re.split(r"[,|]", value.strip("`.,;:"))]
+    pairs = [
+        (option, value)
+        for option, value in zip(words, words[1:], strict=False)
+        if option in CHOICES
+    ]
+    values = [
+        (option, one) for option, value in pairs for one in re.split(r"[,|]", value.strip("`.,;:"))
+    ]
     return [
         f"{option} {one}"
         for option, one in values
@@ -85,7 +108,8 @@ def faults_of_command(line: str) -> list[str]:
     try:
         commands()[words[0]].make_context(words[0], words[1:])
     except Exception as error:
-        if not hasattr(error, "format_message"):  # typer has an own copy of click, or uses the package
+        # typer has an own copy of click, or uses the package
+        if not hasattr(error, "format_message"):
             raise
         return [error.format_message()]
     return wrong_choices(words)
@@ -104,12 +128,18 @@ def faults_of_usage(text: str) -> list[str]:
 def page_parameters(of, page) -> list:
     name = page.relative_to(TOP).as_posix()
     return [
-        pytest.param(text, id=f"{name}: {text[:80]}") for text in dict.fromkeys(of(page.read_text(encoding="utf-8")))
+        pytest.param(text, id=f"{name}: {text[:80]}")
+        for text in dict.fromkeys(of(page.read_text(encoding="utf-8")))
     ]
 
 
 # tests/repository/test_extending_page.py runs those of commands of another package
-LINES = [one for page in PAGES if page.stem != "extending" for one in page_parameters(complete_commands, page)]
+LINES = [
+    one
+    for page in PAGES
+    if page.stem != "extending"
+    for one in page_parameters(complete_commands, page)
+]
 USAGES = [one for page in PAGES for one in page_parameters(usage_texts, page)]
 
 
@@ -129,7 +159,14 @@ def test_the_commands_of_the_pages_and_their_faults_are_detected():
     assert any("--goal minimum|maximum" in text for text in texts) and "--goal maximum" in texts
     assert faults_of_usage("--goal greatest") == ["--goal greatest"]
     assert faults_of_usage("fvsolve sensitivity CASE --outcome X") == ["unknown option --outcome"]
-    assert faults_of_usage("fvsolve ruin CASE") == faults_of_command("fvsolve ruin a") == ["unknown command ruin"]
-    assert "No such option" in faults_of_command('fvsolve sensitivity a --vary b=1,2 --outcome "max(c)"')[0]
+    assert (
+        faults_of_usage("fvsolve ruin CASE")
+        == faults_of_command("fvsolve ruin a")
+        == ["unknown command ruin"]
+    )
+    assert (
+        "No such option"
+        in faults_of_command('fvsolve sensitivity a --vary b=1,2 --outcome "max(c)"')[0]
+    )
     assert "Missing option" in faults_of_command("fvsolve size a > b.txt")[0]
     assert faults_of_command("fvsolve order a --scheme upwind,muscle") == ["--scheme muscle"]

@@ -47,7 +47,9 @@ def run(top: Path, *words: str) -> subprocess.CompletedProcess:
 
 
 def test_features_of_the_package_have_cases_here():
-    assert {path.parent.name for path in (PACKAGE / "features").glob("*/feature.py")} == AWAKE.keys()
+    assert {
+        path.parent.name for path in (PACKAGE / "features").glob("*/feature.py")
+    } == AWAKE.keys()
 
 
 def test_a_surge_runs_without_features(tmp_path):

@@ -40,22 +40,40 @@ def whole(tmp_path_factory):
     (folder / "measured.csv").write_text("t,p\n0,4e5\n0.5,6e5\n")
     case = branched(fields=2)
     case |= {
-        "routes": {"line": {"pipes": ["main", "last"]}}, "expect": {"max(gate.head)": {"value": 100.0, "rtol": 0.9}},
+        "routes": {"line": {"pipes": ["main", "last"]}},
+        "expect": {"max(gate.head)": {"value": 100.0, "rtol": 0.9}},
         "limits": {"high": {"on": "line", "quantity": "gauge_pressure", "maximum": 8e5}},
         "compare": {"gate.pressure": {"file": str(folder / "measured.csv")}},
-    }  # fmt: skip
+    }
     path = folder / "case.toml"
     path.write_text(fvsolve.load(case).resolved())
     result = fvsolve.run(path, out=folder / "run", pictures=False)
     summary = peak_errors(result, result.case)
-    cavity = {"time": 0.1, "distance": 3.0, "volume": 1e-3, "t_volume": 0.2, "text": "main: a cavity"}
+    cavity = {
+        "time": 0.1,
+        "distance": 3.0,
+        "volume": 1e-3,
+        "t_volume": 0.2,
+        "text": "main: a cavity",
+    }
     warning = {"key": None, "value": 1.0, "limit": 2.0, "ok": False, "text": "few cells"}
-    run_up = {"greatest": 1.0, "greatest_angle": 2.0, "angle": [1.0], "run_up": [1.0], "x": [0.0], "y": [None]}
+    run_up = {
+        "greatest": 1.0,
+        "greatest_angle": 2.0,
+        "angle": [1.0],
+        "run_up": [1.0],
+        "x": [0.0],
+        "y": [None],
+    }
     summary |= {
-        "marks": [{"what": "dry", "place": "nodes.fork", "time": 0.2, "text": "fork: dry", "volume": None}],
-        "cavities": [{"place": "links.main", **cavity}], "events": [{"time": 0.1, "name": "valve", "what": "shuts"}],
-        "warnings": [{"kind": "cells", "place": "links.main", **warning}], "run_up": {"shore": run_up},
-    }  # fmt: skip
+        "marks": [
+            {"what": "dry", "place": "nodes.fork", "time": 0.2, "text": "fork: dry", "volume": None}
+        ],
+        "cavities": [{"place": "links.main", **cavity}],
+        "events": [{"time": 0.1, "name": "valve", "what": "shuts"}],
+        "warnings": [{"kind": "cells", "place": "links.main", **warning}],
+        "run_up": {"shore": run_up},
+    }
     (folder / "run" / "summary.json").write_text(json.dumps(summary))
     read_summary(folder / "run" / "summary.json")
     return path, folder / "run"
@@ -64,7 +82,11 @@ def whole(tmp_path_factory):
 def places(data, at=()):
     """Key paths of all entries; of lists and of long tables only the first ones."""
     items = (
-        list(data.items()) if isinstance(data, dict) else list(enumerate(data))[:1] if isinstance(data, list) else []
+        list(data.items())
+        if isinstance(data, dict)
+        else list(enumerate(data))[:1]
+        if isinstance(data, list)
+        else []
     )
     for key, value in items if len(at) < 1 else items[:12]:
         yield (*at, key)
@@ -86,13 +108,19 @@ def changed(data: dict, at: tuple, value) -> str:
 
 def arguments(command: str, case: Path, run: Path, other: Path) -> tuple:
     return {
-        "report": ("report", run), "plot": ("plot", run, "--probes", "gate.pressure"), "fatigue": ("fatigue", run),
-        "view": ("view", run, "--out", run / "view.png"), "compare": ("compare", run, other),
-        "compared with": ("compare", other, run), "resume": ("run", case, "--out", run, "--resume", "--no-pictures"),
-    }[command]  # fmt: skip
+        "report": ("report", run),
+        "plot": ("plot", run, "--probes", "gate.pressure"),
+        "fatigue": ("fatigue", run),
+        "view": ("view", run, "--out", run / "view.png"),
+        "compare": ("compare", run, other),
+        "compared with": ("compare", other, run),
+        "resume": ("run", case, "--out", run, "--resume", "--no-pictures"),
+    }[command]
 
 
-def is_refused_or_used(fvs, name: str, text: str | bytes, command: str, whole, folder: Path) -> bool:
+def is_refused_or_used(
+    fvs, name: str, text: str | bytes, command: str, whole, folder: Path
+) -> bool:
     """Check that a command refuses the file `name` with this text in a message, or uses it; True if it is refused."""
     case, run = whole
     own = folder / "run"
@@ -116,20 +144,26 @@ def own_folder(tmp_path_factory):
 def test_a_summary_with_any_other_value_is_refused_or_used(whole, fvs, own_folder, seed):
     summary, draw = json.loads((whole[1] / "summary.json").read_text()), random.Random(seed)
     at, value = draw.choice(list(places(summary))), draw.choice(VALUES)
-    is_refused_or_used(fvs, "summary.json", changed(summary, at, value), draw.choice(COMMANDS), whole, own_folder)
+    is_refused_or_used(
+        fvs, "summary.json", changed(summary, at, value), draw.choice(COMMANDS), whole, own_folder
+    )
 
 
 @pytest.mark.parametrize("key", SummaryShape.__annotations__)
 def test_each_entry_of_a_summary_has_a_declared_type(key, whole, tmp_path):
     """The entry is named with what is found, what is expected, and the remedy."""
     summary = json.loads((whole[1] / "summary.json").read_text())
-    simple = isinstance(summary.get(key), (str, int, float, type(None))) and key != "energy_use"  # absent here
+    # absent here
+    simple = isinstance(summary.get(key), (str, int, float, type(None))) and key != "energy_use"
     wrong = {"a": 1} if simple else "words"
     (tmp_path / "summary.json").write_text(changed(summary, (key,), wrong))
     with pytest.raises(RunError) as error:
         fvsolve.open_run(tmp_path)
     said = str(error.value)
-    assert said.startswith(f"{tmp_path / 'summary.json'}: {key}: ") and "run the case again with --force" in said
+    assert (
+        said.startswith(f"{tmp_path / 'summary.json'}: {key}: ")
+        and "run the case again with --force" in said
+    )
     found = "it is a table" if wrong == {"a": 1} else '"words" is a text'
     assert f"{key}: {found}; expected " in said
 
@@ -141,7 +175,9 @@ def test_all_faults_of_a_summary_are_listed_up_to_five_and_the_rest_is_counted(w
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     with pytest.raises(RunError) as error:
         fvsolve.open_run(tmp_path)
-    assert str(error.value).count("expected a number or null") == 5 and "; and 3 more. " in str(error.value)
+    assert str(error.value).count("expected a number or null") == 5 and "; and 3 more. " in str(
+        error.value
+    )
 
 
 @pytest.mark.parametrize("change, told", [
@@ -157,10 +193,13 @@ def test_entries_that_contradict_each_other_are_named(change, told, whole, tmp_p
 
 
 BOMBS = {
-    "nested lists": "[" * 10**6, "nested tables": '{"a":' * 10**6, "many lists": "[[]," * 2_000_000,
-    "a long text": '"' + "\U0001f30a" * 20_000_000 + '"', "a long number": "9" * 10**7,
+    "nested lists": "[" * 10**6,
+    "nested tables": '{"a":' * 10**6,
+    "many lists": "[[]," * 2_000_000,
+    "a long text": '"' + "\U0001f30a" * 20_000_000 + '"',
+    "a long number": "9" * 10**7,
     "half a letter": '{"a": "\\ud800"}',
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", BOMBS.values(), ids=BOMBS)
@@ -191,7 +230,10 @@ def test_tables_that_no_run_wrote_are_refused_or_used(name, text, whole, fvs, tm
         cells = [row.split(",") for row in rows]
         cells = [[*row[:column], text.split()[1], *row[column + 1 :]] for row in cells]
         text = "\n".join([head, *map(",".join, cells)])
-    refused = {command: is_refused_or_used(fvs, name, text, command, whole, tmp_path) for command in COMMANDS}
+    refused = {
+        command: is_refused_or_used(fvs, name, text, command, whole, tmp_path)
+        for command in COMMANDS
+    }
     is_empty = (name, text) == ("history.csv", f"{head}\n")  # as of a run that stops at its start
     assert refused["report"] != is_empty
 
@@ -205,7 +247,9 @@ def npz(path: Path, members, kind=zipfile.ZIP_STORED) -> Path:
 
 def header(shape: tuple, dtype: str = "<f8") -> bytes:
     file = BytesIO()
-    np.lib.format.write_array_header_1_0(file, {"descr": dtype, "fortran_order": False, "shape": shape})
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": dtype, "fortran_order": False, "shape": shape}
+    )
     return file.getvalue()
 
 
@@ -218,7 +262,9 @@ def header(shape: tuple, dtype: str = "<f8") -> bytes:
     ([("y.npy", header((1,)) + bytes(8))] * 2, zipfile.ZIP_STORED, "the same name"),
 ], ids=["1e12 elements", "overflow", "objects", "compressed", "many names", "twice"])  # fmt: skip
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_a_checkpoint_larger_than_its_data_is_refused_before_memory_is_taken(members, kind, told, tmp_path):
+def test_a_checkpoint_larger_than_its_data_is_refused_before_memory_is_taken(
+    members, kind, told, tmp_path
+):
     path = npz(tmp_path / "restart.npz", members, kind)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with pytest.raises(ValueError, match=told):
@@ -238,13 +284,26 @@ def test_a_checkpoint_never_unpickles(tmp_path):
 
 
 def test_the_digest_covers_names_types_shapes_and_values():
-    arrays = {"a": np.arange(6.0), "b": np.array("text"), "c": np.zeros(1, [("x", "f8")]), "d": np.zeros((0, 4))}
-    others = [{"a": np.nextafter(arrays["a"], 9.0)}, {"a": arrays["a"].reshape(2, 3)}, {"e": arrays["a"]},
-              {"a": arrays["a"].view(np.int64)}, {"d": np.zeros((4, 0))}, {"b": np.array("texts")},
-              {"c": np.zeros(1, [("y", "f8")])}]  # fmt: skip
+    arrays = {
+        "a": np.arange(6.0),
+        "b": np.array("text"),
+        "c": np.zeros(1, [("x", "f8")]),
+        "d": np.zeros((0, 4)),
+    }
+    others = [
+        {"a": np.nextafter(arrays["a"], 9.0)},
+        {"a": arrays["a"].reshape(2, 3)},
+        {"e": arrays["a"]},
+        {"a": arrays["a"].view(np.int64)},
+        {"d": np.zeros((4, 0))},
+        {"b": np.array("texts")},
+        {"c": np.zeros(1, [("y", "f8")])},
+    ]
     others = [arrays, *({**arrays, **other} for other in others)]
     others.append({"z" if key == "a" else key: array for key, array in arrays.items()})
-    assert len({digest_of(row) for row in others}) == len(others) and digest_of({**arrays}) == digest_of(arrays)
+    assert len({digest_of(row) for row in others}) == len(others) and digest_of(
+        {**arrays}
+    ) == digest_of(arrays)
 
 
 @pytest.mark.parametrize("change, told", [
@@ -256,9 +315,18 @@ def test_the_digest_covers_names_types_shapes_and_values():
     (lambda data: data.update(title=None), "title: it is null"),
 ])  # fmt: skip
 def test_a_study_that_no_study_wrote_is_refused(change, told, tmp_path, fvs):
-    data = {"title": "A", "study": "s", "case": "c", "ok": True, "events": [], "protections": [], "holds": [],
-            "changes": {"events": {}, "protections": {}}, "error": False,
-            "runs": [{"event": None, "protection": None, "directory": "run"}]}  # fmt: skip
+    data = {
+        "title": "A",
+        "study": "s",
+        "case": "c",
+        "ok": True,
+        "events": [],
+        "protections": [],
+        "holds": [],
+        "changes": {"events": {}, "protections": {}},
+        "error": False,
+        "runs": [{"event": None, "protection": None, "directory": "run"}],
+    }
     (tmp_path / "study.json").write_text(json.dumps(data))
     assert scenarios.open_study(tmp_path)["runs"][0]["directory"] == str(tmp_path / "run")
     change(data)
@@ -277,4 +345,6 @@ def test_a_stored_point_that_was_changed_is_run_again(tmp_path):
     deep = '{"key": ' + "[" * 100_000
     (tmp_path / "points.jsonl").write_text("\n".join([forged, deep, lines[1]]) + "\n")
     again = sweep(case, vary, out=tmp_path)
-    assert again.reused == 1 and [row["ok"] for row in again.rows] == [row["ok"] for row in before.rows] == [True, True]
+    assert again.reused == 1 and [row["ok"] for row in again.rows] == [
+        row["ok"] for row in before.rows
+    ] == [True, True]

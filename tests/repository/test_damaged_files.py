@@ -40,26 +40,39 @@ print(value, sum(twice.numba.stats.cache_hits.values()) if "numba" in sys.module
 
 def compiled(folder, *arguments):
     """Printed words and standard error of a process that compiles a function or loads it from the cache."""
-    done = subprocess.run([sys.executable, "-c", KEPT, *arguments], capture_output=True, text=True,
-                          env=os.environ | {"FVSOLVE_CACHE": str(folder)})  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", KEPT, *arguments],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"FVSOLVE_CACHE": str(folder)},
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split(maxsplit=1), done.stderr
 
 
 def test_compiled_code_that_is_damaged_is_compiled_anew(tmp_path):
-    assert compiled(tmp_path)[0] == ["42.0", "0\n"] and compiled(tmp_path)[0] == ["42.0", "without numba\n"]
+    assert compiled(tmp_path)[0] == ["42.0", "0\n"] and compiled(tmp_path)[0] == [
+        "42.0",
+        "without numba\n",
+    ]
     for ending, harm in itertools.product(
         ("code", "nbi", "nbc"), ("cut to nothing", "cut short", "zeros in the middle")
     ):
         (path,) = tmp_path.rglob(f"*.{ending}")
         data = path.read_bytes()
         half = len(data) // 2
-        harmed = {"cut to nothing": b"", "cut short": data[:half],
-                  "zeros in the middle": data[:half] + bytes(len(data) - half)}  # fmt: skip
+        harmed = {
+            "cut to nothing": b"",
+            "cut short": data[:half],
+            "zeros in the middle": data[:half] + bytes(len(data) - half),
+        }
         path.write_bytes(harmed[harm])
         if ending != "code":
             next(tmp_path.rglob("*.code")).unlink()
-        assert compiled(tmp_path)[0] == ["42.0", "1\n" if ending == "code" else "0\n"], (ending, harm)
+        assert compiled(tmp_path)[0] == ["42.0", "1\n" if ending == "code" else "0\n"], (
+            ending,
+            harm,
+        )
         assert path.read_bytes() != harmed[harm], (ending, harm)
         if harm == "zeros in the middle":
             assert compiled(tmp_path)[0] == ["42.0", "without numba\n"], ending
@@ -69,7 +82,10 @@ def test_compiled_code_that_is_damaged_is_compiled_anew(tmp_path):
 def test_a_full_disk_costs_only_time_and_the_folder_is_named(tmp_path):
     said, err = compiled(tmp_path, "100")
     assert said == ["42.0", "0\n"]
-    assert f"{tmp_path}: compiled code cannot be saved: File too large" in err and "FVSOLVE_CACHE" in err
+    assert (
+        f"{tmp_path}: compiled code cannot be saved: File too large" in err
+        and "FVSOLVE_CACHE" in err
+    )
 
 
 FULL = """
@@ -87,12 +103,20 @@ main()
 def test_a_disk_that_fills_up_is_named_with_the_place_and_the_run_goes_on_later(tmp_path):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(fvsolve.load(branched(fields=0), {"output.every": "1 ms"}).resolved())
-    done = subprocess.run([sys.executable, "-c", FULL, str(case), str(out)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(case), str(out)], capture_output=True, text=True
+    )
     assert done.returncode == 2 and f"\n{out}" in f"\n{done.stderr}"
-    assert "cannot be written: File too large. Free disk space, or correct the access rights" in done.stderr
+    assert (
+        "cannot be written: File too large. Free disk space, or correct the access rights"
+        in done.stderr
+    )
     assert fvsolve.run(case, out=out, resume=True).ok
     whole = fvsolve.run(case, out=tmp_path / "whole")
-    assert whole.ok and (out / "history.csv").read_bytes() == (tmp_path / "whole" / "history.csv").read_bytes()
+    assert (
+        whole.ok
+        and (out / "history.csv").read_bytes() == (tmp_path / "whole" / "history.csv").read_bytes()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -134,11 +158,13 @@ HARM = {
     "memory of another type": lambda kept: {"memory.ledger": kept["memory.ledger"].astype(str)},
     "memory with numbers in place of a record": lambda kept: {"memory.state": np.zeros(1)},
     "a segment there is not": lambda kept: {"memory.run": np.append(99.0, kept["memory.run"][1:])},
-    "a segment that is no number": lambda kept: {"memory.run": np.append(np.nan, kept["memory.run"][1:])},
+    "a segment that is no number": lambda kept: {
+        "memory.run": np.append(np.nan, kept["memory.run"][1:])
+    },
     "one array more": lambda kept: {"memory.more": np.zeros(1)},
     "changes without end": lambda kept: {"memory.changes": np.zeros(1)},
     "changes in text": lambda kept: {"memory.changes": np.array([["a"] * 3])},
-}  # fmt: skip
+}
 
 
 def shorter(key: str):
@@ -152,12 +178,19 @@ def test_the_array_that_is_shortened_or_absent_is_named_with_its_file(key, stopp
     with np.load(out / "restart.npz") as file:
         kept = {key: file[key] for key in file.files}
     name = "states" if key == "y" else key.partition(".")[0]
-    for harmed in ({**kept, **shorter(key)(kept)}, {one: array for one, array in kept.items() if one != key}):
+    for harmed in (
+        {**kept, **shorter(key)(kept)},
+        {one: array for one, array in kept.items() if one != key},
+    ):
         write_sealed(out / "restart.npz", harmed)
         with pytest.raises(RunError) as error:
             fvsolve.run(case, out=out, resume=True)
         said = str(error.value)
-        assert said.startswith(str(out / "restart.npz")) and (name in said or key in said) and "--force" in said
+        assert (
+            said.startswith(str(out / "restart.npz"))
+            and (name in said or key in said)
+            and "--force" in said
+        )
         assert "only 0-dim" not in said and "unpack" not in said
 
 
@@ -195,21 +228,31 @@ def with_number(key: str, at, value):
 
 
 FORGED = {
-    "a value of a state": with_number("y", 3, 1.0), "the envelope": with_number("memory.envelope", (0, 0), 1.0),
-    "an extreme": with_number("memory.extremes", (0, 0), np.nan), "a time": with_entry("memory.state", "step", 1.0),
-}  # fmt: skip
+    "a value of a state": with_number("y", 3, 1.0),
+    "the envelope": with_number("memory.envelope", (0, 0), 1.0),
+    "an extreme": with_number("memory.extremes", (0, 0), np.nan),
+    "a time": with_entry("memory.state", "step", 1.0),
+}
 COUNTS = {  # refused even with a right digest
-    "fewer rows": with_number("counts", 0, 3), "more rows": with_number("counts", 0, 10**6),
-    "fewer bytes": with_number("counts", 1, 100), "more bytes": with_number("counts", 1, 10**9),
-    "fewer frames": with_number("counts", 2, 0), "more frames": with_number("counts", 2, 9),
-    "rows without end": with_number("counts", 0, 2**62), "an early time": lambda kept: {"t": np.float64(-1.0)},
-    "another time": lambda kept: {"t": kept["t"] + 0.01}, "NaN steps": with_entry("memory.state", "steps", np.nan),
-    "negative steps": with_entry("memory.state", "steps", -1.0), "no end": with_entry("memory.state", "newton", np.inf),
+    "fewer rows": with_number("counts", 0, 3),
+    "more rows": with_number("counts", 0, 10**6),
+    "fewer bytes": with_number("counts", 1, 100),
+    "more bytes": with_number("counts", 1, 10**9),
+    "fewer frames": with_number("counts", 2, 0),
+    "more frames": with_number("counts", 2, 9),
+    "rows without end": with_number("counts", 0, 2**62),
+    "an early time": lambda kept: {"t": np.float64(-1.0)},
+    "another time": lambda kept: {"t": kept["t"] + 0.01},
+    "NaN steps": with_entry("memory.state", "steps", np.nan),
+    "negative steps": with_entry("memory.state", "steps", -1.0),
+    "no end": with_entry("memory.state", "newton", np.inf),
     "outputs": with_entry("memory.state", "next_output", 1e300),
     "frames": with_entry("memory.state", "next_field", 9.0),
-    "NaN checks": with_number("memory.step doubling", 0, np.nan), "checks": with_number("memory.step doubling", 0, 5.0),
-    "a part": with_number("memory.energy", 10, 1e300), "NaN part": with_number("memory.energy", 10, np.nan),
-}  # fmt: skip
+    "NaN checks": with_number("memory.step doubling", 0, np.nan),
+    "checks": with_number("memory.step doubling", 0, 5.0),
+    "a part": with_number("memory.energy", 10, 1e300),
+    "NaN part": with_number("memory.energy", 10, np.nan),
+}
 
 
 @pytest.mark.parametrize("name", FORGED)
@@ -218,7 +261,9 @@ def test_a_checkpoint_that_was_changed_is_refused_by_its_digest(name, stopped, t
     with np.load(out / "restart.npz") as file:
         kept = {key: file[key] for key in file.files}
     np.savez(out / "restart.npz", **kept | FORGED[name](kept))
-    with pytest.raises(RunError, match=r"restart\.npz was changed after the run wrote it: .*--force"):
+    with pytest.raises(
+        RunError, match=r"restart\.npz was changed after the run wrote it: .*--force"
+    ):
         fvsolve.run(case, out=out, resume=True)
 
 
@@ -240,14 +285,18 @@ def test_counts_that_no_run_has_are_refused_even_with_a_right_digest(name, stopp
 
 
 @pytest.mark.parametrize("name", ["history.csv", "fields.pvd", "restart.npz"])
-def test_a_finished_run_with_files_that_do_not_fit_its_checkpoint_loses_nothing(name, stopped, tmp_path):
+def test_a_finished_run_with_files_that_do_not_fit_its_checkpoint_loses_nothing(
+    name, stopped, tmp_path
+):
     """A later end continues a finished run from its checkpoint; a refusal comes before its results are deleted."""
     case, out = copied(stopped, tmp_path)
     assert fvsolve.run(case, out=out, resume=True).ok
     (out / name).write_bytes((out / name).read_bytes()[:90])
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with pytest.raises(RunError, match=rf"{name}.*--force"):
-        fvsolve.run(case, {"numerics.end": 1.5, "output.every": case["output"]["every"]}, out, resume=True)
+        fvsolve.run(
+            case, {"numerics.end": 1.5, "output.every": case["output"]["every"]}, out, resume=True
+        )
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
@@ -271,7 +320,9 @@ def test_fields_that_are_gone_are_named_and_foreign_files_left_alone(stopped, tm
     shutil.rmtree(out)
     case, out = copied(stopped, tmp_path)
     shutil.rmtree(out / "fields")
-    with pytest.raises(RunError, match=r"fields\.pvd: frames are missing; start the run again with --force"):
+    with pytest.raises(
+        RunError, match=r"fields\.pvd: frames are missing; start the run again with --force"
+    ):
         fvsolve.run(case, out=out, resume=True)
     assert fvsolve.run(case, {"numerics.end": 0.01, "output.fields": 1}, out, force=True).ok
 
@@ -295,7 +346,10 @@ def test_tables_that_are_damaged_are_refused_when_they_are_read(name, text, stop
     shutil.copytree(stopped[1], tmp_path / "out")
     (tmp_path / "out" / name).write_text(text)
     result = fvsolve.open_run(tmp_path / "out")
-    ask = {"history.csv": lambda: result.t, "envelope.csv": lambda: result.envelope["main"]["distance"]}
+    ask = {
+        "history.csv": lambda: result.t,
+        "envelope.csv": lambda: result.envelope["main"]["distance"],
+    }
     if (name, text) == ("envelope.csv", ""):
         assert result.envelope == {}
         return
@@ -321,4 +375,6 @@ def test_damaged_points_of_a_study_are_computed_again(tmp_path):
         f"[]\n3\nnull\n{lines[0]}\n".encode() + b"\xff\xfe\n" + lines[1][:50].encode()
     )
     again = sweep(case, vary, out=tmp_path)
-    assert again.reused == 1 and [row["ok"] for row in again.rows] == [row["ok"] for row in before.rows]
+    assert again.reused == 1 and [row["ok"] for row in again.rows] == [
+        row["ok"] for row in before.rows
+    ]

@@ -40,8 +40,12 @@ def index(tmp_path, monkeypatch) -> Declarations:
     package.mkdir()
     head = "from fvsolve.declarations import declared\n"
     (package / "own.py").write_text(head + VALVES.format(divisor=1), encoding="utf-8")
-    (package / "broken.py").write_text('1 / 0\n@declared("gadget")\ndef pump():\n    pass\n', encoding="utf-8")
-    (package / "unused.txt").write_text('\n@declared("gadget")\ndef text():\n    pass\n', encoding="utf-8")
+    (package / "broken.py").write_text(
+        '1 / 0\n@declared("gadget")\ndef pump():\n    pass\n', encoding="utf-8"
+    )
+    (package / "unused.txt").write_text(
+        '\n@declared("gadget")\ndef text():\n    pass\n', encoding="utf-8"
+    )
     monkeypatch.setattr(declarations, "PACKAGE", package)
     monkeypatch.syspath_prepend(tmp_path)
     yield Declarations("gadget", "gadgets", ("*.py",))
@@ -52,7 +56,12 @@ def index(tmp_path, monkeypatch) -> Declarations:
 def offered(tmp_path, monkeypatch, name: str, entries: dict[str, str], **files: str) -> None:
     """Install a package with modules and entry points."""
     home = tmp_path / f"site-{name}"
-    install(home, name, {f"{name}/{module}.py": text for module, text in files.items()}, {GROUP: entries})
+    install(
+        home,
+        name,
+        {f"{name}/{module}.py": text for module, text in files.items()},
+        {GROUP: entries},
+    )
     monkeypatch.syspath_prepend(home)
 
 
@@ -68,9 +77,13 @@ def test_the_package_is_read_up_to_the_name_in_question(index):
 
 
 def test_an_unknown_name_has_a_hint(index):
-    with pytest.raises(FvsolveError, match='unknown gadget "slow-valv"; did you mean "slow-valve"?'):
+    with pytest.raises(
+        FvsolveError, match='unknown gadget "slow-valv"; did you mean "slow-valve"?'
+    ):
         index.load("slow-valv")
-    with pytest.raises(FvsolveError, match='unknown gadget "q"; expected one of Valve, pump, slow-valve'):
+    with pytest.raises(
+        FvsolveError, match='unknown gadget "q"; expected one of Valve, pump, slow-valve'
+    ):
         index.load("q")
 
 
@@ -80,34 +93,67 @@ def test_a_fault_of_the_package_itself_is_raised_as_it_is(index):
 
 
 def test_entry_points_follow_those_of_the_package(index, tmp_path, monkeypatch):
-    offered(tmp_path, monkeypatch, "gadget_mill", {"wheel": "gadget_mill.parts:Wheel.hub"}, __init__="",
-            parts="class Wheel:\n    hub = 7\n")  # fmt: skip
+    offered(
+        tmp_path,
+        monkeypatch,
+        "gadget_mill",
+        {"wheel": "gadget_mill.parts:Wheel.hub"},
+        __init__="",
+        parts="class Wheel:\n    hub = 7\n",
+    )
     assert list(index) == ["pump", "slow-valve", "Valve", "wheel"]
     assert "class Wheel" in index["wheel"].text() and "gadget_mill" not in sys.modules
     assert index.load("wheel") == 7
 
 
 def test_a_module_that_fails_names_its_source_and_breaks_no_other(index, tmp_path, monkeypatch):
-    entries = {"wheel": "gadget_mill:wheel", "lost": "gadget_mill.lost:x", "exits": "gadget_mill.exits:x"}
-    offered(tmp_path, monkeypatch, "gadget_mill", entries, __init__="wheel = 7\n", exits="import sys; sys.exit(3)\n")
+    entries = {
+        "wheel": "gadget_mill:wheel",
+        "lost": "gadget_mill.lost:x",
+        "exits": "gadget_mill.exits:x",
+    }
+    offered(
+        tmp_path,
+        monkeypatch,
+        "gadget_mill",
+        entries,
+        __init__="wheel = 7\n",
+        exits="import sys; sys.exit(3)\n",
+    )
     assert index.load("wheel") == 7
     source = "lost of the entry points fvsolve.gadgets of gadget_mill: gadget_mill.lost:x cannot be read: "
-    with pytest.raises(FvsolveError, match=f"{source}No module named 'gadget_mill.lost'; correct or remove it"):
+    with pytest.raises(
+        FvsolveError, match=f"{source}No module named 'gadget_mill.lost'; correct or remove it"
+    ):
         index.load("lost")
-    with pytest.raises(FvsolveError, match="gadget_mill.exits:x cannot be read: 3; correct or remove it"):
+    with pytest.raises(
+        FvsolveError, match="gadget_mill.exits:x cannot be read: 3; correct or remove it"
+    ):
         index.load("exits")
 
 
-def test_a_name_that_exists_twice_causes_a_warning_and_stays_that_of_the_first(index, tmp_path, monkeypatch):
-    offered(tmp_path, monkeypatch, "gadget_b", {"wheel": "gadget_b:second"}, __init__="second = 2\n")
-    offered(tmp_path, monkeypatch, "gadget_a", {"wheel": "gadget_a:first", "Valve": "gadget_a:first"},
-            __init__="first = 1\n")  # fmt: skip
+def test_a_name_that_exists_twice_causes_a_warning_and_stays_that_of_the_first(
+    index, tmp_path, monkeypatch
+):
+    offered(
+        tmp_path, monkeypatch, "gadget_b", {"wheel": "gadget_b:second"}, __init__="second = 2\n"
+    )
+    offered(
+        tmp_path,
+        monkeypatch,
+        "gadget_a",
+        {"wheel": "gadget_a:first", "Valve": "gadget_a:first"},
+        __init__="first = 1\n",
+    )
     with pytest.warns(RuntimeWarning) as caught:
         assert index.load("wheel") == 1
     assert sorted(str(one.message) for one in caught) == [
         f"{name} of the entry points fvsolve.gadgets of {package}: {place} cannot be read: a declaration of the gadget "
         f'"{name}" exists already; expected another name; correct or remove it'
-        for name, package, place in (("Valve", "gadget_a", "gadget_a:first"), ("wheel", "gadget_b", "gadget_b:second"))
+        for name, package, place in (
+            ("Valve", "gadget_a", "gadget_a:first"),
+            ("wheel", "gadget_b", "gadget_b:second"),
+        )
     ]
     assert index.load("Valve").__name__ == "Valve"
     with warnings.catch_warnings():
@@ -120,7 +166,10 @@ def test_others_are_read_only_for_a_name_that_the_package_lacks(index, tmp_path,
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert index.load("slow-valve")() == "slow"
-    with pytest.warns(RuntimeWarning, match="gadget_bad cannot be read: it names no object; expected MODULE:OBJECT"):
+    with pytest.warns(
+        RuntimeWarning,
+        match="gadget_bad cannot be read: it names no object; expected MODULE:OBJECT",
+    ):
         assert "wheel" not in index
 
 
@@ -131,21 +180,37 @@ def test_files_and_folders_of_a_user_are_read_by_their_headers(index, tmp_path, 
         (tmp_path / place).write_text(text.format(name), encoding="utf-8")
     places = [str(tmp_path / name) for name in ("mine", "alone.py", "absent.py")]
     monkeypatch.setenv("FVSOLVE_GADGETS", os.pathsep.join(places))
-    with pytest.warns(RuntimeWarning, match="FVSOLVE_GADGETS: .*absent.py cannot be read: .*; correct or remove it"):
+    with pytest.warns(
+        RuntimeWarning,
+        match="FVSOLVE_GADGETS: .*absent.py cannot be read: .*; correct or remove it",
+    ):
         assert [index.load(name)() for name in ("tap", "cock", "plug")] == ["tap", "cock", "plug"]
     (tmp_path / "alone.py").write_text("1 / 0\n" + text.format("plug"), encoding="utf-8")
     declarations._module_of_file.cache_clear()
-    with pytest.raises(FvsolveError, match="FVSOLVE_GADGETS: .*alone.py:f cannot be read: division by zero; correct"):
+    with pytest.raises(
+        FvsolveError,
+        match="FVSOLVE_GADGETS: .*alone.py:f cannot be read: division by zero; correct",
+    ):
         index.load("plug")
 
 
-def test_packages_in_zip_files_are_located_and_a_second_copy_of_a_package_is_not(index, tmp_path, monkeypatch):
+def test_packages_in_zip_files_are_located_and_a_second_copy_of_a_package_is_not(
+    index, tmp_path, monkeypatch
+):
     offered(tmp_path, monkeypatch, "gadget_old", {"old": "gadget_old:x"}, __init__="x = 1\n")
-    home = install(tmp_path / "newer", "gadget_old", {"gadget_old/__init__.py": "x = 2\n"},
-                   {GROUP: {"new": "gadget_old:x"}})  # fmt: skip
+    home = install(
+        tmp_path / "newer",
+        "gadget_old",
+        {"gadget_old/__init__.py": "x = 2\n"},
+        {GROUP: {"new": "gadget_old:x"}},
+    )
     monkeypatch.syspath_prepend(home)
-    zipped = install(tmp_path / "zipped", "gadget_zip", {"gadget_zip/__init__.py": "x = 3\n"},
-                     {GROUP: {"zipped": "gadget_zip:x"}})  # fmt: skip
+    zipped = install(
+        tmp_path / "zipped",
+        "gadget_zip",
+        {"gadget_zip/__init__.py": "x = 3\n"},
+        {GROUP: {"zipped": "gadget_zip:x"}},
+    )
     with zipfile.ZipFile(tmp_path / "packages.zip", "w") as archive:
         for path in zipped.rglob("*"):
             archive.write(path, path.relative_to(zipped))
@@ -155,10 +220,15 @@ def test_packages_in_zip_files_are_located_and_a_second_copy_of_a_package_is_not
 
 
 def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path):
-    entries = {"fvsolve.parts": {"mill": "mill.lost"}, "fvsolve.limiters": {"steep": "mill:steep", "flat": "mill:flat"}}
+    entries = {
+        "fvsolve.parts": {"mill": "mill.lost"},
+        "fvsolve.limiters": {"steep": "mill:steep", "flat": "mill:flat"},
+    }
     text = "def steep(r):\n    return 1 / 0\n\ndef flat(r):\n    return 0.0\n"
     home = install(tmp_path, "mill", {"mill/__init__.py": text}, entries)
-    code = "import fvsolve.parts, fvsolve.core.schemes; print('flat' in fvsolve.core.schemes.LIMITERS)"
+    code = (
+        "import fvsolve.parts, fvsolve.core.schemes; print('flat' in fvsolve.core.schemes.LIMITERS)"
+    )
     done = python(home, "-c", code, FVSOLVE_PARTS=str(tmp_path / "absent"))
     assert done.stdout == "True\n"
     for text in (

@@ -24,21 +24,31 @@ from fvsolve.parts.attitude_keys import Attitude
 
 TOP = DOCS.parent
 TEXTS = "README.md CONTRIBUTING.md pyproject.toml docs/**/*.md cases/*.toml fvsolve/**/*.py tests/**/*.py".split()
-NAMED = re.compile(r"(?<![\w/])(?:tests/)?(\w+/test_\w+\.py|truth/\w+\.py)")  # with `tests/` or without
+# with `tests/` or without
+NAMED = re.compile(r"(?<![\w/])(?:tests/)?(\w+/test_\w+\.py|truth/\w+\.py)")
 
 
 def test_every_file_of_tests_that_is_named_is_there():
-    texts = {path: path.read_text(encoding="utf-8") for pattern in TEXTS for path in TOP.glob(pattern)}
-    named = {(path.relative_to(TOP).as_posix(), name) for path, text in texts.items() for name in NAMED.findall(text)}
+    texts = {
+        path: path.read_text(encoding="utf-8") for pattern in TEXTS for path in TOP.glob(pattern)
+    }
+    named = {
+        (path.relative_to(TOP).as_posix(), name)
+        for path, text in texts.items()
+        for name in NAMED.findall(text)
+    }
     assert len(named) > 50
-    assert sorted((path, name) for path, name in named if not (TOP / "tests" / name).is_file()) == []
+    assert (
+        sorted((path, name) for path, name in named if not (TOP / "tests" / name).is_file()) == []
+    )
 
 
 HOW_TO_PAGES = sorted(path for path in (DOCS / "how-to").glob("*.md") if path.stem != "index")
 START = DOCS / "start"
 RUN_PAGES = [*HOW_TO_PAGES, START / "first-questions.md", DOCS / "index.md"]
 BLOCK = re.compile(r"^```(\w*)[ ]?(\S*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}  # optional libraries
+# optional libraries
+LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}
 FAILS = (0, 1)  # exit status 1: some pages show a limit that fails
 
 
@@ -48,12 +58,15 @@ def plain(text: str) -> str:
 
 
 def test_every_page_is_in_the_index():
-    linked = set(re.findall(r"\(([\w-]+)\.md\)", (DOCS / "how-to/index.md").read_text(encoding="utf-8")))
+    linked = set(
+        re.findall(r"\(([\w-]+)\.md\)", (DOCS / "how-to/index.md").read_text(encoding="utf-8"))
+    )
     assert linked == {path.stem for path in HOW_TO_PAGES} and len(HOW_TO_PAGES) == 10
 
 
 TUTORIALS = sorted(path for path in (DOCS / "tutorials").glob("*.md") if path.stem != "index")
-SECTIONS = ["The question", "The physics", "The check", "Now change this"]  # of each tutorial, in this order
+# of each tutorial, in this order
+SECTIONS = ["The question", "The physics", "The check", "Now change this"]
 
 
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda path: path.stem)
@@ -61,7 +74,9 @@ def test_a_tutorial_asserts_its_check_and_the_answer_to_its_change(page):
     """The site runs the cells; a row of the index leads to the page."""
     text = page.read_text(encoding="utf-8")
     assert f"({page.name})" in (DOCS / "tutorials/index.md").read_text(encoding="utf-8")
-    assert [one for one in re.findall(r"^## (.*)$", text, re.MULTILINE) if one in SECTIONS] == SECTIONS
+    assert [
+        one for one in re.findall(r"^## (.*)$", text, re.MULTILINE) if one in SECTIONS
+    ] == SECTIONS
     check, change = text.split("## The check\n")[1].split("## Now change this\n")
     answer = change.split("**Answer.**")[1]
     assert "\nassert " in check and "\nassert " in answer
@@ -95,15 +110,25 @@ def test_a_page_does_as_it_states(page, fvs, tmp_path, monkeypatch):
 def test_the_first_page_has_the_command_of_the_readme_and_its_output():
     """README's commands run in a fresh clone; the first page of the site shows the first of them."""
     texts = [path.read_text(encoding="utf-8") for path in (START / "index.md", TOP / "README.md")]
-    (ours, shown), (readme, output) = [[text for *_, text in BLOCK.findall(one)[:2]] for one in texts]
+    (ours, shown), (readme, output) = [
+        [text for *_, text in BLOCK.findall(one)[:2]] for one in texts
+    ]
     assert ours == readme and shown == output
 
 
 CONTRIBUTOR_PAGES = {
-    name: (TOP / name).read_text(encoding="utf-8") for name in ("CONTRIBUTING.md", "docs/developing.md")
+    name: (TOP / name).read_text(encoding="utf-8")
+    for name in ("CONTRIBUTING.md", "docs/developing.md")
 }
 # Commands that install, that .ci/run runs, or that have a test of their own.
-HEAVY = ("python3 -m venv", ".ci/run", "python tests/", "lint-imports", "ruff", "NUMBA_DISABLE_JIT=1")
+HEAVY = (
+    "python3 -m venv",
+    ".ci/run",
+    "python tests/",
+    "lint-imports",
+    "ruff",
+    "NUMBA_DISABLE_JIT=1",
+)
 
 
 def commands() -> list[str]:
@@ -126,15 +151,25 @@ def copied_files(tmp_path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [one for one in commands() if not is_test(one) and not one.startswith(HEAVY)])
+@pytest.mark.parametrize(
+    "command", [one for one in commands() if not is_test(one) and not one.startswith(HEAVY)]
+)
 def test_a_command_of_the_pages_does_as_it_states(command, copied_files):
     """Commands that write the schema and the key tables leave both files unchanged."""
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
-    known = os.environ | {"PATH": os.pathsep.join(paths), "PYTHONPATH": str(TOP), "MPLBACKEND": "Agg"}
-    done = subprocess.run(["bash", "-c", command], cwd=copied_files, env=known, capture_output=True, text=True)
+    known = os.environ | {
+        "PATH": os.pathsep.join(paths),
+        "PYTHONPATH": str(TOP),
+        "MPLBACKEND": "Agg",
+    }
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=copied_files, env=known, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     for name in ("docs/parts.md", "cases/schema.json"):
-        assert (copied_files / name).read_text(encoding="utf-8") == (TOP / name).read_text(encoding="utf-8")
+        assert (copied_files / name).read_text(encoding="utf-8") == (TOP / name).read_text(
+            encoding="utf-8"
+        )
 
 
 @pytest.mark.parametrize("command", [one for one in commands() if is_test(one)])
@@ -145,7 +180,10 @@ def test_the_tests_that_the_pages_run_are_there(command):
 
 def test_two_tanks_without_jit_are_the_same_bytes(copied_files):
     """Debugging without JIT writes the bytes of the compiled run, as docs/developing.md states; levels meet at 57 s."""
-    short, written = ("nodes.high.level=3.05", "nodes.low.level=2.9", "numerics.end=60", "expect={}"), []
+    short, written = (
+        ("nodes.high.level=3.05", "nodes.low.level=2.9", "numerics.end=60", "expect={}"),
+        [],
+    )
     for off in ("0", "1"):
         command = [sys.executable, "-m", "fvsolve", "run", "two-tanks", "--out", f"runs/{off}"]
         command += [word for one in short for word in ("--set", one)]
@@ -165,11 +203,16 @@ def test_files_and_names_of_the_pages_are_there(page):
         for path in (TOP / folder).rglob("*.*")
     ]
     said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json"}
-    assert [name for name in said if "NAME" not in name and not any(one.endswith(f"/{name}") for one in there)] == []
+    assert [
+        name
+        for name in said
+        if "NAME" not in name and not any(one.endswith(f"/{name}") for one in there)
+    ] == []
 
 
 def pages() -> list[Path]:
-    docs = [path for path in (TOP / "docs").rglob("*.md") if path.parent.name != "results"]  # of `fvsolve validate`
+    # of `fvsolve validate`
+    docs = [path for path in (TOP / "docs").rglob("*.md") if path.parent.name != "results"]
     return [*TOP.glob("*.md"), *docs, *(TOP / "benchmarks").glob("*.md")]
 
 
@@ -182,29 +225,51 @@ def test_links_of_every_page_lead_to_files_and_headings(page):
         assert target.exists(), link
         if heading:
             titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
-            assert heading in {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}, link
+            assert heading in {
+                re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles
+            }, link
 
 
 def test_the_paper_has_the_form_of_the_journal_and_cites_its_bibliography():
     """Sections and length (750 to 1750 words) of the Journal of Open Source Software; every entry is cited."""
     _, head, text = (DOCS / "paper" / "paper.md").read_text(encoding="utf-8").split("---\n", 2)
-    entries = re.findall(r"^@\w+\{([^,]+),", (DOCS / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE)
+    entries = re.findall(
+        r"^@\w+\{([^,]+),", (DOCS / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert {*re.findall(r"@(\w+:\d{4})", text)} == {*entries} and "bibliography: paper.bib" in head
     assert re.findall(r"^# (.*)$", text, re.MULTILINE) == [
-        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
-        "AI usage disclosure", "Acknowledgements", "References"]  # fmt: skip
-    assert 750 <= len(text.split()) <= 1750 and text.count("\\label{fig:") == text.count("\\autoref{fig:") == 2
+        "Summary",
+        "Statement of need",
+        "State of the field",
+        "Software design",
+        "Research impact statement",
+        "AI usage disclosure",
+        "Acknowledgements",
+        "References",
+    ]
+    assert (
+        750 <= len(text.split()) <= 1750
+        and text.count("\\label{fig:") == text.count("\\autoref{fig:") == 2
+    )
 
 
 def test_the_changelog_has_the_form_of_keep_a_changelog():
     """Form of https://keepachangelog.com/en/1.1.0/: unreleased changes first, six kinds of change, a list for each."""
     text = (TOP / "CHANGELOG.md").read_text(encoding="utf-8")
     top, *versions = re.split(r"^## ", text, flags=re.MULTILINE)
-    assert top.startswith("# Changelog\n") and "keepachangelog.com" in top and versions[0].startswith("[Unreleased]\n")
+    assert (
+        top.startswith("# Changelog\n")
+        and "keepachangelog.com" in top
+        and versions[0].startswith("[Unreleased]\n")
+    )
     for version in versions:
         kinds = re.findall(r"^### (.*)\n\n- ", version, re.MULTILINE)
         order = ["Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"]
-        assert kinds and set(kinds) <= {*order} and len(kinds) == len(set(kinds)) == version.count("\n### ")
+        assert (
+            kinds
+            and set(kinds) <= {*order}
+            and len(kinds) == len(set(kinds)) == version.count("\n### ")
+        )
 
 
 ATTITUDES = page("attitudes")
@@ -218,7 +283,9 @@ def test_there_is_an_example_of_every_form():
 @pytest.mark.parametrize("form", FORMS)
 def test_the_forms_of_the_page_are_read(form):
     read = Attitude.model_validate(tomllib.loads(form)["attitude"])
-    assert np.allclose(read.rotation @ read.rotation.T, np.eye(3), atol=1e-15) and not [*read.unusual()]
+    assert np.allclose(read.rotation @ read.rotation.T, np.eye(3), atol=1e-15) and not [
+        *read.unusual()
+    ]
 
 
 def test_lines_of_python_about_attitudes_print_the_text_below_them():
@@ -232,12 +299,34 @@ def test_lines_that_print_otherwise_are_seen():
 COURSE = page("course")
 EQUATIONS = range(1, 83)
 STATEMENTS = {  # statements without a number, in sections 2 to 5: words of a heading
-    "Eigenvalues", "Eigenvectors", "Derivative of a square", "Velocity and angular velocity", "Transposes",
-    "Inverse of two by two", "Modules and connections", "Hydraulic", "Translational", "Rotational", "Electrical",
-    "Magnetic", "Thermal", "Chemical", "Energy that falls", "resistor", "Connected stable", "Connected passive",
-    "Passive is positive real", "definition", "theorem", "Stiff", "A-stability", "No explicit method", "Aliasing",
-    "L-stability", "Padé",
-}  # fmt: skip
+    "Eigenvalues",
+    "Eigenvectors",
+    "Derivative of a square",
+    "Velocity and angular velocity",
+    "Transposes",
+    "Inverse of two by two",
+    "Modules and connections",
+    "Hydraulic",
+    "Translational",
+    "Rotational",
+    "Electrical",
+    "Magnetic",
+    "Thermal",
+    "Chemical",
+    "Energy that falls",
+    "resistor",
+    "Connected stable",
+    "Connected passive",
+    "Passive is positive real",
+    "definition",
+    "theorem",
+    "Stiff",
+    "A-stability",
+    "No explicit method",
+    "Aliasing",
+    "L-stability",
+    "Padé",
+}
 NOT_YET = "not modelled yet"
 
 
@@ -253,7 +342,9 @@ class Entry:
     @property
     def numbers(self) -> list[int]:
         """Numbers of equations at the start of the heading."""
-        return [int(one) for one in re.findall(r"\((\d+)\)", re.match(r"(\(\d+\) )*", self.title)[0])]
+        return [
+            int(one) for one in re.findall(r"\((\d+)\)", re.match(r"(\(\d+\) )*", self.title)[0])
+        ]
 
     @property
     def modelled(self) -> bool:
@@ -276,7 +367,11 @@ ENTRIES = entries()
 
 def of(*keys: str) -> list:
     """Test parameters: entries with at least one of these fields, or with Python."""
-    some = [one for one in ENTRIES if any(key in one.fields or (key == "python" and one.python) for key in keys)]
+    some = [
+        one
+        for one in ENTRIES
+        if any(key in one.fields or (key == "python" and one.python) for key in keys)
+    ]
     return [pytest.param(one, id=one.title) for one in some]
 
 
@@ -286,7 +381,9 @@ def test_every_equation_has_an_entry_in_their_order():
 
 def test_every_statement_of_sections_2_to_5_has_an_entry():
     titles = [one.title for one in ENTRIES if one.section[0] in "2345" and not one.numbers]
-    assert len({word: [title for title in titles if word in title] for word in STATEMENTS}) == len(titles)
+    assert len({word: [title for title in titles if word in title] for word in STATEMENTS}) == len(
+        titles
+    )
     assert all(any(word in title for title in titles) for word in STATEMENTS)
 
 
@@ -309,7 +406,11 @@ def names_in(path: str) -> set[str]:
     for one in tree.body:
         found |= {one.name} if isinstance(one, (ast.FunctionDef, ast.ClassDef)) else set()
         if isinstance(one, ast.ClassDef):
-            found |= {f"{one.name}.{inner.name}" for inner in one.body if isinstance(inner, ast.FunctionDef)}
+            found |= {
+                f"{one.name}.{inner.name}"
+                for inner in one.body
+                if isinstance(inner, ast.FunctionDef)
+            }
         for target in getattr(one, "targets", []):
             found |= {target.id} if isinstance(target, ast.Name) else set()
     return found
@@ -319,7 +420,11 @@ def names_in(path: str) -> set[str]:
 def words_in(path: str) -> set[str]:
     """String constants of a file."""
     tree = ast.parse((TOP / path).read_text(encoding="utf-8"))
-    return {one.value for one in ast.walk(tree) if isinstance(one, ast.Constant) and isinstance(one.value, str)}
+    return {
+        one.value
+        for one in ast.walk(tree)
+        if isinstance(one, ast.Constant) and isinstance(one.value, str)
+    }
 
 
 @pytest.mark.parametrize("entry", [one for one in of("where") if one.values[0].modelled])
@@ -359,4 +464,6 @@ def test_lines_of_python_print_the_text_below_them(entry):
 
 def test_whatever_is_modelled_can_be_seen_to_run():
     """Each modelled statement has a command or lines of Python that a reader may run."""
-    assert [one.title for one in ENTRIES if one.modelled and not one.python and "run" not in one.fields] == []
+    assert [
+        one.title for one in ENTRIES if one.modelled and not one.python and "run" not in one.fields
+    ] == []

@@ -13,7 +13,12 @@ import pytest
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 HEADS = {"a": 50.0, "b": 48.0, "c": 47.0, "behind": -3.0}
 FLOWS = {"p1": 0.020, "p2": -0.005}
-CAUSE = [["Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %", ["D-W"]]]
+CAUSE = [
+    [
+        "Darcy factor by Colebrook, in EPANET by Swamee and Jain: both factors agree within 3 %",
+        ["D-W"],
+    ]
+]
 
 
 @pytest.fixture
@@ -34,18 +39,28 @@ def row(files, heads=None, flows=None, notes=(), warnings=(), dead=("behind",)):
     flow = files.worst(FLOWS | (flows or {}), FLOWS)
     flow["share"] = flow["difference"] / max(map(abs, FLOWS.values()))
     return {
-        "epanet": "ok", "import": "ok", "nodes": len(HEADS), "seconds": {}, "warnings": list(warnings),
-        "head": files.worst(HEADS | (heads or {}), HEADS, dead), "flow": flow, "dead": list(dead),
+        "epanet": "ok",
+        "import": "ok",
+        "nodes": len(HEADS),
+        "seconds": {},
+        "warnings": list(warnings),
+        "head": files.worst(HEADS | (heads or {}), HEADS, dead),
+        "flow": flow,
+        "dead": list(dead),
         "causes": [text for text, _ in notes],
-    }  # fmt: skip
+    }
 
 
-@pytest.mark.parametrize("change, word", [(0.0, "1 mm"), (9e-4, "1 mm"), (-9e-3, "1 cm"), (0.011, "silent")])
+@pytest.mark.parametrize(
+    "change, word", [(0.0, "1 mm"), (9e-4, "1 mm"), (-9e-3, "1 cm"), (0.011, "silent")]
+)
 def test_a_wrong_head_is_reported_with_its_name(change, word, files):
     found = row(files, heads={"b": HEADS["b"] + change})
     assert files.verdict(found) == word
     if change:
-        assert found["head"]["name"] == "b" and found["head"]["difference"] == pytest.approx(abs(change))
+        assert found["head"]["name"] == "b" and found["head"]["difference"] == pytest.approx(
+            abs(change)
+        )
     line = files.line("town.inp", found)
     assert word in line and (word != "silent" or " b " in line)
 
@@ -86,14 +101,31 @@ def test_the_counts_add_up(files):
         "seconds": {},
     }
     theirs = {"epanet": "undefined node x", "seconds": {}}
-    rows = [row(files), row(files, {"a": 50.005}), row(files, {"a": 60.0}), row(files, {"a": 60.0}, notes=CAUSE),
-            refused, theirs, theirs | {"epanet": "ok", "warnings": [], "left_out": "more than 3 nodes"}]  # fmt: skip
+    rows = [
+        row(files),
+        row(files, {"a": 50.005}),
+        row(files, {"a": 60.0}),
+        row(files, {"a": 60.0}, notes=CAUSE),
+        refused,
+        theirs,
+        theirs | {"epanet": "ok", "warnings": [], "left_out": "more than 3 nodes"},
+    ]
     expected = {
-        "files found": 9, "distinct files": 7, "EPANET runs": 6, "left out": 1, "imported": 4,
-        "imported, its case refused": 0, "within 1 mm": 1,
-        "within 1 cm": 2, "above, with named cause": 1, "silent": 1, "refused by us": 1,
-        "of these, without a solution of EPANET": 1, "refused by EPANET": 1, "refused by EPANET, imported": 0,
-    }  # fmt: skip
+        "files found": 9,
+        "distinct files": 7,
+        "EPANET runs": 6,
+        "left out": 1,
+        "imported": 4,
+        "imported, its case refused": 0,
+        "within 1 mm": 1,
+        "within 1 cm": 2,
+        "above, with named cause": 1,
+        "silent": 1,
+        "refused by us": 1,
+        "of these, without a solution of EPANET": 1,
+        "refused by EPANET": 1,
+        "refused by EPANET, imported": 0,
+    }
     assert files.counts(rows, 9) == expected
 
 
@@ -103,7 +135,11 @@ def test_a_late_switch_is_no_difference_of_heads_and_a_permanent_difference_is(f
     apart[2, 0] = 8.0  # one row, at a switch
     assert files.worst_in_rows(times, files.lasting(apart), names)["difference"] == 0.0
     apart[3:5, 1] = 3.0, 2.0
-    assert files.worst_in_rows(times, files.lasting(apart), names) == {"difference": 2.0, "name": "b", "time": 1050.0}
+    assert files.worst_in_rows(times, files.lasting(apart), names) == {
+        "difference": 2.0,
+        "name": "b",
+        "time": 1050.0,
+    }
     apart[0, 1] = np.nan
     assert files.worst_in_rows(times, apart, names)["difference"] == np.inf
 
@@ -119,8 +155,20 @@ def test_a_late_switch_is_no_difference_of_heads_and_a_permanent_difference_is(f
 )  # fmt: skip
 def test_a_day_has_a_word_of_its_own(change, word, files):
     near = {"difference": 0.0, "name": "t", "time": 0.0}
-    day = {"ok": True, "level": near, "head": near, "causes": [], "cpu": 1.0, "epanet_cpu": 0.2, "steps": 3, "step": 10}
-    day |= {key: near | value if isinstance(value, dict) and key in day else value for key, value in change.items()}
+    day = {
+        "ok": True,
+        "level": near,
+        "head": near,
+        "causes": [],
+        "cpu": 1.0,
+        "epanet_cpu": 0.2,
+        "steps": 3,
+        "step": 10,
+    }
+    day |= {
+        key: near | value if isinstance(value, dict) and key in day else value
+        for key, value in change.items()
+    }
     assert files.day_verdict(day) == word and word in files.day_line(day)
     found = files.counts([row(files) | {"day": day}, row(files) | {"day": day | {"cpu": 0.1}}], 2)
     assert found["days"] == 2 and found["days within 3 times EPANET's CPU"] == (word != "stopped")
@@ -131,7 +179,10 @@ def test_equal_files_are_examined_once_and_equal_names_get_their_folder(files, t
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "net.INP").write_text(text)
     found = files.files_of([tmp_path])
-    assert len(found) == 3 and [name for name, _ in files.distinct(found)] == ["one/net.INP", "three/net.INP"]
+    assert len(found) == 3 and [name for name, _ in files.distinct(found)] == [
+        "one/net.INP",
+        "three/net.INP",
+    ]
 
 
 FATES = {
@@ -155,7 +206,9 @@ def test_files_that_hang_crash_or_raise_do_not_stop_the_table(files, tmp_path, m
     files.examined(paths, options, lambda path, row: found.setdefault(path.name, row))
     assert files.verdict(found["good"]) == "1 mm"
     for name, (text, _) in FATES.items():
-        assert files.verdict(found[name]) == "refused by us" and found[name]["error"].startswith(text)
+        assert files.verdict(found[name]) == "refused by us" and found[name]["error"].startswith(
+            text
+        )
 
 
 def test_epanets_own_values_come_from_the_original_file_in_si(files, tmp_path):
@@ -178,21 +231,27 @@ def test_epanets_own_values_come_from_the_original_file_in_si(files, tmp_path):
         engine.start(path, version)
 
 
-def test_epanets_day_follows_a_tank_to_its_end_and_states_the_time_of_an_interrupted_demand(files, tmp_path):
+def test_epanets_day_follows_a_tank_to_its_end_and_states_the_time_of_an_interrupted_demand(
+    files, tmp_path
+):
     """A tank of 4 m with 100 m2 loses 10 l/s, so it is empty at 40 000 s; the demand behind it then has no source."""
     engine = files.epanet_engine
     version = next((version for version in engine.LIBRARIES if engine.library(version)), None)
     if version is None:
         pytest.skip("EPANET is not installed")
     path, width = tmp_path / "tank.inp", (400.0 / np.pi) ** 0.5
-    text = f"[JUNCTIONS]\na 0 10\n[RESERVOIRS]\nfar 60\n[TANKS]\ntower 50 4 0 9 {width} 0\n[PIPES]\n"
+    text = (
+        f"[JUNCTIONS]\na 0 10\n[RESERVOIRS]\nfar 60\n[TANKS]\ntower 50 4 0 9 {width} 0\n[PIPES]\n"
+    )
     path.write_text(
-        text + "p tower a 100 300 120\nq far a 100 300 120 0 Closed\n[OPTIONS]\nUNITS LPS\nHEADLOSS H-W\n[END]\n"
+        text
+        + "p tower a 100 300 120\nq far a 100 300 120 0 Closed\n[OPTIONS]\nUNITS LPS\nHEADLOSS H-W\n[END]\n"
     )
     day = engine.day(path, version)
     level, full = day.heads[:, day.names.index("tower")] - 50.0, day.times < 39900.0
     assert day.tanks == ["tower"] and day.end == 86400.0 and day.steps > 8640
-    assert level[full] == pytest.approx(4.0 - 0.01 * day.times[full] / 100.0, abs=5e-5)  # 28.317 l in a ft3
+    # 28.317 l in a ft3
+    assert level[full] == pytest.approx(4.0 - 0.01 * day.times[full] / 100.0, abs=5e-5)
     assert day.warnings[engine.CUT_OFF] == day.times[day.dead.all(axis=1)][0]
     assert 40000.0 <= day.warnings[engine.CUT_OFF] <= 40350.0 and not day.dead[full].any()
 

@@ -22,11 +22,15 @@ RUNS = re.findall(r"```sh\n(.*?)```(?:\n\n```text\n(.*?)```)?", TEXT, re.DOTALL)
 def home(tmp_path_factory) -> Path:
     """Folder with the cases of the page and its installed package."""
     project = tomllib.loads(FILES["pyproject.toml"])["project"]
-    files = {name: text for name, text in FILES.items() if name != "pyproject.toml"} | {"fieldkit/__init__.py": ""}
+    files = {name: text for name, text in FILES.items() if name != "pyproject.toml"} | {
+        "fieldkit/__init__.py": ""
+    }
     return install(tmp_path_factory.mktemp("home"), project["name"], files, project["entry-points"])
 
 
-@pytest.mark.parametrize("commands, output", RUNS, ids=[commands.splitlines()[0] for commands, _ in RUNS])
+@pytest.mark.parametrize(
+    "commands, output", RUNS, ids=[commands.splitlines()[0] for commands, _ in RUNS]
+)
 def test_the_commands_of_the_page_print_its_text(commands, output, home):
     done = ""
     for line in commands.splitlines():
@@ -39,7 +43,12 @@ def test_the_commands_of_the_page_print_its_text(commands, output, home):
 
 def test_each_entry_point_of_the_page_is_used_by_it():
     entries = tomllib.loads(FILES["pyproject.toml"])["project"]["entry-points"]
-    text = "\n".join([*(commands for commands, _ in RUNS), *(FILES[name] for name in FILES if name.endswith(".toml"))])
+    text = "\n".join(
+        [
+            *(commands for commands, _ in RUNS),
+            *(FILES[name] for name in FILES if name.endswith(".toml")),
+        ]
+    )
     assert [name for group in entries.values() for name in group if text.count(name) < 2] == []
     assert len(FILES) >= 4 and len(RUNS) >= 2
 
@@ -66,13 +75,26 @@ def print_areas(case: str) -> None:
 
 def test_headers_in_a_file_of_a_user_are_those_of_the_page(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(HEADERS, encoding="utf-8")
-    indices = {"STUDIES": studies.STUDIES, "SINKS": SINKS, "EXACT_SOLUTIONS": exact.NAMES, "COMMANDS": COMMANDS}
+    indices = {
+        "STUDIES": studies.STUDIES,
+        "SINKS": SINKS,
+        "EXACT_SOLUTIONS": exact.NAMES,
+        "COMMANDS": COMMANDS,
+    }
     for variable, index in indices.items():
         monkeypatch.setenv(f"FVSOLVE_{variable}", str(tmp_path))
         assert f"`FVSOLVE_{variable}`" in TEXT and index.variable == f"FVSOLVE_{variable}"
-    attributes = [(name, found.attribute) for index in indices.values() for name, found in index.others().items()]
-    assert attributes == [("maxima", "maxima"), ("json-lines", "JsonLines"), ("free-mass", "FREE_MASS"),
-                          ("areas", "print_areas")]  # fmt: skip
+    attributes = [
+        (name, found.attribute)
+        for index in indices.values()
+        for name, found in index.others().items()
+    ]
+    assert attributes == [
+        ("maxima", "maxima"),
+        ("json-lines", "JsonLines"),
+        ("free-mass", "FREE_MASS"),
+        ("areas", "print_areas"),
+    ]
     for header in re.findall(r"header is\s`([^`]+)`", TEXT):
         assert header.replace("NAME", "FREE_MASS").replace('"name", ...)', '"free-mass"') in HEADERS
     assert len(re.findall(r"header is\s", TEXT)) == 4

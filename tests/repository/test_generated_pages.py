@@ -32,8 +32,14 @@ def test_the_section_of_a_command_has_the_options_of_its_help(command, sections,
 
 
 def test_each_unit_has_the_size_that_the_case_file_reads():
-    rows = [line.split(" | ") for line in generated_pages.units().splitlines() if line.startswith("| a")]
-    sizes = [found for row in rows for found in re.findall(r"`([^`]+)` ([\d.e+-]+)( gauge)?(?:,| \|$)", row[-1])]
+    rows = [
+        line.split(" | ") for line in generated_pages.units().splitlines() if line.startswith("| a")
+    ]
+    sizes = [
+        found
+        for row in rows
+        for found in re.findall(r"`([^`]+)` ([\d.e+-]+)( gauge)?(?:,| \|$)", row[-1])
+    ]
     assert {unit for unit, *_ in sizes} == {unit for unit, one in UNITS.items() if not one.offset}
     for unit, size, gauge in sizes:
         read = parse(f"1 {unit}", UNITS[unit].dimension)
@@ -44,8 +50,12 @@ def test_each_unit_has_the_size_that_the_case_file_reads():
 def test_all_public_names_are_there_with_the_first_line_of_their_docstrings():
     text = generated_pages.names()
     listed = re.findall(r"\{py:(?:function|class|exception)\} ([\w.]+)", text)
-    assert {f"fvsolve.{name}" for name in fvsolve.__all__} <= {*listed} and len(listed) == len({*listed})
-    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.steppers.analyse"} <= {*listed}
+    assert {f"fvsolve.{name}" for name in fvsolve.__all__} <= {*listed} and len(listed) == len(
+        {*listed}
+    )
+    assert {"fvsolve.studies.order", "fvsolve.studies.sweep", "fvsolve.steppers.analyse"} <= {
+        *listed
+    }
     for name in fvsolve.__all__:
         assert generated_pages.escaped(getattr(fvsolve, name).__doc__.splitlines()[0]) in text
     assert "{py:method} rhs(t, y=None)" in text and "{py:property} envelope" in text
@@ -60,13 +70,19 @@ def test_a_public_name_without_docstring_is_refused(monkeypatch):
 def test_all_tables_of_the_core_and_of_features_are_there_with_each_column():
     text = generated_pages.tables()
     sections = dict(re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL))
-    assert {"## Tables of the core", "## Tables of delay lines", "## Tables of controls"} <= {*text.splitlines()}
-    for name, kind in ((name, kind) for name, kind in vars(dtypes).items() if isinstance(kind, np.dtype)):
+    assert {"## Tables of the core", "## Tables of delay lines", "## Tables of controls"} <= {
+        *text.splitlines()
+    }
+    for name, kind in (
+        (name, kind) for name, kind in vars(dtypes).items() if isinstance(kind, np.dtype)
+    ):
         assert re.findall(r"^\| `(\w+)` \|", sections[name], re.MULTILINE) == list(kind.names)
     assert "| `tau` | number | travel time of a stretch [s] |" in sections["DELAY"]
 
 
 def test_lines_about_arguments_are_items_of_a_list():
-    text = "Sum of a and b.\n\na, b : numbers < 1, with\ncontinuation\nc : `a*b`\nRaises ValueError."
+    text = (
+        "Sum of a and b.\n\na, b : numbers < 1, with\ncontinuation\nc : `a*b`\nRaises ValueError."
+    )
     expected = "Sum of a and b.\n\n\n- a, b: numbers \\< 1, with\n  continuation\n- c: `a*b`\n\nRaises ValueError."
     assert generated_pages.prose(text) == expected

@@ -34,10 +34,29 @@ def test_drawn_inputs_do_no_harm(group, tmp_path):
         assert not fault, f"{item.name}: {fault}"
 
 
-LONG = ["dots of a key", "quoted dots of a key", "dots of a header", "dots of an inline key", "unknown keys",
-        "unknown parts", "blanks of a claim", "blanks after a claim", "blanks of a probe", "blanks of a unit",
-        "brackets", "digits", "digits in quotes", "empty lines", "formula", "parentheses", "signals", "scalars",
-        "limits", "parts", "claims"]  # fmt: skip
+LONG = [
+    "dots of a key",
+    "quoted dots of a key",
+    "dots of a header",
+    "dots of an inline key",
+    "unknown keys",
+    "unknown parts",
+    "blanks of a claim",
+    "blanks after a claim",
+    "blanks of a probe",
+    "blanks of a unit",
+    "brackets",
+    "digits",
+    "digits in quotes",
+    "empty lines",
+    "formula",
+    "parentheses",
+    "signals",
+    "scalars",
+    "limits",
+    "parts",
+    "claims",
+]
 
 
 @pytest.mark.parametrize("name", LONG)
@@ -48,7 +67,9 @@ def test_long_texts_do_no_harm(name, tmp_path):
 
 
 def test_a_message_lists_fifty_faults_and_counts_the_others(tmp_path):
-    (tmp_path / "case.toml").write_text(hostile_inputs.SCENE + "".join(f"k{n} = 1\n" for n in range(100_000)))
+    (tmp_path / "case.toml").write_text(
+        hostile_inputs.SCENE + "".join(f"k{n} = 1\n" for n in range(100_000))
+    )
     with pytest.raises(CaseError) as error:
         fvsolve.load(tmp_path / "case.toml")
     lines = str(error.value).splitlines()
@@ -57,7 +78,9 @@ def test_a_message_lists_fifty_faults_and_counts_the_others(tmp_path):
         lines[1].startswith("  line 29: numerics.k0: unknown key; keys are")
         and lines[-1] == "  and 99950 further faults"
     )
-    (tmp_path / "case.toml").write_text(hostile_inputs.SCENE + "".join(f"k{n} = 1\n" for n in range(MOST_FAULTS)))
+    (tmp_path / "case.toml").write_text(
+        hostile_inputs.SCENE + "".join(f"k{n} = 1\n" for n in range(MOST_FAULTS))
+    )
     with pytest.raises(CaseError) as error:
         fvsolve.load(tmp_path / "case.toml")
     assert len(str(error.value).splitlines()) == 1 + MOST_FAULTS
@@ -81,7 +104,9 @@ def test_long_keys_are_detected_before_the_text_is_parsed(text, line):
 ])  # fmt: skip
 def test_impossible_numbers_are_refused_by_name(key, value, tmp_path):
     (tmp_path / "case.toml").write_text(hostile_inputs.SCENE)
-    with pytest.raises(CaseError, match="has a magnitude (below 1e-30|above 1e\\+30) in SI units") as error:
+    with pytest.raises(
+        CaseError, match="has a magnitude (below 1e-30|above 1e\\+30) in SI units"
+    ) as error:
         fvsolve.load(tmp_path / "case.toml", set={key: value})
     assert error.value.faults[0].place.startswith(key)
 
@@ -91,13 +116,17 @@ def test_long_overrides_are_refused(tmp_path):
     with pytest.raises(CaseError, match="has more than 40 names"):
         fvsolve.load(tmp_path / "case.toml", set={"a." * 20_000 + "a": 1})
     with pytest.raises(CaseError, match="links.main.length"):
-        fvsolve.load(tmp_path / "case.toml", set={"links.main.length": "{ " + "a." * 20_000 + "a = 1 }"})
+        fvsolve.load(
+            tmp_path / "case.toml", set={"links.main.length": "{ " + "a." * 20_000 + "a = 1 }"}
+        )
 
 
 def test_zero_and_rounding_errors_are_numbers(tmp_path):
     (tmp_path / "case.toml").write_text(hostile_inputs.SCENE)
     for value in (0.0, -0.0, 5.6e-17, "-1e-16 m"):
-        assert fvsolve.load(tmp_path / "case.toml", set={"nodes.gate.elevation": value, "nodes.out.elevation": 0})
+        assert fvsolve.load(
+            tmp_path / "case.toml", set={"nodes.gate.elevation": value, "nodes.out.elevation": 0}
+        )
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes in folders")
@@ -143,7 +172,10 @@ def test_mutants_change_the_place_of_their_names():
         mutant = hostile_inputs.mutant(source, ("numerics", "end"), change)
         assert mutant != source or change == "renamed", change
     names = [item.name for item in hostile_inputs.mutants(draw, 200)]
-    assert len({name.split()[0] for name in names}) > 40 and len({name.split()[-1] for name in names}) > 30
+    assert (
+        len({name.split()[0] for name in names}) > 40
+        and len({name.split()[-1] for name in names}) > 30
+    )
 
 
 PARTS = [(group, kind) for group in ("nodes", "links") for kind in KINDS[group]]
@@ -180,14 +212,17 @@ def test_values_of_a_wrong_type_are_faults_of_every_table(name):
     for wrong in WRONG:
         refused({**scene, name: wrong}, f"{name} = {wrong!r}")
         for inner in WRONG:
-            refused({**scene, name: {**scene.get(name, {}), "x": inner}}, f"{name}.x = {inner!r}") if isinstance(
-                scene.get(name, {}), dict
-            ) else None
+            refused(
+                {**scene, name: {**scene.get(name, {}), "x": inner}}, f"{name}.x = {inner!r}"
+            ) if isinstance(scene.get(name, {}), dict) else None
 
 
 # one key of each kind : (case, key path)
-SHIPPED = [(name, paths[0]) for cases in hostile_inputs.kinds_of_keys(hostile_inputs.tables()).values()
-           for name, paths in [next(iter(cases.items()))]]  # fmt: skip
+SHIPPED = [
+    (name, paths[0])
+    for cases in hostile_inputs.kinds_of_keys(hostile_inputs.tables()).values()
+    for name, paths in [next(iter(cases.items()))]
+]
 
 
 @pytest.mark.parametrize("name", sorted({name for name, _ in SHIPPED}))

@@ -27,7 +27,9 @@ def circle(arrows: dict[str, set[str]]) -> list[str]:
 
 def test_imports_run_in_no_circle():
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
-    found = circle({module: graph.find_modules_directly_imported_by(module) for module in graph.modules})
+    found = circle(
+        {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    )
     assert not found, " -> ".join(found)
 
 
@@ -63,7 +65,9 @@ def test_compiled_files_of_parts_and_basins_import_compiled_code_only():
     assert {below_core(module)[0] for module in compiled} == {"parts", "features"}
     for module in compiled:
         for other in graph.find_modules_directly_imported_by(module):
-            assert is_compiled(other) or below_core(other)[0] in ("kernels", "jit"), f"{module} imports {other}"
+            assert is_compiled(other) or below_core(other)[0] in ("kernels", "jit"), (
+                f"{module} imports {other}"
+            )
 
 
 @pytest.mark.parametrize("folder", ["parts", "features/basins"])
@@ -71,7 +75,9 @@ def test_declarations_import_no_lowering(folder):
     """A `part.py` beside a compiled law states keys only, so that a schema needs no tables and no compiled law."""
     graph = grimp.build_graph("fvsolve", exclude_type_checking_imports=True, cache_dir=None)
     place = f"fvsolve.{folder.replace('/', '.')}."
-    declared = [module for module in graph.modules if module.startswith(place) and module.endswith(".part")]
+    declared = [
+        module for module in graph.modules if module.startswith(place) and module.endswith(".part")
+    ]
     assert declared
     for module in declared:
         for other in graph.find_modules_directly_imported_by(module):
@@ -85,10 +91,15 @@ def test_parts_are_declared_without_numba():
 
 @pytest.mark.parametrize("folder", ["parts", "features/basins"])
 def test_every_folder_of_parts_and_basins_has_a_declaration(folder):
-    folders = [path for path in (Path(fvsolve.__file__).parent / folder).iterdir() if (path / "__init__.py").is_file()]
+    folders = [
+        path
+        for path in (Path(fvsolve.__file__).parent / folder).iterdir()
+        if (path / "__init__.py").is_file()
+    ]
     from fvsolve.parts.conduit.part import ConduitFlow
 
-    assert ConduitFlow.package == "fvsolve.features.basins.conduit"  # whose declaration is that of a link
+    # whose declaration is that of a link
+    assert ConduitFlow.package == "fvsolve.features.basins.conduit"
     folders = [path for path in folders if (folder, path.name) != ("features/basins", "conduit")]
     assert folders and all((path / "part.py").is_file() for path in folders)
 
@@ -111,7 +122,10 @@ def imported_tests(text: str) -> list[str]:
 
 def test_no_file_of_tests_imports_a_test_module():
     """What several files of tests need is in `tests/reference`, so each of them can be read and changed alone."""
-    files = {path.relative_to(TESTS): path.read_text(encoding="utf-8") for path in sorted(TESTS.rglob("*.py"))}
+    files = {
+        path.relative_to(TESTS): path.read_text(encoding="utf-8")
+        for path in sorted(TESTS.rglob("*.py"))
+    }
     assert len(files) > 300
     assert {path: found for path, text in files.items() if (found := imported_tests(text))} == {}
 

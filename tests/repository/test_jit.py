@@ -86,7 +86,11 @@ def test_without_the_store_all_code_comes_from_numba(package):
     asked = cold.format("is_cached('loop'), is_cached('law'), is_cached('oop')")
     assert python(package, asked, **off) == ["False", "True", "True", "False"]
     assert not list((package.parent / "cache" / "code").rglob(f"*{store.SUFFIX}"))
-    assert python(package, PROBE) == ["12.0", "True", "0"] and python(package, PROBE) == ["12.0", "False", "False"]
+    assert python(package, PROBE) == ["12.0", "True", "0"] and python(package, PROBE) == [
+        "12.0",
+        "False",
+        "False",
+    ]
 
 
 @pytest.mark.parametrize("copy, told", [
@@ -96,10 +100,18 @@ def test_without_the_store_all_code_comes_from_numba(package):
 def test_a_template_is_compiled_once_under_a_name(package, copy, told):
     """The copy of the second module ran the code of the first, loaded from the cache."""
     (package / "core" / "kernels" / "powers.py").write_text(POWERS)
-    line = "from fvsolve.jit import specialise\nfrom fvsolve.core.kernels.powers import _sums, cube\n"
-    (package / "core" / "steppers" / "more.py").write_text(f"{line}other = specialise(_sums, {copy})\n")
-    code = "try:\n    import fvsolve.core.steppers.more\nexcept ValueError as fault:\n    print(fault)"
-    assert f"fvsolve.core.steppers.more: {told}" in " ".join(python(package, code)).replace("fvsolve.core.kernels.", "")
+    line = (
+        "from fvsolve.jit import specialise\nfrom fvsolve.core.kernels.powers import _sums, cube\n"
+    )
+    (package / "core" / "steppers" / "more.py").write_text(
+        f"{line}other = specialise(_sums, {copy})\n"
+    )
+    code = (
+        "try:\n    import fvsolve.core.steppers.more\nexcept ValueError as fault:\n    print(fault)"
+    )
+    assert f"fvsolve.core.steppers.more: {told}" in " ".join(python(package, code)).replace(
+        "fvsolve.core.kernels.", ""
+    )
 
 
 def test_a_run_without_the_store_has_the_same_results():
@@ -112,18 +124,33 @@ print(store.IN_USE, run.ok, run.summary["steps"], run.si("low.level").tobytes().
 """
     words = {}
     for setting in ("0", "1"):
-        environment = os.environ | {"FVSOLVE_STORE": setting, "PYTHONPATH": str(cache_folders.PACKAGE.parent)}
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+        environment = os.environ | {
+            "FVSOLVE_STORE": setting,
+            "PYTHONPATH": str(cache_folders.PACKAGE.parent),
+        }
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stderr
         words[setting] = done.stdout.split()
-    assert words["0"][:2] == ["False", "True"] and words["0"][1:] == words["1"][1:] and len(words["0"][3]) > 1000
+    assert (
+        words["0"][:2] == ["False", "True"]
+        and words["0"][1:] == words["1"][1:]
+        and len(words["0"][3]) > 1000
+    )
 
 
-PRIVATE = re.compile(r"numba\.(core|np|extending|misc|_\w+)|_numba_type_|\b(lib|context|builder)\.call_conv\b")
+PRIVATE = re.compile(
+    r"numba\.(core|np|extending|misc|_\w+)|_numba_type_|\b(lib|context|builder)\.call_conv\b"
+)
 
 
 def test_only_the_folder_compile_depends_on_private_names_of_numba():
-    users = {path for path in cache_folders.PACKAGE.rglob("*.py") if PRIVATE.search(path.read_text(encoding="utf-8"))}
+    users = {
+        path
+        for path in cache_folders.PACKAGE.rglob("*.py")
+        if PRIVATE.search(path.read_text(encoding="utf-8"))
+    }
     assert {path.parent.name for path in users} == {"compile"} and len(users) >= 3
 
 
@@ -165,12 +192,17 @@ def test_specialisations_of_a_template_are_stored_each_under_its_own_name(packag
     assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "0", "1", "0", "1"]
     assert python(package, SPECIALISED)[:3] == ["14.0", "38.0", "False"]
     stored = list((package.parent / "cache" / "code").rglob(f"sum_of_*{store.SUFFIX}"))
-    assert sorted(path.name.rpartition("-")[0] for path in stored) == ["sum_of_cubes", "sum_of_squares"]
+    assert sorted(path.name.rpartition("-")[0] for path in stored) == [
+        "sum_of_cubes",
+        "sum_of_squares",
+    ]
     for path in stored:
         path.unlink()
     assert python(package, SPECIALISED) == ["14.0", "38.0", "True", "1", "0", "1", "0"]
     assert python(package, SPECIALISED, NUMBA_DISABLE_JIT="1") == ["14.0", "38.0", "False"]
-    (package / "core" / "kernels" / "powers.py").write_text(POWERS.replace("ADDED=0.5", "ADDED=1.5"))
+    (package / "core" / "kernels" / "powers.py").write_text(
+        POWERS.replace("ADDED=0.5", "ADDED=1.5")
+    )
     assert python(package, SPECIALISED) == ["14.0", "42.0", "True", "0", "1", "0", "1"]
 
 
@@ -197,11 +229,17 @@ def test_settings_that_change_code_have_a_store_of_their_own(package):
     for _ in range(2):
         told = python(package, PROBE, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
         assert told[0] == "12.0"
-    assert told[1] == "False" and python(package, PROBE, NUMBA_DEBUG_JIT="0") == ["12.0", "False", "False"]
+    assert told[1] == "False" and python(package, PROBE, NUMBA_DEBUG_JIT="0") == [
+        "12.0",
+        "False",
+        "False",
+    ]
     said = "from fvsolve import jit; print(jit.other_caches())"
     other, own = (python(package, said, **settings) for settings in ({"NUMBA_OPT": "1"}, {}))
     named = " ".join(other)
-    assert named.count(store.target()["processor"]) == 2 and "generic-" in named, "two stores and this machine's"
+    assert named.count(store.target()["processor"]) == 2 and "generic-" in named, (
+        "two stores and this machine's"
+    )
     target = python(package, "from fvsolve.compile import store; print(store.target()['name'])")
     assert own[own.index("is") + 1] == target[0]
 
@@ -214,7 +252,9 @@ def test_code_for_a_stated_processor_serves_other_processors(package):
     assert python(package, PROBE, **stated) == ["12.0", "True", "1"]
     assert python(package, other + PROBE, **stated) == ["12.0", "False", "False"]
     name = "from fvsolve.compile import store; print(store.target()['name'].rpartition('-')[0])"
-    assert python(package, other + name) == ["znver9"] and python(package, other + name, **stated) == ["generic"]
+    assert python(package, other + name) == ["znver9"] and python(
+        package, other + name, **stated
+    ) == ["generic"]
 
 
 def test_code_of_other_sources_is_named(package):
@@ -222,7 +262,10 @@ def test_code_of_other_sources_is_named(package):
     old = python(package, "from fvsolve import jit; print(jit.source_hash())")[0]
     (package / "units.py").write_text("NEW = 1\n")
     told = " ".join(python(package, "from fvsolve import jit; print(jit.other_caches())"))
-    assert f"contains code compiled from other versions of the sources ({old}), which cannot be used" in told
+    assert (
+        f"contains code compiled from other versions of the sources ({old}), which cannot be used"
+        in told
+    )
 
 
 @pytest.mark.parametrize(
@@ -243,7 +286,9 @@ def test_code_of_other_sources_is_named(package):
     }.values(),
     ids=["another machine", "a helper that is gone", "a helper not declared"],
 )
-def test_functions_that_cannot_be_called_are_refused_by_name_and_compiled_again(package, changes, named):
+def test_functions_that_cannot_be_called_are_refused_by_name_and_compiled_again(
+    package, changes, named
+):
     python(package, PROBE)
     forged(package, **changes)
     said = python(package, PROBE, told=named)
@@ -255,7 +300,10 @@ def test_old_generations_are_deleted_except_the_newest(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")
         python(package, "from fvsolve import jit; jit.code_folder()")
-    assert len(list((package.parent / "cache" / "code").iterdir())) == cache_folders.KEPT_GENERATIONS + 1
+    assert (
+        len(list((package.parent / "cache" / "code").iterdir()))
+        == cache_folders.KEPT_GENERATIONS + 1
+    )
 
 
 def test_without_jit_the_plain_function_comes_back_and_numba_stays_away(package):
@@ -297,7 +345,9 @@ print(either(True, 0.0), either(False, 0.0))
 def test_cache_folder_falls_back_when_the_stated_folder_is_not_writable(package, tmp_path):
     (tmp_path / "file").touch()
     code = "from fvsolve.jit import cache_folder; print(cache_folder())"
-    assert python(package, code, FVSOLVE_CACHE=str(tmp_path / "stated")) == [str(tmp_path / "stated")]
+    assert python(package, code, FVSOLVE_CACHE=str(tmp_path / "stated")) == [
+        str(tmp_path / "stated")
+    ]
     stated = {"FVSOLVE_CACHE": str(tmp_path / "file" / "x"), "TMPDIR": str(tmp_path)}
     fallback = Path(python(package, code, **stated)[0])
     assert fallback.parent == tmp_path and fallback.name.startswith("fvsolve-cache")
@@ -308,7 +358,11 @@ def test_only_hashed_folders_compile():
 
     Basins state all their compiled files.
     """
-    users = {path for path in cache_folders.PACKAGE.rglob("*.py") if "njit" in path.read_text(encoding="utf-8")}
+    users = {
+        path
+        for path in cache_folders.PACKAGE.rglob("*.py")
+        if "njit" in path.read_text(encoding="utf-8")
+    }
     features = cache_folders.PACKAGE / "features"
     hashed = {
         *cache_folders.compiled_sources(),
@@ -322,9 +376,15 @@ def test_only_hashed_folders_compile():
 def test_declarations_and_lowerings_compile_nothing():
     """Of parts only laws are hashed, of basins only compiled files; edits elsewhere keep the compiled code."""
     hashed = {path.relative_to(cache_folders.PACKAGE) for path in cache_folders.compiled_sources()}
-    of_basins = {path.relative_to(cache_folders.PACKAGE / "features" / "basins") for path in COMPILED}
+    of_basins = {
+        path.relative_to(cache_folders.PACKAGE / "features" / "basins") for path in COMPILED
+    }
     assert not any(path.parts[0] == "features" for path in hashed)
-    assert {Path("liquid/grid_linear.py"), Path("basin_scalars.py"), Path("free_surface/law_patch_face.py")} < of_basins
+    assert {
+        Path("liquid/grid_linear.py"),
+        Path("basin_scalars.py"),
+        Path("free_surface/law_patch_face.py"),
+    } < of_basins
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower", "feature")) for path in of_basins)
 
@@ -338,9 +398,19 @@ def test_a_compiled_function_of_declared_arguments_takes_no_others():
     assert factor(whole, numbers, 1, numbers) == 0 and solve(whole, numbers, numbers) is None
     frozen = numbers.copy()
     frozen.flags.writeable = False
-    for wrong in (whole, numbers.astype(np.float32), numbers[::2], frozen, np.zeros((3, 1)), [0.0], None):
+    for wrong in (
+        whole,
+        numbers.astype(np.float32),
+        numbers[::2],
+        frozen,
+        np.zeros((3, 1)),
+        [0.0],
+        None,
+    ):
         solve(whole, numbers.copy(), numbers)  # an array that does not exist any more
-        with pytest.raises(TypeError, match="argument 1 is .*; expected a writable C-contiguous array"):
+        with pytest.raises(
+            TypeError, match="argument 1 is .*; expected a writable C-contiguous array"
+        ):
             solve(whole, wrong, numbers)
 
 

@@ -39,8 +39,12 @@ def finished(tmp_path_factory):
 
 def killed(after: float, *arguments) -> bool:
     """Start a command and kill it with its processes after a time [s]; True if it was still running."""
-    process = subprocess.Popen([sys.executable, "-m", "fvsolve", *map(str, arguments)], start_new_session=True,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fvsolve", *map(str, arguments)],
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         process.wait(after)
         return False
@@ -59,15 +63,23 @@ def killed(after: float, *arguments) -> bool:
 def test_a_run_that_is_killed_is_continued_with_equal_rows(finished, tmp_path_factory, share):
     out = tmp_path_factory.mktemp("killed") / "run"
     killed(share * LONGEST, "run", finished / "case.toml", "--out", out)
-    resumed = fvsolve.run(finished / "case.toml", out=out, resume=True)  # the lock ended with its process
-    assert resumed.ok and (out / "history.csv").read_bytes() == (finished / "run" / "history.csv").read_bytes()
-    assert len(list((out / "fields").glob("*.vtu"))) == 21 and not [p for p in out.rglob(".*") if ".tmp" in p.name]
+    # the lock ended with its process
+    resumed = fvsolve.run(finished / "case.toml", out=out, resume=True)
+    assert (
+        resumed.ok
+        and (out / "history.csv").read_bytes() == (finished / "run" / "history.csv").read_bytes()
+    )
+    assert len(list((out / "fields").glob("*.vtu"))) == 21 and not [
+        p for p in out.rglob(".*") if ".tmp" in p.name
+    ]
     shutil.rmtree(out)
 
 
 @given(share=st.floats(0.3, 1.0))
 @examples(4)
-def test_a_report_that_is_killed_leaves_the_old_or_the_new_page(finished, fvs, tmp_path_factory, share):
+def test_a_report_that_is_killed_leaves_the_old_or_the_new_page(
+    finished, fvs, tmp_path_factory, share
+):
     out = tmp_path_factory.mktemp("killed") / "run"
     shutil.copytree(finished / "run", out)
     killed(share * LONGEST, "report", out, "--xlsx")
@@ -81,14 +93,23 @@ def test_a_report_that_is_killed_leaves_the_old_or_the_new_page(finished, fvs, t
 @examples(3)
 def test_a_sweep_that_is_killed_retains_its_finished_points(finished, fvs, tmp_path_factory, share):
     out = tmp_path_factory.mktemp("killed") / "sweep"
-    command = ("sweep", finished / "case.toml", "--set", "links.valve.area=0.003,0.004,0.005,0.006", "--out", out)
+    command = (
+        "sweep",
+        finished / "case.toml",
+        "--set",
+        "links.valve.area=0.003,0.004,0.005,0.006",
+        "--out",
+        out,
+    )
     killed(share * LONGEST, *command)
     points = out / "points.jsonl"
     kept = points.read_text().splitlines() if points.is_file() else []
     assert fvs(*command)[0] == 0
     now = points.read_text().splitlines()
     assert len(now) == 4 and len((out / "sweep.csv").read_text().splitlines()) == 5
-    assert [line for line in kept if line.endswith("}")] == now[: len([line for line in kept if line.endswith("}")])]
+    assert [line for line in kept if line.endswith("}")] == now[
+        : len([line for line in kept if line.endswith("}")])
+    ]
     shutil.rmtree(out)
 
 
@@ -105,8 +126,11 @@ with replacing(sys.argv[1]) as fresh, open(fresh, "w") as file:
 
 def test_a_kill_within_a_write_leaves_the_old_file_and_leftovers_are_removed(tmp_path):
     write_file(tmp_path / "a.html", "old")
-    with subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path / "a.html")], stdin=subprocess.PIPE,
-                          stdout=subprocess.PIPE) as process:  # fmt: skip
+    with subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(tmp_path / "a.html")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as process:
         process.stdout.readline()
         process.kill()
     assert (tmp_path / "a.html").read_text() == "old"
@@ -127,7 +151,10 @@ def test_a_new_file_retains_rights_and_links_and_devices_stay(tmp_path):
     assert (tmp_path / "link.csv").is_symlink() and target.read_text() == "new"
     assert target.stat().st_mode & 0o777 == 0o640
     write_file(os.devnull, "nothing")
-    assert os.stat(os.devnull).st_rdev != 0 and sorted(os.listdir(tmp_path)) == ["link.csv", "target.csv"]
+    assert os.stat(os.devnull).st_rdev != 0 and sorted(os.listdir(tmp_path)) == [
+        "link.csv",
+        "target.csv",
+    ]
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_names_it(tmp_path):
@@ -150,19 +177,30 @@ def test_no_module_writes_a_result_in_place():
     pattern = re.compile(
         r"\.write_text\(|\.write_bytes\(|\.savefig\(|savez\((?!file)|[( ]open\([^)]*\"[wa]b?\"|copyfile\("
     )
-    found = {(path.relative_to(package).as_posix(), line.strip())
-             for path in package.rglob("*.py") for line in path.read_text(encoding="utf-8").splitlines()
-             if pattern.search(line) and "fresh" not in line}  # fmt: skip
+    found = {
+        (path.relative_to(package).as_posix(), line.strip())
+        for path in package.rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if pattern.search(line) and "fresh" not in line
+    }
     allowed = {
         # growing files, cut to a checkpoint
-        "core/output/csv_files.py", "core/output/fields.py", "studies/result_cache.py",
+        "core/output/csv_files.py",
+        "core/output/fields.py",
+        "studies/result_cache.py",
         # caches
-        "compile/store.py", "compile/numba_internals.py", "compile/cache_folders.py", "core/fluid/coolprop.py",
+        "compile/store.py",
+        "compile/numba_internals.py",
+        "compile/cache_folders.py",
+        "core/fluid/coolprop.py",
         # temporary folders
-        "studies/validation/library.py", "studies/validation/epanet_networks.py", "studies/validation/data_files.py",
+        "studies/validation/library.py",
+        "studies/validation/epanet_networks.py",
+        "studies/validation/data_files.py",
         "exchange/epanet/toolkit_process.py",  # a temporary folder
-        "exchange/fmi/cosimulation.py", "display.py",  # memory
-    }  # fmt: skip
+        "exchange/fmi/cosimulation.py",
+        "display.py",  # memory
+    }
     assert {row for row in found if row[0] not in allowed} == set()
 
 

@@ -38,7 +38,10 @@ def scene():
 @pytest.mark.parametrize("use", USES.values(), ids=USES)
 def test_the_parts_of_a_case_are_gone_with_the_case(use, scene):
     case = fvsolve.load(scene)
-    parts = [weakref.ref(part) for part in (*case.nodes.values(), *case.links.values(), case.fluid, case.numerics)]
+    parts = [
+        weakref.ref(part)
+        for part in (*case.nodes.values(), *case.links.values(), case.fluid, case.numerics)
+    ]
     use(case)
     del case
     gc.collect()

@@ -16,11 +16,16 @@ STATION = re.compile(r"^ *(\S+\.py) +(?:([A-Za-z_]+)(?:\.(\w+))?[:,] )?", re.MUL
 
 def test_nine_verbs_order_all_methods_of_a_part():
     rows = {
-        verb: re.findall(r"`(\w+)`", names) for verb, names in VERB.findall((DOCS / "device.md").read_text("utf-8"))
+        verb: re.findall(r"`(\w+)`", names)
+        for verb, names in VERB.findall((DOCS / "device.md").read_text("utf-8"))
     }
     rows.pop("verb", None)
     named = [name for names in rows.values() for name in names]
-    declared = {name for one in (Lowering, Restriction, Device) for name in {*vars(one), *one.__annotations__}}
+    declared = {
+        name
+        for one in (Lowering, Restriction, Device)
+        for name in {*vars(one), *one.__annotations__}
+    }
     assert len(rows) == 9 and len(named) == len(set(named))
     assert set(named) == {name for name in declared if not name.startswith("_")} - REGISTRY
 
@@ -34,14 +39,18 @@ def test_stations_on_the_way_of_a_run_exist():
         source = (PACKAGE / path).read_text("utf-8")
         if name not in ("", "conductance", "probes"):  # a value or a word
             assert re.search(rf"^(?:class|def) {name}\b", source, re.MULTILINE), f"{path}: {name}"
-        assert not method or re.search(rf"^    def {method}\b", source, re.MULTILINE), f"{path}: {method}"
+        assert not method or re.search(rf"^    def {method}\b", source, re.MULTILINE), (
+            f"{path}: {method}"
+        )
 
 
 def test_docstrings_of_folders_state_contents_and_imports():
     page = (DOCS / "developing.md").read_text("utf-8").partition("## How a run goes")[0]
     folders = {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"data"}
     named = {
-        name for names in re.findall(r"^\| (`.+?`) \|", page, re.MULTILINE) for name in re.findall(r"`(\w+)`", names)
+        name
+        for names in re.findall(r"^\| (`.+?`) \|", page, re.MULTILINE)
+        for name in re.findall(r"`(\w+)`", names)
     }
     inside = {path.stem for path in (PACKAGE / "core").iterdir() if not path.name.startswith("_")}
     assert len(folders) == 10 and named == folders | inside

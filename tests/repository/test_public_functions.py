@@ -31,17 +31,23 @@ BAD = {
     "nothing": lambda y: None,
     "ragged": lambda y: [[0.0], [0.0, 1.0]],
     "objects": lambda y: np.array([None] * y.size),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_states_of_another_size_or_kind_are_refused(name, model):
     y = BAD[name](model.start)
     for door in (model.rhs, model.evaluate, model.jacobian, model.observe):
-        with pytest.raises(FvsolveError, match="y .*; expected a number for each|does not consist of real numbers"):
+        with pytest.raises(
+            FvsolveError, match="y .*; expected a number for each|does not consist of real numbers"
+        ):
             door(0.0, y)
     out = model.new_out()
-    for door in (lambda y: model.fields(y, out), model.contents, lambda y: advance(model, State(0.0, y), 0.1)):
+    for door in (
+        lambda y: model.fields(y, out),
+        model.contents,
+        lambda y: advance(model, State(0.0, y), 0.1),
+    ):
         with pytest.raises(FvsolveError):
             door(y)
 
@@ -49,7 +55,9 @@ def test_states_of_another_size_or_kind_are_refused(name, model):
 @pytest.mark.parametrize("t", [np.nan, np.inf, "0", None, 1j, [0.0, 1.0]])
 def test_times_that_are_none_are_refused(t, model):
     for door in (model.rhs, model.evaluate, model.observe, State):
-        with pytest.raises(FvsolveError, match=r"t = .* (is not a time|does not consist of real numbers)"):
+        with pytest.raises(
+            FvsolveError, match=r"t = .* (is not a time|does not consist of real numbers)"
+        ):
             door(t, model.start)
     with pytest.raises(FvsolveError, match="until = "):
         advance(model, initial_state(model), t)
@@ -94,8 +102,17 @@ def test_integrate_takes_rows_of_real_numbers(y0, t, more, words):
 
 def test_arrays_of_a_result_are_not_to_be_written_into(tmp_path):
     held = fvsolve.run(branched(fields=0), {"numerics.end": 0.05}, tmp_path / "run")
-    for result in (held, fvsolve.run(branched(fields=0), {"numerics.end": 0.05}), fvsolve.open_run(tmp_path / "run")):
-        arrays = [result.t, result["gate.pressure"], result.seconds, *result.envelope["main"].values()]
+    for result in (
+        held,
+        fvsolve.run(branched(fields=0), {"numerics.end": 0.05}),
+        fvsolve.open_run(tmp_path / "run"),
+    ):
+        arrays = [
+            result.t,
+            result["gate.pressure"],
+            result.seconds,
+            *result.envelope["main"].values(),
+        ]
         for array in arrays:
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 1.0
@@ -134,7 +151,9 @@ def test_a_state_that_is_not_finite_is_refused_with_the_name_of_the_first(value,
     y = model.start.copy()
     y[[5, 9]] = value
     state = State(0.0, y)
-    calls = [partial(door, 0.0, y) for door in (model.rhs, model.evaluate, model.jacobian, model.observe)]
+    calls = [
+        partial(door, 0.0, y) for door in (model.rhs, model.evaluate, model.jacobian, model.observe)
+    ]
     calls += [lambda: model.observe(state), lambda: advance(model, state, 0.1)]
     calls += [lambda: fvsolve.solve(model, state, object())]
     for door in calls:
@@ -144,10 +163,25 @@ def test_a_state_that_is_not_finite_is_refused_with_the_name_of_the_first(value,
 
 
 WRONG = [3, None, "", [], np.zeros(3)]
-WHAT_IS_THERE = {"case": lambda m: m.case, "model": lambda m: m, "state": initial_state, "y": lambda m: m.start}
+WHAT_IS_THERE = {
+    "case": lambda m: m.case,
+    "model": lambda m: m,
+    "state": initial_state,
+    "y": lambda m: m.start,
+}
 WHAT_IS_THERE |= {"out": lambda m: m.new_out(), "sink": MemorySink, "f": lambda m: lambda t, y: -y}
-PLAIN = {"t": 0.0, "until": 0.0, "y0": [1.0], "source": "valve-closure", "directory": "nowhere", "name": "mine", "k": 0,
-         "text": "0 |\n--+--\n  | 1", "elevation": 0.0, "pressure": 1e5}  # fmt: skip
+PLAIN = {
+    "t": 0.0,
+    "until": 0.0,
+    "y0": [1.0],
+    "source": "valve-closure",
+    "directory": "nowhere",
+    "name": "mine",
+    "k": 0,
+    "text": "0 |\n--+--\n  | 1",
+    "elevation": 0.0,
+    "pressure": 1e5,
+}
 
 
 def public_functions(model):
@@ -155,7 +189,11 @@ def public_functions(model):
     names = [name for name in fvsolve.__all__ if not isinstance(getattr(fvsolve, name), type)]
     found = {name: getattr(fvsolve, name) for name in names} | {"State": State}
     at_model = {name: getattr(model, name) for name in dir(model) if name[0] != "_"}
-    found |= {f"Model.{name}": one for name, one in at_model.items() if callable(one) and name not in NO_DOORS}
+    found |= {
+        f"Model.{name}": one
+        for name, one in at_model.items()
+        if callable(one) and name not in NO_DOORS
+    }
     return found
 
 
@@ -166,35 +204,94 @@ OTHERS = {  # functions of results and studies, with valid arguments
     "Result.plot_envelope": (lambda there: there.result.plot_envelope, {"path": None}),
     "Result.column": (lambda there: there.result.column, {"probe": "gate.pressure"}),
     "Result.si": (lambda there: there.result.si, {"probe": "gate.pressure"}),
-    "Result.view": (lambda there: there.result.view, {"time": None, "field": None, "path": None, "contours": 0}),
-    "Result.animate": (lambda there: there.result.animate, {"path": None, "field": None, "contours": 0}),
+    "Result.view": (
+        lambda there: there.result.view,
+        {"time": None, "field": None, "path": None, "contours": 0},
+    ),
+    "Result.animate": (
+        lambda there: there.result.animate,
+        {"path": None, "field": None, "contours": 0},
+    ),
     "Case.elevation": (lambda there: there.case.elevation, {"name": "gate"}),
     "Case.wave_speed": (lambda there: there.case.wave_speed, {"name": "main"}),
     "Case.plot": (lambda there: there.case.plot, {"path": None}),
     "fit": (lambda there: studies.fit, {"sizes": [4, 2, 1], "errors": [16, 4, 1], "floor": 0.0}),
-    "advection_limit": (lambda there: studies.advection_limit, {"scheme": "upwind", "method": "rk4", "courant": None}),
-    "advection_limits": (lambda there: studies.advection_limits, {"schemes": "upwind", "methods": "rk4", "courant": 1}),
-    "limit_of": (lambda there: studies.limit_of,
-                 {"weights": (0, 0, 1, 0, 0), "scheme": "mine", "method": "rk4", "courant": 1}),
-    "positive_real": (lambda there: studies.positive_real, {"numerator": [1], "denominator": [1, 1]}),
-    "line_positive_real": (lambda there: studies.line_positive_real, {"line": LINE, "shift": None, "tolerance": 1e-6}),
-    "sweep_positive_real": (lambda there: studies.sweep_positive_real,
-                            {"h": lambda s: 1.0, "slope": 0.0, "high": 1.0, "shift": 0.0, "tolerance": 1e-6}),
-    "state_positive_real": (lambda there: studies.state_positive_real, {"h": FIRST, "tolerance": 1e-9}),
-    "LineImpedance": (lambda there: partial(LineImpedance), {"z0": 1.0, "time": 1.0, "reflection": 0.5}),
+    "advection_limit": (
+        lambda there: studies.advection_limit,
+        {"scheme": "upwind", "method": "rk4", "courant": None},
+    ),
+    "advection_limits": (
+        lambda there: studies.advection_limits,
+        {"schemes": "upwind", "methods": "rk4", "courant": 1},
+    ),
+    "limit_of": (
+        lambda there: studies.limit_of,
+        {"weights": (0, 0, 1, 0, 0), "scheme": "mine", "method": "rk4", "courant": 1},
+    ),
+    "positive_real": (
+        lambda there: studies.positive_real,
+        {"numerator": [1], "denominator": [1, 1]},
+    ),
+    "line_positive_real": (
+        lambda there: studies.line_positive_real,
+        {"line": LINE, "shift": None, "tolerance": 1e-6},
+    ),
+    "sweep_positive_real": (
+        lambda there: studies.sweep_positive_real,
+        {"h": lambda s: 1.0, "slope": 0.0, "high": 1.0, "shift": 0.0, "tolerance": 1e-6},
+    ),
+    "state_positive_real": (
+        lambda there: studies.state_positive_real,
+        {"h": FIRST, "tolerance": 1e-9},
+    ),
+    "LineImpedance": (
+        lambda there: partial(LineImpedance),
+        {"z0": 1.0, "time": 1.0, "reflection": 0.5},
+    ),
     "LineImpedance()": (lambda there: LINE, {"s": 1j}),
-    "Transfer": (lambda there: partial(Transfer), {"a": [[-1.0]], "b": [1.0], "c": [1.0], "d": 0.0}),
+    "Transfer": (
+        lambda there: partial(Transfer),
+        {"a": [[-1.0]], "b": [1.0], "c": [1.0], "d": 0.0},
+    ),
     "Transfer()": (lambda there: FIRST, {"s": 1j}),
-    "limited_limits": (lambda there: studies.limited_limits, {"schemes": "muscl", "methods": "rk4", "cells": 3}),
+    "limited_limits": (
+        lambda there: studies.limited_limits,
+        {"schemes": "muscl", "methods": "rk4", "cells": 3},
+    ),
     "analyse": (lambda there: steppers.analyse, {"method": "rk4"}),
-    "local_error": (lambda there: steppers.local_error, {"method": "rk4", "lam": -1.0, "h": 0.1, "y": 1.0}),
-    "global_error": (lambda there: steppers.global_error, {"method": "rk4", "lam": 1j, "h": 0.1, "steps": 3}),
-    "seen_frequency": (lambda there: steppers.seen_frequency, {"method": "rk4", "omega": 1.0, "h": 0.1}),
+    "local_error": (
+        lambda there: steppers.local_error,
+        {"method": "rk4", "lam": -1.0, "h": 0.1, "y": 1.0},
+    ),
+    "global_error": (
+        lambda there: steppers.global_error,
+        {"method": "rk4", "lam": 1j, "h": 0.1, "steps": 3},
+    ),
+    "seen_frequency": (
+        lambda there: steppers.seen_frequency,
+        {"method": "rk4", "omega": 1.0, "h": 0.1},
+    ),
     "stability_function": (lambda there: steppers.stability_function, {"method": "rk4"}),
     "pade": (lambda there: steppers.pade, {"k": 1, "m": 1}),
-}  # fmt: skip
-OTHER = [object(), "", "no\0where", "nowhere/at all", [None], ["a"], [np.nan], np.zeros((2, 3)), {"a": 1}, b"x", np.nan,
-         np.inf, -1, 2.5, True, 1 + 1j]  # fmt: skip
+}
+OTHER = [
+    object(),
+    "",
+    "no\0where",
+    "nowhere/at all",
+    [None],
+    ["a"],
+    [np.nan],
+    np.zeros((2, 3)),
+    {"a": 1},
+    b"x",
+    np.nan,
+    np.inf,
+    -1,
+    2.5,
+    True,
+    1 + 1j,
+]
 TAKEN = {  # values of OTHER that are valid, and the arguments that accept them
     "2.5": "fit.floor advection_limit.courant advection_limits.courant limit_of.courant line_positive_real.shift "
     "line_positive_real.tolerance sweep_positive_real.slope sweep_positive_real.high sweep_positive_real.shift "
@@ -209,11 +306,15 @@ TAKEN = {one: given for given, many in TAKEN.items() for one in many.split()}
 
 @pytest.fixture(scope="module")
 def there(model):
-    return SimpleNamespace(case=model.case, result=fvsolve.run(branched(fields=0), {"numerics.end": 0.01}))
+    return SimpleNamespace(
+        case=model.case, result=fvsolve.run(branched(fields=0), {"numerics.end": 0.01})
+    )
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_results_and_studies_accept_their_documented_arguments_and_refuse_all_else(name, there, tmp_path, monkeypatch):
+def test_results_and_studies_accept_their_documented_arguments_and_refuse_all_else(
+    name, there, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     make, plain = OTHERS[name]
     door, bad = make(there), []
@@ -272,8 +373,13 @@ def test_every_public_function_states_its_expectation(model, tmp_path, monkeypat
     bad = []
     for name, door in public_functions(model).items():
         wanted = inspect.signature(door).parameters.values()
-        there = {one.name: WHAT_IS_THERE[one.name](model) if one.name in WHAT_IS_THERE else PLAIN.get(one.name)
-                 for one in wanted if one.default is one.empty}  # fmt: skip
+        there = {
+            one.name: WHAT_IS_THERE[one.name](model)
+            if one.name in WHAT_IS_THERE
+            else PLAIN.get(one.name)
+            for one in wanted
+            if one.default is one.empty
+        }
         if name == "integrate":
             there["t"] = [0.0, 1.0]
         if name == "run":

@@ -43,7 +43,9 @@ def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
     found = {}
     for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
         exec(example, found)
-    assert found["result"].ok and Path("gate.png").exists() and found["state"].t == pytest.approx(1.0)
+    assert (
+        found["result"].ok and Path("gate.png").exists() and found["state"].t == pytest.approx(1.0)
+    )
     for values in (found["decay"], found["again"]):
         assert values[:, 0] == pytest.approx([1.0, math.exp(-0.5), math.exp(-1.0)], rel=1e-6)
 
@@ -60,21 +62,39 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_importing_imports_nothing_heavy():
-    heavy = ["numpy", "numba", "CoolProp", "pint", "matplotlib", "pyvista", "meshio", "scipy", "rich", "pydantic"]
+    heavy = [
+        "numpy",
+        "numba",
+        "CoolProp",
+        "pint",
+        "matplotlib",
+        "pyvista",
+        "meshio",
+        "scipy",
+        "rich",
+        "pydantic",
+    ]
     code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
-PAGES = {page.name: page.read_text(encoding="utf-8")
-         for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]}  # fmt: skip
+PAGES = {
+    page.name: page.read_text(encoding="utf-8")
+    for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]
+}
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_names_of_a_page_can_be_imported_from_the_stated_place(page):
     imports = re.findall(r"from (fvsolve[\w.]*) import \(?([\w, ]+)", PAGES[page])
-    named = [(room, name.strip()) for room, names in imports for name in names.split(",") if name.strip()]
-    named += [text.rpartition(".")[::2] for text in re.findall(r"`(fvsolve(?:\.[a-zA-Z_]\w*)+)", PAGES[page])]
+    named = [
+        (room, name.strip()) for room, names in imports for name in names.split(",") if name.strip()
+    ]
+    named += [
+        text.rpartition(".")[::2]
+        for text in re.findall(r"`(fvsolve(?:\.[a-zA-Z_]\w*)+)", PAGES[page])
+    ]
     lost = [f"{room}.{name}" for room, name in named if not importable(room, name)]
     assert not lost
 
@@ -103,7 +123,9 @@ def test_the_package_refuses_an_older_python():
     assert "numba" not in found.stderr
 
 
-NO_CI = pytest.mark.skipif(not (TOP / ".ci/run").exists() or os.name == "nt", reason="no .ci/run here")
+NO_CI = pytest.mark.skipif(
+    not (TOP / ".ci/run").exists() or os.name == "nt", reason="no .ci/run here"
+)
 
 
 @NO_CI
@@ -115,10 +137,16 @@ def test_ci_refuses_an_unknown_option():
 @NO_CI
 def test_ci_refuses_an_older_python(tmp_path):
     older = tmp_path / "python3.10"
-    older.write_text('#!/bin/sh\nif [ "$1" = --version ]; then echo Python 3.10.13; else exit 1; fi\n')
+    older.write_text(
+        '#!/bin/sh\nif [ "$1" = --version ]; then echo Python 3.10.13; else exit 1; fi\n'
+    )
     older.chmod(0o755)
-    found = subprocess.run([TOP / ".ci/run"], capture_output=True, text=True,
-                           env=os.environ | {"PYTHON": str(older), "TMPDIR": str(tmp_path)})  # fmt: skip
+    found = subprocess.run(
+        [TOP / ".ci/run"],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHON": str(older), "TMPDIR": str(tmp_path)},
+    )
     assert found.returncode == 1
     assert all(part in found.stdout for part in (str(older), "3.10.13", "3.11 or later", "PYTHON="))
     assert list(tmp_path.iterdir()) == [older]

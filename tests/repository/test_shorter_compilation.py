@@ -69,7 +69,12 @@ def test_functions_that_are_optimised_alone_give_the_same(package, large):  # no
     """Also where one calls another directly and through a third, for two types, from the cache and from the store."""
     (package / "core" / "kernels" / "chain.py").write_text(FUNCTIONS)
     total = 1.0 + 4.0 + 16.0
-    wanted = [str(2.5 * total), str(0.5 * total), str(0.5 * total + total + 2.0 * total + 5.0), "negative"]
+    wanted = [
+        str(2.5 * total),
+        str(0.5 * total),
+        str(0.5 * total + total + 2.0 * total + 5.0),
+        "negative",
+    ]
     code = CHAIN.format(large=large, compiled=True)
     first, second = [python(package, code, FVSOLVE_STORE="0") for _ in range(2)]
     assert first[:5] == [*wanted, "3"] and second[:5] == [*wanted, "0"]
@@ -95,7 +100,13 @@ def test_variables_of_statements_are_those_that_numba_lists():
             return [member]
         if isinstance(member, Inst):
             return member.list_vars()
-        members = member.values() if isinstance(member, dict) else member if isinstance(member, list | tuple) else ()
+        members = (
+            member.values()
+            if isinstance(member, dict)
+            else member
+            if isinstance(member, list | tuple)
+            else ()
+        )
         return [one for each in members for one in listed(each)]
 
     numba_module()
@@ -113,8 +124,15 @@ def test_variables_of_statements_are_those_that_numba_lists():
 
 def test_flags_are_equal_where_all_options_are():
     numba_module()
-    sets = [{}, {"nrt": True}, {"nrt": False}, {"fastmath": True}, {"nrt": True, "fastmath": True},
-            {"no_cpython_wrapper": False}, {"error_model": "numpy"}]  # fmt: skip
+    sets = [
+        {},
+        {"nrt": True},
+        {"nrt": False},
+        {"fastmath": True},
+        {"nrt": True, "fastmath": True},
+        {"no_cpython_wrapper": False},
+        {"error_model": "numpy"},
+    ]
     all_flags = []
     for options in sets:
         all_flags.append(Flags())
@@ -123,7 +141,9 @@ def test_flags_are_equal_where_all_options_are():
     found = [(one == other) for one, other in product(all_flags, all_flags)]
     assert found == [one.values() == other.values() for one, other in product(all_flags, all_flags)]
     assert len(sets) < sum(found) < len(found)
-    assert all(hash(one) == hash(other) for one, other in product(all_flags, all_flags) if one == other)
+    assert all(
+        hash(one) == hash(other) for one, other in product(all_flags, all_flags) if one == other
+    )
     assert Flags() != TargetConfig() and Flags() != 1
 
 
@@ -131,10 +151,21 @@ def test_a_remembered_operator_has_the_signature_that_numba_resolves():
     numba_module()
     context, types = cpu_target.typing_context, numba.types
     context.refresh()
-    kinds = [types.int64, types.int32, types.uint8, types.float64, types.complex128, types.boolean, types.literal(2),
-             types.float64[::1], types.int64[:, ::1]]  # fmt: skip
+    kinds = [
+        types.int64,
+        types.int32,
+        types.uint8,
+        types.float64,
+        types.complex128,
+        types.boolean,
+        types.literal(2),
+        types.float64[::1],
+        types.int64[:, ::1],
+    ]
     resolved = 0
-    for name, one, other in product(("add", "truediv", "lt", "pow", "getitem", "and_", "sub"), kinds, kinds):
+    for name, one, other in product(
+        ("add", "truediv", "lt", "pow", "getitem", "and_", "sub"), kinds, kinds
+    ):
         function = context.resolve_value_type(getattr(operator, name))
         fresh = types.Function(function.templates)
         try:

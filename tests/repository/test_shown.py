@@ -28,12 +28,15 @@ def object_of(kind: str):
     if kind == "State":
         return advance(object_of("Model"), initial_state(object_of("Model")), 1.0)
     return {
-        "Case": lambda: load(CASE), "Model": lambda: build(object_of("Case")),
+        "Case": lambda: load(CASE),
+        "Model": lambda: build(object_of("Case")),
         "Result": lambda: run(object_of("Model")),
-        "Order": lambda: order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"),
+        "Order": lambda: order(
+            CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4"
+        ),
         "Sweep": lambda: sweep(CASE, {"numerics.rtol": [1e-4, 1e-5]}),
         "Chart": lambda: chart(CASE, methods=["rk4"], step=[4.0, 2.0]),
-    }[kind]()  # fmt: skip
+    }[kind]()
 
 
 KINDS = ["Case", "Model", "State", "Result", "Order", "Sweep", "Chart"]
@@ -55,16 +58,22 @@ def test_every_object_has_a_line_a_table_and_a_picture(kind, tmp_path):
 
 def test_a_notebook_shows_the_table_alone_if_nothing_can_be_drawn(monkeypatch):
     for kind in KINDS:
-        monkeypatch.setattr(type(object_of(kind)), "plot", lambda *_: importlib.import_module("no_matplotlib"))
+        monkeypatch.setattr(
+            type(object_of(kind)), "plot", lambda *_: importlib.import_module("no_matplotlib")
+        )
         page = object_of(kind)._repr_html_()
         assert "<table>" in page and "<img" not in page
 
 
 def test_tables_hold_the_numbers():
-    assert object_of("State").frame()["y"].to_numpy() == pytest.approx(object_of("State").y, abs=0.0)
+    assert object_of("State").frame()["y"].to_numpy() == pytest.approx(
+        object_of("State").y, abs=0.0
+    )
     assert list(object_of("Model").frame()["state"]) == object_of("Model").state_names
     assert list(object_of("Sweep").frame()["numerics.rtol"]) == [1e-4, 1e-5]
-    assert len(object_of("Order").frame()) == 3 and len(object_of("Chart").frame()) == len(object_of("Chart").points)
+    assert len(object_of("Order").frame()) == 3 and len(object_of("Chart").frame()) == len(
+        object_of("Chart").points
+    )
 
 
 def test_names_in_a_notebook_are_text_and_no_markup():
@@ -84,7 +93,9 @@ def test_a_shipped_case_goes_by_its_name_as_on_the_command_line(tmp_path, monkey
         load(CASE)
 
 
-@pytest.mark.parametrize("name", ["valve-clsure", "valve_closure", "valve-closure.toml", "cases2/valve-clsure.toml"])
+@pytest.mark.parametrize(
+    "name", ["valve-clsure", "valve_closure", "valve-closure.toml", "cases2/valve-clsure.toml"]
+)
 def test_a_misspelled_shipped_case_is_named_in_python(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for function in (
@@ -95,7 +106,10 @@ def test_a_misspelled_shipped_case_is_named_in_python(name, tmp_path, monkeypatc
         lambda case: response(case, "gate"),
         lambda case: sweep(case, {"a": [1]}),
     ):
-        with pytest.raises(FvsolveError, match='there is no such file; did you mean the shipped case "valve-closure"'):
+        with pytest.raises(
+            FvsolveError,
+            match='there is no such file; did you mean the shipped case "valve-closure"',
+        ):
             function(name)
     (tmp_path / "valve-closer.toml").write_text("")  # a file of the caller takes precedence
     with pytest.raises(FvsolveError, match='did you mean "valve-closer.toml"'):
@@ -106,8 +120,10 @@ def test_a_misspelled_shipped_case_is_named_by_commands(fvs, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     for command in (("run",), ("check",), ("energy",), ("precompile", "--for"), ("new",)):
         code, _, err = fvs(*command, "valve-clsure")
-        assert code == 2 and 'no shipped case valve-clsure; did you mean "valve-closure"' in err.replace(
-            "no file and ", ""
+        assert (
+            code == 2
+            and 'no shipped case valve-clsure; did you mean "valve-closure"'
+            in err.replace("no file and ", "")
         )
 
 
@@ -126,10 +142,13 @@ def test_a_tableau_from_arrays_is_that_of_its_text():
     for a in ([[0, 0], [1, 0]], np.array([[0.0, 0.0], [1.0, 0.0]])):
         method = tableau("shown-array", a, [Fraction(1, 2), Fraction(1, 2)], [0, 1])
         assert (
-            np.array_equal(method.a, text.a) and np.array_equal(method.b, text.b) and np.array_equal(method.c, text.c)
+            np.array_equal(method.a, text.a)
+            and np.array_equal(method.b, text.b)
+            and np.array_equal(method.c, text.c)
         )
         assert (method.order, method.stages) == (text.order, text.stages) == (2, 2)
-    assert tableau("shown-array", A=[[0, 0], [0.5, 0]], b=[0.0, 1.0]).order == 2  # c defaults to the row sums
+    # c defaults to the row sums
+    assert tableau("shown-array", A=[[0, 0], [0.5, 0]], b=[0.0, 1.0]).order == 2
     pair = tableau("shown-array", [[0, 0], [1, 0]], [[0.5, 0.5], [1.0, 0.0]], [0.0, 1.0])
     assert pair.adaptive and (pair.order, pair.error_order) == (2, 1)
 
@@ -139,7 +158,9 @@ def test_a_tableau_of_third_parts_in_floating_point_retains_its_order():
     assert tableau("shown-heun", a, [1 / 4, 0, 3 / 4]).order == METHODS["heun"].order == 3
 
 
-@pytest.mark.parametrize("a, b, c", [([[0, 0]], [1], None), ([[0]], [1, 2], None), ([[0]], [1], [0, 1])])
+@pytest.mark.parametrize(
+    "a, b, c", [([[0, 0]], [1], None), ([[0]], [1, 2], None), ([[0]], [1], [0, 1])]
+)
 def test_arrays_of_another_shape_are_refused(a, b, c):
     with pytest.raises(FvsolveError, match="expected"):
         tableau("shown-wrong", a, b, c)
@@ -153,8 +174,21 @@ def test_arrays_of_another_shape_are_refused(a, b, c):
 def test_a_file_of_a_printed_tableau_is_a_method_on_the_command_line(fvs, tmp_path):
     path = tmp_path / "my-heun2.txt"
     path.write_text(ROW)
-    code, out, _ = fvs("order", CASE, "--refine", "time", "--levels", "3", "--method", path, "--set", "numerics.step=4",
-                       "--out", tmp_path / "order", "--json")  # fmt: skip
+    code, out, _ = fvs(
+        "order",
+        CASE,
+        "--refine",
+        "time",
+        "--levels",
+        "3",
+        "--method",
+        path,
+        "--set",
+        "numerics.step=4",
+        "--out",
+        tmp_path / "order",
+        "--json",
+    )
     assert code == 0 and "my-heun2" in out
     assert json.loads(fvs("methods", path, "--out", tmp_path / "m.png", "--json")[1])["order"] == 2
     path.write_text("0 | what\n")
@@ -172,8 +206,14 @@ def test_the_version_is_printed(fvs):
     code, out, _ = fvs("--version")
     assert code == 0 and out.strip() == f"fvsolve {fvsolve.__version__}"
     assert files("fvsolve").joinpath("py.typed").is_file()
-    assert subprocess.run([sys.executable, "-c", "import fvsolve; print(fvsolve.__version__)"],
-                          capture_output=True, text=True).stdout.strip() == fvsolve.__version__  # fmt: skip
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", "import fvsolve; print(fvsolve.__version__)"],
+            capture_output=True,
+            text=True,
+        ).stdout.strip()
+        == fvsolve.__version__
+    )
 
 
 def test_the_first_run_on_a_machine_states_that_it_compiles(fvs, tmp_path, monkeypatch):
@@ -190,7 +230,9 @@ def test_a_name_stands_for_a_list_of_it_in_all_studies():
     one = order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods="rk4")
     both = order(CASE, {"numerics.step": 4.0}, refine="time", levels=3, methods=["rk4", "heun"])
     assert one.method == "rk4" and [found.method for found in both] == ["rk4", "heun"]
-    assert {point.setting.method for point in chart(CASE, methods="rk4", step=[4.0, 2.0]).points} >= {"rk4"}
+    assert {
+        point.setting.method for point in chart(CASE, methods="rk4", step=[4.0, 2.0]).points
+    } >= {"rk4"}
     assert [one.method for one in advection_limits("upwind", "rk4")] == ["rk4"]
 
 

@@ -17,19 +17,46 @@ import pytest
 from reference.browser import browser
 from reference.folders import DOCS
 
-for module in ("sphinx", "myst_nb", "pydata_sphinx_theme", "sphinx_copybutton", "latex2mathml", "wntr", "plotly"):
+for module in (
+    "sphinx",
+    "myst_nb",
+    "pydata_sphinx_theme",
+    "sphinx_copybutton",
+    "latex2mathml",
+    "wntr",
+    "plotly",
+):
     pytest.importorskip(module, reason="the extra `docs` is not installed")
 
 FILES = (path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md"))
-PAGES = sorted(page for page in FILES if not page.startswith("validation/results/"))  # part of validation/cases
+# part of validation/cases
+PAGES = sorted(page for page in FILES if not page.startswith("validation/results/"))
 FORMS = [(width, scheme) for width in (1280, 390) for scheme in ("light", "dark")]
-LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "embed": "src"}
+LOADED = {
+    "script": "src",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "video": "src",
+    "embed": "src",
+}
 VOID = {"script", "style", "template", "noscript"}  # elements whose text is not shown
 
 
 def build(source: Path, target: Path) -> subprocess.CompletedProcess:
     """Build a site from nothing, with warnings as errors."""
-    command = [sys.executable, "-m", "sphinx", "-W", "-n", "--keep-going", "-E", "-q", str(source), str(target)]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "-n",
+        "--keep-going",
+        "-E",
+        "-q",
+        str(source),
+        str(target),
+    ]
     known = os.environ | {"PYTHONPATH": str(DOCS.parent), "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(command, capture_output=True, text=True, env=known)
 
@@ -82,7 +109,9 @@ def html(site: Path) -> list[Path]:
 
 
 def test_every_page_of_docs_is_a_page_of_the_site(site):
-    assert [page for page in PAGES if not (site / f"{page}.html").is_file()] == [] and len(PAGES) > 60
+    assert [page for page in PAGES if not (site / f"{page}.html").is_file()] == [] and len(
+        PAGES
+    ) > 60
 
 
 def test_every_page_is_reached_from_the_only_landing_page(site):
@@ -91,9 +120,15 @@ def test_every_page_is_reached_from_the_only_landing_page(site):
         name = todo.pop()
         seen.add(name)
         found = (urlsplit(link).path for link in read(site / name).links if "://" not in link)
-        todo |= {os.path.normpath(Path(name).parent / unquote(one)) for one in found if one.endswith(".html")} - seen
+        todo |= {
+            os.path.normpath(Path(name).parent / unquote(one))
+            for one in found
+            if one.endswith(".html")
+        } - seen
     assert {f"{page}.html" for page in PAGES} <= seen
-    assert [one for one in ("home", "start", "contents", "README") if (site / f"{one}.html").exists()] == []
+    assert [
+        one for one in ("home", "start", "contents", "README") if (site / f"{one}.html").exists()
+    ] == []
 
 
 def test_every_link_leads_to_a_file_and_an_anchor_of_the_site(site):
@@ -104,7 +139,9 @@ def test_every_link_leads_to_a_file_and_an_anchor_of_the_site(site):
             if parts.scheme:
                 continue
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            anchored = target.suffix != ".html" or unquote(parts.fragment) in read(target).anchors | {"#"}
+            anchored = target.suffix != ".html" or unquote(parts.fragment) in read(
+                target
+            ).anchors | {"#"}
             if not target.is_file() or not anchored:
                 lost.append(f"{path.relative_to(site)}: {link}")
     assert lost == []
@@ -112,9 +149,13 @@ def test_every_link_leads_to_a_file_and_an_anchor_of_the_site(site):
 
 def test_no_page_and_no_style_loads_a_file_from_the_network(site):
     outside = re.compile(r"^(https?:)?//")
-    assert [(path.name, one) for path in html(site) for one in read(path).loaded if outside.match(one)] == []
+    assert [
+        (path.name, one) for path in html(site) for one in read(path).loaded if outside.match(one)
+    ] == []
     for style in site.rglob("*.css"):
-        assert not re.search(r"(url\(\s*['\"]?|@import\s+['\"])(https?:)?//", style.read_text(encoding="utf-8")), style
+        assert not re.search(
+            r"(url\(\s*['\"]?|@import\s+['\"])(https?:)?//", style.read_text(encoding="utf-8")
+        ), style
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -125,11 +166,19 @@ def test_headings_and_code_of_a_page_are_in_its_html(page, site):
         text = (DOCS / f"{page}.md").parent.joinpath(mark[1]).read_text(encoding="utf-8")
     shown = re.sub(r"\s", "", read(site / f"{page}.html").text)
     blocks = re.findall(
-        r"^```[^\n]*\n(?:%%writefile[^\n]*)?(.*?)^```", text.replace("\n!", "\n"), re.DOTALL | re.MULTILINE
+        r"^```[^\n]*\n(?:%%writefile[^\n]*)?(.*?)^```",
+        text.replace("\n!", "\n"),
+        re.DOTALL | re.MULTILINE,
     )
     prose = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
-    headings = [re.sub(r"[*`]|\]\(.*?\)|\[", "", one) for one in re.findall(r"^#+ (.*)$", prose, re.MULTILINE)]
-    assert headings and [one for one in [*headings, *blocks] if re.sub(r"\s", "", one) not in shown] == []
+    headings = [
+        re.sub(r"[*`]|\]\(.*?\)|\[", "", one)
+        for one in re.findall(r"^#+ (.*)$", prose, re.MULTILINE)
+    ]
+    assert (
+        headings
+        and [one for one in [*headings, *blocks] if re.sub(r"\s", "", one) not in shown] == []
+    )
 
 
 def test_formulas_are_mathml(site):
@@ -147,18 +196,29 @@ def test_cells_of_a_tutorial_have_run_and_commands_are_shown_as_for_a_shell(site
     assert len(re.findall(r"<img[^>]*_images/[0-9a-f]{32,}\.png", page)) == 2
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("tutorials/") and "index" not in page])
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.startswith("tutorials/") and "index" not in page]
+)
 def test_every_tutorial_has_run_and_shows_pictures_and_plain_commands_and_files(page, site):
     shown = re.sub(r"\s", "", read(site / f"{page}.html").text)
     assert "!fvsolve" not in shown and "%%writefile" not in shown and "\x1b" not in shown
-    assert len(re.findall(r"<img[^>]*_images/[0-9a-f]{32,}\.png", (site / f"{page}.html").read_text("utf-8"))) >= 1
+    assert (
+        len(
+            re.findall(
+                r"<img[^>]*_images/[0-9a-f]{32,}\.png", (site / f"{page}.html").read_text("utf-8")
+            )
+        )
+        >= 1
+    )
 
 
 def test_a_failing_cell_a_lost_link_and_a_page_without_section_stop_the_build(tmp_path):
     for name in ("conf.py", "generated_pages.py", "kernel_start.py", "python.md", "site.css"):
         shutil.copy(DOCS / name, tmp_path / name)
     (tmp_path / "python.md").write_text("# Alone\n")
-    (tmp_path / "index.md").write_text("# Top\n\n[gone](gone.md)\n\n| page |\n|---|\n| [cell](cell.md) |\n")
+    (tmp_path / "index.md").write_text(
+        "# Top\n\n[gone](gone.md)\n\n| page |\n|---|\n| [cell](cell.md) |\n"
+    )
     head = "---\nfile_format: mystnb\nkernelspec:\n  name: python3\n---\n\n# Cell\n\n"
     (tmp_path / "cell.md").write_text(head + "```{code-cell} ipython3\n!false\n!echo after\n```\n")
     done = build(tmp_path, tmp_path / "html")
@@ -181,16 +241,21 @@ def test_pages_fit_their_window_without_a_message_of_the_browser(width, scheme, 
     """No page is wider than its window; the browser loads local files only and reports nothing."""
     view = chromium.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     said, asked, wide = [], [], []
-    view.on("console", lambda one: said.append(one.text) if one.type in ("error", "warning") else None)
+    view.on(
+        "console", lambda one: said.append(one.text) if one.type in ("error", "warning") else None
+    )
     view.on("pageerror", lambda one: said.append(str(one)))
     view.on("request", lambda one: asked.append(one.url))
     for page in PAGES:
         view.goto((site / f"{page}.html").as_uri())
-        if view.evaluate("document.documentElement.scrollWidth > document.documentElement.clientWidth"):
+        if view.evaluate(
+            "document.documentElement.scrollWidth > document.documentElement.clientWidth"
+        ):
             wide.append(page)
         assert view.evaluate("document.documentElement.dataset.theme") == scheme
     view.close()
-    said = [text for text in said if "GL Driver Message" not in text]  # speed of a browser without a graphics card
+    # speed of a browser without a graphics card
+    said = [text for text in said if "GL Driver Message" not in text]
     assert (said, wide) == ([], [])
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 

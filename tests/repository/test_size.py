@@ -14,8 +14,10 @@ import pytest
 TOP = Path(__file__).parents[2]
 SLACK = 0.03  # greatest unused share of a limit
 MAX_ARGUMENTS = 12
-MAX_LINES = 60
-BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of statements that hold statements
+# 60 until 2026-11-30: the same functions have up to a fifth more lines since code is broken at 100 characters
+MAX_LINES = 72
+# fields of statements that hold statements
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
 # folder -> (lines, files), with its subfolders. Raised for issue 60 (real network files): reader by EPANET's toolkit,
 # comparison after the import, export, valves that act at once and sparse clusters, parts without supply, causes of
 # starts without solution, energy of pumps, hydrants, tables of air valves, water age and tracing, the table of files,
@@ -27,71 +29,86 @@ BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields of state
 # circle of imports.
 # Index of declarations; commands, exact solutions, sinks and studies of other packages, with the page that shows them.
 # Comments that say why in kernels and steppers.
-DIVIDED = "fvsolve", "fvsolve/core", "fvsolve/exchange", "tests"  # folders whose subfolders have limits of their own
+# Raised for issue 61 (let it breathe): code is broken at 100 characters, and each assignment has a line of its own.
+# folders whose subfolders have limits of their own
+DIVIDED = "fvsolve", "fvsolve/core", "fvsolve/exchange", "tests"
 FOLDERS: dict[str, tuple[int, int]] = {
-    "fvsolve": (1605, 12),
-    "tests": (1269, 9),
-    "benchmarks": (9597, 64),
-    "fvsolve/case": (8414, 30),
-    "fvsolve/cli": (3753, 19),
-    "fvsolve/compile": (1593, 9),
-    "fvsolve/core": (752, 3),
+    "fvsolve": (1794, 12),
+    "tests": (1513, 9),
+    "benchmarks": (11696, 64),
+    "fvsolve/case": (10269, 30),
+    "fvsolve/cli": (5034, 19),
+    "fvsolve/compile": (1760, 9),
+    "fvsolve/core": (870, 3),
     "fvsolve/data": (12, 1),
-    "fvsolve/exact": (1482, 7),
+    "fvsolve/exact": (1736, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (30063, 172),
-    "fvsolve/parts": (19944, 134),
-    "fvsolve/report": (4973, 21),
-    "fvsolve/studies": (17428, 67),
-    "fvsolve/core/assembly": (2484, 10),
-    "fvsolve/core/fluid": (1087, 4),
-    "fvsolve/core/kernels": (10429, 49),
-    "fvsolve/core/mesh": (1512, 6),
-    "fvsolve/core/model": (4071, 18),
-    "fvsolve/core/output": (2874, 15),
-    "fvsolve/core/run": (1634, 7),
-    "fvsolve/core/solve": (3052, 12),
-    "fvsolve/core/step_limits": (1690, 7),
-    "fvsolve/core/steppers": (8221, 35),
-    "fvsolve/exchange/epanet": (3775, 12),
-    "fvsolve/exchange/fmi": (440, 5),
-    "tests/attitude": (449, 2),
-    "tests/basins": (10481, 37),
-    "tests/case": (4424, 16),
-    "tests/cli": (1351, 10),
-    "tests/draw": (232, 2),
-    "tests/epanet": (1877, 6),
-    "tests/exact": (571, 3),
-    "tests/features": (1057, 4),
-    "tests/fluid": (1063, 4),
-    "tests/fmi": (396, 2),
-    "tests/invariance": (2283, 13),
-    "tests/kernels": (1356, 8),
-    "tests/mesh": (560, 2),
-    "tests/model": (2412, 11),
-    "tests/output": (898, 4),
-    "tests/parts": (19415, 52),
-    "tests/reference": (5646, 66),
-    "tests/report": (865, 4),
-    "tests/repository": (5809, 32),
-    "tests/schemes": (570, 2),
-    "tests/solve": (2816, 14),
-    "tests/step_limits": (1039, 4),
-    "tests/steppers": (2905, 17),
-    "tests/studies": (9031, 27),
-    "tests/units": (359, 1),
-    "tests/validation": (319, 1),
+    "fvsolve/features": (34895, 172),
+    "fvsolve/parts": (24232, 134),
+    "fvsolve/report": (6340, 21),
+    "fvsolve/studies": (20724, 67),
+    "fvsolve/core/assembly": (2643, 10),
+    "fvsolve/core/fluid": (1204, 4),
+    "fvsolve/core/kernels": (11613, 49),
+    "fvsolve/core/mesh": (1774, 6),
+    "fvsolve/core/model": (4783, 18),
+    "fvsolve/core/output": (3286, 15),
+    "fvsolve/core/run": (1928, 7),
+    "fvsolve/core/solve": (3577, 12),
+    "fvsolve/core/step_limits": (1907, 7),
+    "fvsolve/core/steppers": (9335, 35),
+    "fvsolve/exchange/epanet": (4525, 12),
+    "fvsolve/exchange/fmi": (510, 5),
+    "tests/attitude": (480, 2),
+    "tests/basins": (13794, 37),
+    "tests/case": (5703, 16),
+    "tests/cli": (1640, 10),
+    "tests/draw": (287, 2),
+    "tests/epanet": (2266, 6),
+    "tests/exact": (721, 3),
+    "tests/features": (1395, 4),
+    "tests/fluid": (1348, 4),
+    "tests/fmi": (453, 2),
+    "tests/invariance": (3037, 13),
+    "tests/kernels": (1625, 8),
+    "tests/mesh": (647, 2),
+    "tests/model": (3126, 11),
+    "tests/output": (1110, 4),
+    "tests/parts": (25599, 52),
+    "tests/reference": (7469, 66),
+    "tests/report": (1158, 4),
+    "tests/repository": (7046, 32),
+    "tests/schemes": (669, 2),
+    "tests/solve": (3748, 14),
+    "tests/step_limits": (1314, 4),
+    "tests/steppers": (3387, 17),
+    "tests/studies": (11229, 27),
+    "tests/units": (453, 1),
+    "tests/validation": (376, 1),
 }
 # functions that exceed a limit: "path: function" -> (arguments, lines). Commands and studies are excepted by rule.
-LONG: dict[str, tuple[int, int]] = {}
+LONG: dict[str, tuple[int, int]] = {
+    # one row a step: the order in which tables of a case are read; arrays of a run
+    "fvsolve/case/load.py: _read_all": (2, 87),
+    "fvsolve/core/solve/run_loop.py: __init__": (5, 80),
+    # one search with twelve numbers that change in each turn
+    "fvsolve/core/steppers/time_loop.py: locate": (7, 86),
+    # kernels whose rows are not to be passed once more
+    "fvsolve/features/basins/free_surface/surface_grid.py: put_fluxes_along": (8, 75),
+    "fvsolve/features/delay_lines/kernels/line_envelopes.py: update_stretch_extremes": (9, 75),
+}
 # folders whose functions may be longer: commands, with an argument for each option, and studies
 EXCEPTED = ("fvsolve/cli/", "fvsolve/studies/")
 
 
 def folders() -> list[str]:
     """Folders of the package and of the tests, and modules of the package beside its folders as "fvsolve"."""
-    inside = [f"{top}/{path.name}" for top in DIVIDED for path in sorted((TOP / top).iterdir())
-              if path.is_dir() and any(path.rglob("*.py"))]  # fmt: skip
+    inside = [
+        f"{top}/{path.name}"
+        for top in DIVIDED
+        for path in sorted((TOP / top).iterdir())
+        if path.is_dir() and any(path.rglob("*.py"))
+    ]
     return list(dict.fromkeys(["fvsolve", "tests", "benchmarks", *inside]))
 
 
@@ -110,11 +127,15 @@ def long_functions(source: str) -> dict[str, tuple[int, int]]:
     """Functions of a text of Python that exceed a limit : name -> (arguments, lines with docstring)."""
     found = {}
     nodes: list[ast.AST] = [ast.parse(source)]
-    for node in nodes:  # statements, which grow in the loop; expressions contain no function with a name
+    # statements, which grow in the loop; expressions contain no function with a name
+    for node in nodes:
         nodes += [one for part in BLOCKS for one in getattr(node, part, ())]
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             own = node.args
-            size = len(own.posonlyargs) + len(own.args) + len(own.kwonlyargs), node.end_lineno - node.lineno + 1
+            size = (
+                len(own.posonlyargs) + len(own.args) + len(own.kwonlyargs),
+                node.end_lineno - node.lineno + 1,
+            )
             if size[0] > MAX_ARGUMENTS or size[1] > MAX_LINES:
                 found[node.name] = size
     return found
@@ -123,9 +144,15 @@ def long_functions(source: str) -> dict[str, tuple[int, int]]:
 @pytest.mark.parametrize("folder", folders())
 def test_a_folder_is_within_its_limits(folder):
     assert folder in FOLDERS, f"{folder} has no limits; expected an entry in FOLDERS"
-    for size, limit, what in zip(size_of(files_of(folder)), FOLDERS[folder], ("lines", "files"), strict=True):
-        assert size <= limit, f"{folder} has {size} {what}, more than {limit}. Delete or unify code, or raise the limit"
-        assert size >= limit - max(1, SLACK * limit), f"{folder} has {size} {what}; lower the limit from {limit}"
+    for size, limit, what in zip(
+        size_of(files_of(folder)), FOLDERS[folder], ("lines", "files"), strict=True
+    ):
+        assert size <= limit, (
+            f"{folder} has {size} {what}, more than {limit}. Delete or unify code, or raise the limit"
+        )
+        assert size >= limit - max(1, SLACK * limit), (
+            f"{folder} has {size} {what}; lower the limit from {limit}"
+        )
 
 
 def test_limits_are_for_folders_that_exist():
@@ -137,9 +164,16 @@ def test_functions_are_short_and_have_few_arguments():
     for path in sorted((TOP / "fvsolve").rglob("*.py")):
         place = path.relative_to(TOP).as_posix()
         if not place.startswith(EXCEPTED):
-            found |= {f"{place}: {name}": size for name, size in long_functions(path.read_text("utf8")).items()}
-    new = {place: size for place, size in found.items() if place not in LONG or max(
-        own - limit for own, limit in zip(size, LONG[place], strict=True)) > 0}  # fmt: skip
+            found |= {
+                f"{place}: {name}": size
+                for name, size in long_functions(path.read_text("utf8")).items()
+            }
+    new = {
+        place: size
+        for place, size in found.items()
+        if place not in LONG
+        or max(own - limit for own, limit in zip(size, LONG[place], strict=True)) > 0
+    }
     assert not new, f"more than {MAX_ARGUMENTS} arguments or {MAX_LINES} lines: {new}"
     assert not (LONG.keys() - found.keys()), "these functions are short now; remove their entries"
 
@@ -149,8 +183,11 @@ def test_functions_are_short_and_have_few_arguments():
     [
         ("def f(a, b):\n    pass\n", {}),
         (f"def f({', '.join(f'a{i}' for i in range(13))}):\n    pass\n", {"f": (13, 2)}),
-        (f"class A:\n    def g(self, *, {', '.join(f'a{i}' for i in range(12))}):\n        pass\n", {"g": (13, 2)}),
-        ("def h():\n" + "    x = 1\n" * 60, {"h": (0, 61)}),
+        (
+            f"class A:\n    def g(self, *, {', '.join(f'a{i}' for i in range(12))}):\n        pass\n",
+            {"g": (13, 2)},
+        ),
+        ("def h():\n" + "    x = 1\n" * MAX_LINES, {"h": (0, MAX_LINES + 1)}),
     ],
 )
 def test_a_long_function_is_detected(source, found):

@@ -72,9 +72,17 @@ class A:
 h = lambda: 3
 '''
 LINES = [
-    "x = 1  # not on a line of its own", "class A:", "    def f(self):", "        def inner(): return 2",
-    "        return inner", "    async def g(self):", '        return """text', "# no comment", '"""', "h = lambda: 3",
-]  # fmt: skip
+    "x = 1  # not on a line of its own",
+    "class A:",
+    "    def f(self):",
+    "        def inner(): return 2",
+    "        return inner",
+    "    async def g(self):",
+    '        return """text',
+    "# no comment",
+    '"""',
+    "h = lambda: 3",
+]
 COUNTS = Density(functions=3, lines=len(LINES), characters=sum(map(len, LINES)), comments=2)
 
 
@@ -83,7 +91,10 @@ def test_functions_code_lines_and_comments_of_a_text_are_counted():
 
 
 def test_densities_are_those_of_all_files_below_the_folders(tmp_path):
-    root = write(tmp_path, {"a/one.py": SOURCE, "b/c/two.py": "# comment\ny = 2\n", "other/three.py": "z = 3\n"})
+    root = write(
+        tmp_path,
+        {"a/one.py": SOURCE, "b/c/two.py": "# comment\ny = 2\n", "other/three.py": "z = 3\n"},
+    )
     folders = root / "a", root / "b"
     assert structure.functions_per_1000_lines(*folders) == 1000 * 3 / 11
     assert structure.comments_per_100_lines(*folders) == 100 * 3 / 11
@@ -111,7 +122,9 @@ message = "pipes"
 
 
 def test_cells_are_words_of_features_in_hubs(tmp_path):
-    root = write(tmp_path, {"a.py": HUB, "b.py": "network_start = 0\nnetwork_inputs = pipes_of = 1\n"})
+    root = write(
+        tmp_path, {"a.py": HUB, "b.py": "network_start = 0\nnetwork_inputs = pipes_of = 1\n"}
+    )
     found = structure.hub_matrix(root, ["a.py", "b.py"])
     assert found == {
         ("a.py", "basins"): {"basins": 1},
@@ -124,7 +137,10 @@ def test_cells_are_words_of_features_in_hubs(tmp_path):
 def test_cells_of_the_code_alone_have_no_comments_and_docstrings(tmp_path):
     root = write(tmp_path, {"a.py": HUB})
     found = structure.hub_matrix(root, ["a.py"], code_alone=True)
-    assert found == {("a.py", "delay lines"): {"delays": 1, "past": 1}, ("a.py", "pipes"): {"pipes": 1}}
+    assert found == {
+        ("a.py", "delay lines"): {"delays": 1, "past": 1},
+        ("a.py", "pipes"): {"pipes": 1},
+    }
 
 
 def test_a_hub_that_moved_is_an_error(tmp_path):
@@ -147,7 +163,9 @@ def test_circles_are_strongly_connected_modules(arrows, found):
 
 def test_imports_in_functions_and_for_type_checks_are_counted(tmp_path, monkeypatch):
     lazy = "def f():\n    from circle_of_three import a\n"
-    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from circle_of_three.b import f\n"
+    typed = (
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from circle_of_three.b import f\n"
+    )
     files = {"__init__.py": "", "a.py": "import circle_of_three.c\n", "b.py": lazy, "c.py": typed}
     write(tmp_path / "circle_of_three", files)
     monkeypatch.syspath_prepend(tmp_path)
@@ -156,7 +174,9 @@ def test_imports_in_functions_and_for_type_checks_are_counted(tmp_path, monkeypa
 
 
 def test_a_limit_that_is_moved_away_from_its_goal_is_detected():
-    source = 'LIMITS = {"a": Limit(limit=9, goal=5, slack=0), "b": Limit(limit=1.5, goal=4, slack=0)}\n'
+    source = (
+        'LIMITS = {"a": Limit(limit=9, goal=5, slack=0), "b": Limit(limit=1.5, goal=4, slack=0)}\n'
+    )
     before = structure.limits_in(source)
     assert before == {"a": Limit(9, 5, 0), "b": Limit(1.5, 4, 0)}
     now = {"a": Limit(10, 5, 0), "b": Limit(1.2, 4, 0), "c": Limit(7, 0, 0)}
@@ -173,5 +193,9 @@ def test_a_limit_that_was_moved_away_from_its_goal_has_its_reason():
     if committed.returncode:
         pytest.skip("no commits here")
     decided = structure.decisions_in((TOP / "docs/decisions.md").read_text(encoding="utf8"))
-    for measure, limit in structure.moved_back(structure.limits_in(committed.stdout), LIMITS).items():
-        assert decided.get(measure) == limit, f"{measure}: expected a line in docs/decisions.md that ends at {limit:g}"
+    for measure, limit in structure.moved_back(
+        structure.limits_in(committed.stdout), LIMITS
+    ).items():
+        assert decided.get(measure) == limit, (
+            f"{measure}: expected a line in docs/decisions.md that ends at {limit:g}"
+        )

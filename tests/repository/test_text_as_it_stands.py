@@ -21,11 +21,15 @@ TITLE = r"a $\nothing_{$ b, $5 and $6 [bold] [/red] <image> & 100 % \o/"
 STEERS = "a\x1b[31mb\u202ec\x07"
 
 
-@pytest.mark.parametrize("title", [TITLE, "$x$", "$\\foo$", "a$b", STEERS, "ü 水 \U0001f30a", "[/]", "x" * 10**5])
+@pytest.mark.parametrize(
+    "title", [TITLE, "$x$", "$\\foo$", "a$b", STEERS, "ü 水 \U0001f30a", "[/]", "x" * 10**5]
+)
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_any_title_is_drawn_and_printed_as_it_stands(title, tmp_path, fvs, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "case.toml").write_text(fvsolve.load(still(title=title)).resolved(), encoding="utf-8")
+    (tmp_path / "case.toml").write_text(
+        fvsolve.load(still(title=title)).resolved(), encoding="utf-8"
+    )
     code, out, err = fvs("run", "case.toml")
     assert code == 0 and "could not be drawn" not in err  # a first run reports compilation
     assert title in out or title == STEERS
@@ -36,9 +40,15 @@ def test_any_title_is_drawn_and_printed_as_it_stands(title, tmp_path, fvs, monke
 
 def test_dollars_are_drawn_as_dollars():
     t = np.linspace(0.0, 1.0, 5)
-    made = [history_figure(t, t[:, None], [("a.level", "m")], title=title) for title in ("x", "$x$")]
+    made = [
+        history_figure(t, t[:, None], [("a.level", "m")], title=title) for title in ("x", "$x$")
+    ]
     sizes = [one.get_suptitle() and one._suptitle.get_window_extent().width for one in made]
-    dollar = history_figure(t, t[:, None], [("a.level", "m")], title="$")._suptitle.get_window_extent().width
+    dollar = (
+        history_figure(t, t[:, None], [("a.level", "m")], title="$")
+        ._suptitle.get_window_extent()
+        .width
+    )
     assert sizes[1] == pytest.approx(sizes[0] + 2.0 * dollar, rel=0.1)
 
 
@@ -49,7 +59,9 @@ def test_powers_of_ten_stay_powers():
     from fvsolve.studies.accuracy.fit import Fit
 
     none = Fit((1.0, 1.0), 1.0, 0.1, ("", "", ""), 1.0)
-    figure = order_figure([1.0, 10.0, 100.0], {"h": {"a": ([1.0, 0.1, 1e-7], none)}}, "cells", title="$a$")
+    figure = order_figure(
+        [1.0, 10.0, 100.0], {"h": {"a": ([1.0, 0.1, 1e-7], none)}}, "cells", title="$a$"
+    )
     figure.canvas.draw()
     texts = {one.get_text(): one for one in figure.findobj(Text)}
     powers = [one.get_parse_math() for text, one in texts.items() if "mathdefault" in text]
@@ -58,15 +70,32 @@ def test_powers_of_ten_stay_powers():
 
 def test_units_of_scalars_stand_in_the_files_as_they_are(tmp_path):
     unit = 'mg/l, "dry" <&> [x]'
-    pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [4, 4],
-            "velocity": {"u": 0, "v": 0}, "scalars": {"dye": 1.0}}  # fmt: skip
+    pool = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [1.0, 1.0],
+        "cells": [4, 4],
+        "velocity": {"u": 0, "v": 0},
+        "scalars": {"dye": 1.0},
+    }
     lines = {"across": {"basin": "pool", "from": [0.1, 0.1], "to": [0.9, 0.9], "points": 3}}
-    case = scene({"pool": pool}, {}, 1.0, {"courant": 0.5}, ["pool.dye@0.5,0.5"], 0.5, scalars={"dye": {"unit": unit}})
+    case = scene(
+        {"pool": pool},
+        {},
+        1.0,
+        {"courant": 0.5},
+        ["pool.dye@0.5,0.5"],
+        0.5,
+        scalars={"dye": {"unit": unit}},
+    )
     case["output"] |= {"fields": 1, "lines": lines}
     fvsolve.run(case, out=tmp_path / "run")
     for _, path in read_series(tmp_path / "run" / "fields.pvd"):
         assert unit in [one.text for one in ElementTree.parse(path).iter("InformationKey")]
-    for path in (tmp_path / "run" / "lines" / "across-000000.csv", tmp_path / "run" / "history.csv"):
+    for path in (
+        tmp_path / "run" / "lines" / "across-000000.csv",
+        tmp_path / "run" / "history.csv",
+    ):
         with open(path, encoding="utf-8", newline="") as file:
             header, row, *_ = csv.reader(file)
         assert header[-1].endswith(f" [{unit}]") and len(row) == len(header)
@@ -88,9 +117,16 @@ def test_the_summary_is_there_though_a_picture_fails(tmp_path, fvs, monkeypatch)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(fvsolve.load(still(title="A")).resolved())
     done = subprocess.run([sys.executable, "-c", LIMITED], capture_output=True, text=True)
-    assert done.returncode == 0 and re.fullmatch(r"\S+history.png could not be drawn: .*\n", done.stderr)
+    assert done.returncode == 0 and re.fullmatch(
+        r"\S+history.png could not be drawn: .*\n", done.stderr
+    )
     said = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert said["ok"] and said["files"] == ["case.toml", "history.csv", "restart.npz", "summary.json"]
+    assert said["ok"] and said["files"] == [
+        "case.toml",
+        "history.csv",
+        "restart.npz",
+        "summary.json",
+    ]
     assert fvs("run", "case.toml", "--out", "out", "--resume")[0] == 0  # draws missing pictures
     assert imread(tmp_path / "out" / "history.png").size > 0
 

@@ -36,10 +36,16 @@ TYPES = {"nodes": "basin", "links": "pipe"}  # of the parts that blocks continue
 
 
 def blocks() -> list:
-    found = [(path, k, text) for path in sorted(DOCS.rglob("*.md"))
-             for k, (_, text) in enumerate(BLOCK.findall(path.read_text(encoding="utf-8")))]  # fmt: skip
-    return [pytest.param(text, id=f"{path.relative_to(DOCS).with_suffix('').as_posix()}-{k}")
-            for path, k, text in found if (path.stem, k) not in OTHER]  # fmt: skip
+    found = [
+        (path, k, text)
+        for path in sorted(DOCS.rglob("*.md"))
+        for k, (_, text) in enumerate(BLOCK.findall(path.read_text(encoding="utf-8")))
+    ]
+    return [
+        pytest.param(text, id=f"{path.relative_to(DOCS).with_suffix('').as_posix()}-{k}")
+        for path, k, text in found
+        if (path.stem, k) not in OTHER
+    ]
 
 
 def tables(text: str) -> list[dict]:
@@ -60,7 +66,11 @@ def completed(table: dict) -> dict:
             part |= {"physics": "transport"}
         elif "start" not in rest:
             part |= {"level": 1.0}
-        part = {key: value for key, value in part.items() if not ("mesh" in rest and key in ("size", "cells"))}
+        part = {
+            key: value
+            for key, value in part.items()
+            if not ("mesh" in rest and key in ("size", "cells"))
+        }
         case["nodes"] = {"part": part | rest}
     for group, usual in TYPES.items():
         for part in case.get(group, {}).values():
@@ -80,7 +90,9 @@ def test_a_block_has_no_faults_of_its_own(text):
         except CaseError as error:
             faults = [str(fault) for fault in error.faults]
             assert [
-                fault for fault in faults if not REST_IS_MISSING.search(fault) and not GIVEN_BY_PIPES.search(fault)
+                fault
+                for fault in faults
+                if not REST_IS_MISSING.search(fault) and not GIVEN_BY_PIPES.search(fault)
             ] == []
 
 
@@ -94,7 +106,9 @@ def test_faults_of_blocks_are_seen():
 
 LEVEL = tomllib.loads((CASES / "tank-level-pi.toml").read_text(encoding="utf-8"))
 COMMON = re.findall(
-    r"^\| ([a-z -]+) \| (.*) \|$", page("controls").split("## Common blocks")[1].split("## Names")[0], re.MULTILINE
+    r"^\| ([a-z -]+) \| (.*) \|$",
+    page("controls").split("## Common blocks")[1].split("## Names")[0],
+    re.MULTILINE,
 )[2:]
 
 
@@ -124,7 +138,10 @@ def test_a_common_block_of_controls_makes_a_model(row):
         usual = {"type": "transfer-function", "input": "tower.level", "numerator": [1]}
     controls = {"level": usual | table} | (controllers if "controllers" in row[1] else {})
     model = fvsolve.build(fvsolve.load(LEVEL | {"controls": controls, "expect": {}, "output": {}}))
-    assert "controls.level.output" in str(model.checks) or model.case.controls.keys() == controls.keys()
+    assert (
+        "controls.level.output" in str(model.checks)
+        or model.case.controls.keys() == controls.keys()
+    )
 
 
 def test_a_formula_of_a_control_does_not_compare_for_equality():

@@ -32,7 +32,10 @@ OTHERS = {"repository", "invariance", "reference"}  # tests of several packages 
 def test_every_folder_of_tests_is_a_package_or_an_exception():
     tests = folders.CASES.parent / "tests"
     stand = {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")}
-    stages = [PACKAGE, *(PACKAGE / name for name in ("core", "exchange", "features", "report", "studies"))]
+    stages = [
+        PACKAGE,
+        *(PACKAGE / name for name in ("core", "exchange", "features", "report", "studies")),
+    ]
     assert stand - OTHERS <= {path.stem for stage in stages for path in stage.iterdir()}
 
 
@@ -47,7 +50,10 @@ def test_a_name_that_was_not_run_is_missing():
 
 def test_a_listed_test_that_is_not_there_is_named():
     tally = Tally()
-    tally.add({kind: sorted(names) for kind, names in expected().items()} | {"unknown": ["tests/a.py::test_gone"]})
+    tally.add(
+        {kind: sorted(names) for kind, names in expected().items()}
+        | {"unknown": ["tests/a.py::test_gone"]}
+    )
     assert tally.missing() == ["tests/durations.json: tests/a.py::test_gone is not a test"]
 
 
@@ -66,7 +72,10 @@ def test_only_tests_that_cannot_be_missing_for_want_of_a_library_are_unknown():
     here = "tests/repository/test_tools_of_tests.py"
     listed = {f"{here}::test_a": 1.0, f"{here}::test_gone": 1.0, "tests/gone.py::test_b": 1.0}
     listed |= {"tests/solve/test_ranks.py::test_ranks": 1.0}
-    assert unknown_names(listed, [f"{here}::test_a"]) == {f"{here}::test_gone", "tests/gone.py::test_b"}
+    assert unknown_names(listed, [f"{here}::test_a"]) == {
+        f"{here}::test_gone",
+        "tests/gone.py::test_b",
+    }
 
 
 def test_a_run_counts_its_parts_scheme_method_and_law(request):
@@ -79,8 +88,11 @@ def test_a_run_counts_its_parts_scheme_method_and_law(request):
         links = {"p": pipe("a", "b", 100.0, 0.1, 1000.0, 4, initial_flow=0.0)}
         fvsolve.run(scene(nodes, links, 0.1, {"scheme": "fromm", "method": "heun", "courant": 0.4}))
         assert tally.plain() == {
-            "law": ["linear"], "method": ["heun"], "part": ["pipe", "reservoir"], "scheme": ["fromm"]
-        }  # fmt: skip
+            "law": ["linear"],
+            "method": ["heun"],
+            "part": ["pipe", "reservoir"],
+            "scheme": ["fromm"],
+        }
     finally:
         for kind, names in tally.names.items():
             before[kind] |= names
@@ -102,7 +114,8 @@ def test_there_are_enough_and_each_folder_of_the_package_has_a_fault():
     folders = {path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
     folders -= {Path("data")}  # printed tables, and one function that reads them
     folders -= {Path("features"), Path("exchange")}  # a docstring
-    of_parts = {path.parent.relative_to(PACKAGE) for path in PACKAGE.glob("*/**/part.py")}  # a folder for each part
+    # a folder for each part
+    of_parts = {path.parent.relative_to(PACKAGE) for path in PACKAGE.glob("*/**/part.py")}
     count = Counter(Path(fault.path).parent for fault in planted_faults.FAULTS)
     assert sum(count.values()) == 57
     assert folders - of_parts <= set(count)
@@ -114,7 +127,9 @@ def test_drawn_faults_follow_their_seed_and_still_compile():
     faults = drawn_faults.drawn(1, 40)
     assert faults == drawn_faults.drawn(1, 40) and faults[:4] != drawn_faults.drawn(2, 4)
     assert len({fault.path for fault in faults}) == 40
-    assert {drawn_faults.group_of(Path(fault.path)) for fault in faults[:4]} == set(drawn_faults.GROUPS)
+    assert {drawn_faults.group_of(Path(fault.path)) for fault in faults[:4]} == set(
+        drawn_faults.GROUPS
+    )
     for fault in faults:
         text = (PACKAGE / fault.path).read_text(encoding="utf-8")
         planted = fault.planted(text)
@@ -176,7 +191,9 @@ def test_constants_of_a_module_that_is_loaded_are_not_drawn(tmp_path, monkeypatc
     load_constants(tmp_path, 700_000)
     assert drawn() == before
     monkeypatch.setattr(providers, "is_local_module_file", constants_ast.is_local_module_file)
-    monkeypatch.setattr(providers, "_local_constants", providers._local_constants | constants_ast.Constants())
+    monkeypatch.setattr(
+        providers, "_local_constants", providers._local_constants | constants_ast.Constants()
+    )
     load_constants(tmp_path, 900_000)
     assert drawn() != before  # hypothesis draws constants by default, so this test can fail
 

@@ -23,11 +23,17 @@ def public_functions() -> Iterator[tuple[str, Any]]:
                 yield f"{name}.{key}", function
 
 
-@pytest.mark.parametrize("name, function", [pytest.param(*pair, id=pair[0]) for pair in public_functions()])
+@pytest.mark.parametrize(
+    "name, function", [pytest.param(*pair, id=pair[0]) for pair in public_functions()]
+)
 def test_a_public_function_is_fully_annotated(name: str, function: Any) -> None:
     signature = inspect.signature(function)
     types = {key: one.annotation for key, one in signature.parameters.items() if key != "self"}
-    lost = [key for key, type_ in (types | {"return": signature.return_annotation}).items() if type_ is inspect._empty]
+    lost = [
+        key
+        for key, type_ in (types | {"return": signature.return_annotation}).items()
+        if type_ is inspect._empty
+    ]
     assert not lost, f"{name}: no type of {lost}"
 
 
@@ -46,8 +52,12 @@ def test_a_typed_program_runs(tmp_path: Path) -> None:
     assert assert_type(result.ok, bool) and assert_type(result.reason, str) == "finished"
     start = assert_type(fvsolve.initial_state(model), fvsolve.State)
     state = assert_type(fvsolve.advance(model, start, 1.0, {}), fvsolve.State)
-    assert assert_type(state.t, float) == 1.0 and assert_type(model.rhs(state), np.ndarray).size == 2
-    values = assert_type(fvsolve.integrate(lambda t, y: -y, [1.0], [0.0, 1.0], rtol=1e-9), np.ndarray)
+    assert (
+        assert_type(state.t, float) == 1.0 and assert_type(model.rhs(state), np.ndarray).size == 2
+    )
+    values = assert_type(
+        fvsolve.integrate(lambda t, y: -y, [1.0], [0.0, 1.0], rtol=1e-9), np.ndarray
+    )
     assert values[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-7)
     with pytest.raises(fvsolve.CaseError):
         fvsolve.run("two-tanks", set={"numerics.ende": 2.0})

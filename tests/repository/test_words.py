@@ -25,7 +25,8 @@ IN_TEXTS = re.compile(
     r"\b(wanted|wants|is none|(?<!there )is no [a-z]+|are none|told|asked for|heeded|nobody|bears|meant)\b"
 )
 REMEDIES = "Add|Choose|Give|Install|Keep|Leave|Name|Reduce|Remove|Run|Set|Start|Try|Use"
-FULL_STOP = re.compile(rf"\. (Expected (?!orders)|({REMEDIES}) )")  # a message is "FAULT; expected ..., REMEDY"
+# a message is "FAULT; expected ..., REMEDY"
+FULL_STOP = re.compile(rf"\. (Expected (?!orders)|({REMEDIES}) )")
 PUBLIC = frozenset({"what", "found", "told", "rungs", "kept", "why"})  # fields of JSON files
 OPENINGS = re.compile(r"(What|Which|Whether|That|As|The same)\b")
 
@@ -43,8 +44,15 @@ def package_words() -> dict[str, list[tuple[str, str]]]:
     try:
         for path in PATHS:
             nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
-            for kind, listed in (("names", names(nodes)), ("docstrings", docstrings(nodes)), ("texts", texts(nodes))):
-                lists[kind] += [(f"{path.relative_to(PACKAGE).as_posix()}:{line}", text) for text, line in listed]
+            for kind, listed in (
+                ("names", names(nodes)),
+                ("docstrings", docstrings(nodes)),
+                ("texts", texts(nodes)),
+            ):
+                lists[kind] += [
+                    (f"{path.relative_to(PACKAGE).as_posix()}:{line}", text)
+                    for text, line in listed
+                ]
     finally:
         gc.enable()
     return lists
@@ -70,7 +78,9 @@ def words(name: str) -> set[str]:
 
 def docstrings(nodes: list[ast.AST]):
     for node in nodes:
-        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)) and (text := ast.get_docstring(node)):
+        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)) and (
+            text := ast.get_docstring(node)
+        ):
             yield text, getattr(node, "lineno", 1)
 
 
@@ -84,12 +94,21 @@ def texts(nodes: list[ast.AST]):
         and isinstance(node.body[0], ast.Expr)
     }
     for node in nodes:
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value and id(node) not in own:
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and " " in node.value
+            and id(node) not in own
+        ):
             yield node.value, node.lineno
 
 
 def test_no_identifier_has_a_forbidden_word():
-    wrong = [(place, name) for place, name in package_words()["names"] if words(name) & IN_NAMES and name not in PUBLIC]
+    wrong = [
+        (place, name)
+        for place, name in package_words()["names"]
+        if words(name) & IN_NAMES and name not in PUBLIC
+    ]
     assert wrong == [] and len(package_words()["names"]) > 10000
 
 
@@ -101,22 +120,33 @@ def test_no_module_has_a_forbidden_word_in_its_name():
 def test_no_test_nor_helper_of_tests_has_a_forbidden_word_in_its_name():
     """The names of test modules, of tests and of the functions and classes that they share."""
     paths = sorted(TESTS.rglob("*.py"))
-    defined = [(path, name) for path in paths for name in DEFINED.findall(path.read_text(encoding="utf-8"))]
-    listed = [(path.relative_to(TESTS).as_posix(), name) for path, name in defined + [(one, one.stem) for one in paths]]
+    defined = [
+        (path, name) for path in paths for name in DEFINED.findall(path.read_text(encoding="utf-8"))
+    ]
+    listed = [
+        (path.relative_to(TESTS).as_posix(), name)
+        for path, name in defined + [(one, one.stem) for one in paths]
+    ]
     assert len(listed) > 5000
     assert [(place, name) for place, name in listed if words(name) & IN_NAMES] == []
 
 
 def test_no_message_nor_help_has_a_forbidden_word():
-    assert [(place, text) for place, text in package_words()["texts"] if IN_TEXTS.search(text)] == []
+    assert [
+        (place, text) for place, text in package_words()["texts"] if IN_TEXTS.search(text)
+    ] == []
 
 
 def test_an_expectation_or_a_remedy_follows_its_fault_in_the_same_sentence():
-    assert [(place, text) for place, text in package_words()["texts"] if FULL_STOP.search(text)] == []
+    assert [
+        (place, text) for place, text in package_words()["texts"] if FULL_STOP.search(text)
+    ] == []
 
 
 def test_no_docstring_begins_with_a_relative_clause():
-    assert [(place, text) for place, text in package_words()["docstrings"] if OPENINGS.match(text)] == []
+    assert [
+        (place, text) for place, text in package_words()["docstrings"] if OPENINGS.match(text)
+    ] == []
 
 
 def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
@@ -128,7 +158,9 @@ def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
     often = Counter(name for names in named.values() for name in names)
     homes = defaultdict(list)
     for home, text in sources.items():
-        for one in ast.walk(ast.parse(text)) if any(often[name] > 1 for name in named[home]) else ():
+        for one in (
+            ast.walk(ast.parse(text)) if any(often[name] > 1 for name in named[home]) else ()
+        ):
             if isinstance(one, ast.ClassDef):
                 homes[one.name].append(home)
     return {name: repeated for name, repeated in homes.items() if len(set(repeated)) > 1}
@@ -136,9 +168,13 @@ def doubles(sources: dict[str, str]) -> dict[str, list[str]]:
 
 def test_a_class_name_is_used_once():
     top = Path(fvsolve.__file__).parent
-    repeated = doubles({str(path.relative_to(top)): path.read_text(encoding="utf-8") for path in top.rglob("*.py")})
+    repeated = doubles(
+        {str(path.relative_to(top)): path.read_text(encoding="utf-8") for path in top.rglob("*.py")}
+    )
     assert not repeated
 
 
 def test_a_double_is_seen():
-    assert doubles({"a": "class One: pass", "b": "class Two: pass\nclass One: pass"}) == {"One": ["a", "b"]}
+    assert doubles({"a": "class One: pass", "b": "class Two: pass\nclass One: pass"}) == {
+        "One": ["a", "b"]
+    }

@@ -6,7 +6,18 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from reference.orders import gaussian_averages, mean_error, observed_order
-from reference.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
+from reference.scenes import (
+    NO_FRICTION,
+    RHO,
+    WATER,
+    chamber,
+    junction,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    valve,
+)
 from scipy.integrate import solve_ivp
 
 import fvsolve
@@ -37,7 +48,9 @@ def test_facts_of_a_scheme_are_those_of_its_weights(name):
     assert (one.order, tuple(one.reach), one.for_basin(True).name, one.cavities) == KNOWN[name]
     assert one.for_basin(False).name == ("upwind" if name == "upwind" else "muscl")
     assert one.smooth is (SCHEMES[one.twin] if one.limited else one)
-    assert family(name) == (rec.UPWIND if name == "upwind" else rec.LINEAR if name in LINEAR else FAMILIES[name])
+    assert family(name) == (
+        rec.UPWIND if name == "upwind" else rec.LINEAR if name in LINEAR else FAMILIES[name]
+    )
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -45,7 +58,10 @@ def test_weights_are_exact_for_their_degree_and_no_more(name):
     """Averages of (x - 0.3)^d over the cells [k, k + 1], k = -2 to 2, give the value at the face x = 1."""
     one = LINEAR[name]
     for degree in range(one.degree + 2):
-        averages = [((k + 0.7) ** (degree + 1) - (k - 0.3) ** (degree + 1)) / (degree + 1) for k in range(-2, 3)]
+        averages = [
+            ((k + 0.7) ** (degree + 1) - (k - 0.3) ** (degree + 1)) / (degree + 1)
+            for k in range(-2, 3)
+        ]
         apart = abs(float(np.dot([float(w) for w in one.weights], averages)) - 0.7**degree)
         assert apart < 1e-12 if degree <= one.degree else apart > 1e-3
 
@@ -53,7 +69,12 @@ def test_weights_are_exact_for_their_degree_and_no_more(name):
 def test_a_scheme_is_a_single_entry():
     """The weights of a new scheme, kappa = 1/2 of van Leer's family, give all its properties."""
     one = Scheme("quick-like", weights=tuple(Fraction(w, 8) for w in (0, -1, 6, 3, 0)))
-    assert (one.order, tuple(one.reach), one.limited, one.plane) == (2, (2, 1, 1, 2), False, "muscl")
+    assert (one.order, tuple(one.reach), one.limited, one.plane) == (
+        2,
+        (2, 1, 1, 2),
+        False,
+        "muscl",
+    )
 
 
 def test_shorter_schemes_have_space():
@@ -65,7 +86,10 @@ def test_shorter_schemes_have_space():
 
 def test_codes_of_limiters_are_those_of_their_functions():
     assert [CODES[name] for name in ("minmod", "van-leer", "monotonized-central")] == [
-        rec.MINMOD, rec.VAN_LEER, rec.MONOTONIZED_CENTRAL]  # fmt: skip
+        rec.MINMOD,
+        rec.VAN_LEER,
+        rec.MONOTONIZED_CENTRAL,
+    ]
     assert limited(CODES["minmod"], 1.0, 3.0) == 1.0
     assert limited(CODES["van-leer"], 1.0, 3.0) == 1.5
     assert limited(CODES["monotonized-central"], 1.0, 3.0) == 2.0
@@ -144,7 +168,8 @@ METHODS = {
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_shows_its_order_on_a_pipe_with_a_demand_that_moves(method):
     """The reference is SciPy's DOP853 on the same cells, so that only time is discretised."""
-    scheme = "upwind" if method == "euler" else "upwind5"  # Euler is unstable with schemes above first order
+    # Euler is unstable with schemes above first order
+    scheme = "upwind" if method == "euler" else "upwind5"
     cells, end = 40, 0.08
     demand = ramp(0.0, 0.2, 0.0, 0.01, 4.0)
     errors, steps = [], (5e-4, 2.5e-4)
@@ -173,7 +198,10 @@ def with_friction(cells: int, scheme: str, through: float, reversing: bool) -> n
 def friction_order(scheme: str, cells: int, through: float, reversing: bool) -> float:
     """Order from the differences of three nested grids, each averaged onto the coarser."""
     grids = [with_friction(cells * 2**k, scheme, through, reversing) for k in range(3)]
-    gaps = [np.mean(np.abs(c - f.reshape(-1, 2).mean(axis=1))) for c, f in zip(grids, grids[1:], strict=False)]
+    gaps = [
+        np.mean(np.abs(c - f.reshape(-1, 2).mean(axis=1)))
+        for c, f in zip(grids, grids[1:], strict=False)
+    ]
     return math.log2(gaps[0] / gaps[1])
 
 
@@ -205,7 +233,12 @@ def test_an_error_controlled_run_satisfies_its_tolerance_in_proportion():
 
 def pots(step_size: float, every: float, method: str, kink: float) -> fvsolve.Result:
     """Run of two chambers in a row, with an outlet of the second that starts to close linearly at `kink` [s]."""
-    nodes = {"pump": reservoir(8e6), "a": chamber(0.02, 5e6), "b": chamber(0.05, 3e6), "out": reservoir(5e5)}
+    nodes = {
+        "pump": reservoir(8e6),
+        "a": chamber(0.02, 5e6),
+        "b": chamber(0.05, 3e6),
+        "out": reservoir(5e5),
+    }
     links = {
         "in": valve("pump", "a", 2e-7),
         "mid": valve("a", "b", 4e-7),
@@ -228,7 +261,9 @@ def pots_exact(t: np.ndarray, kink: float) -> np.ndarray:
     for end in (kink, kink + 0.6, 1.0):
         inside = t[(t >= start) & (t < end)]
         stops = np.append(inside, end)
-        run = solve_ivp(rate, (start, end), y, "DOP853", rtol=1e-13, atol=1e-6, t_eval=stops, max_step=0.02)
+        run = solve_ivp(
+            rate, (start, end), y, "DOP853", rtol=1e-13, atol=1e-6, t_eval=stops, max_step=0.02
+        )
         found.append(run.y[1][: len(inside)])
         y, start = run.y[:, -1], end
     found.append(np.full(np.sum(t >= 1.0), y[1]))
@@ -244,8 +279,12 @@ def test_a_kink_that_no_step_falls_on_costs_no_order(method, order):
     assert observed_order(errors, steps) > order - 0.4
 
 
-@pytest.mark.parametrize("method, order", [("improved-euler", 2), ("rk4", 4), ("dormand-prince", 4)])
-def test_values_between_steps_are_as_good_as_the_steps_up_to_the_dense_output_s_order(method, order):
+@pytest.mark.parametrize(
+    "method, order", [("improved-euler", 2), ("rk4", 4), ("dormand-prince", 4)]
+)
+def test_values_between_steps_are_as_good_as_the_steps_up_to_the_dense_output_s_order(
+    method, order
+):
     errors, kink, steps = [], 0.2, (0.08, 0.04)
     for size in steps:
         result = pots(size, 0.0137, method, kink)

@@ -12,7 +12,9 @@ def drained(every):
     shut = {"start": 1.013, "duration": 0.05, "value": [1.0, 0.0]}
     nodes = {"tower": tank(2.0, 4.0), "town": reservoir(1e5)}
     links = {"outlet": valve("tower", "town", 2e-3, opening=shut)}
-    return fvsolve.run(scene(nodes, links, 5.0, {"method": "rk4", "step": 0.01}, ["outlet.flow"], every=every))
+    return fvsolve.run(
+        scene(nodes, links, 5.0, {"method": "rk4", "step": 0.01}, ["outlet.flow"], every=every)
+    )
 
 
 def test_runs_with_other_rows_differ_by_rounding_at_common_times():
@@ -27,15 +29,24 @@ def test_runs_with_other_rows_differ_by_rounding_at_common_times():
 
 
 def test_runs_without_common_times_are_interpolated_with_a_note():
-    found = differences(drained(0.0101), drained(0.07 / 1.000001))  # common are the first and the last time
-    assert found["probes"]["outlet.flow"]["rows"] > 100 and abs(found["probes"]["outlet.flow"]["greatest"]) > 1e-4
+    # common are the first and the last time
+    found = differences(drained(0.0101), drained(0.07 / 1.000001))
+    assert (
+        found["probes"]["outlet.flow"]["rows"] > 100
+        and abs(found["probes"]["outlet.flow"]["greatest"]) > 1e-4
+    )
     assert "interpolated between rows up to 0.07 s apart" in found["note"]
 
 
 def test_both_rows_of_a_jump_belong_to_both_rows_of_the_other_run():
     t, theirs = np.array([0.0, 1.0, 1.0, 2.0, 3.0]), np.array([0.0, 0.5, 1.0, 1.0, 3.0])
     assert [rows.tolist() for rows in common_rows(t, theirs)] == [[0, 1, 2, 4], [0, 2, 3, 4]]
-    assert [rows.tolist() for rows in common_rows(t, theirs + 1e-11)] == [[0, 1, 2, 4], [0, 2, 3, 4]]
+    assert [rows.tolist() for rows in common_rows(t, theirs + 1e-11)] == [
+        [0, 1, 2, 4],
+        [0, 2, 3, 4],
+    ]
     single = np.array([0.0, 1.0, 3.0])
     assert [rows.tolist() for rows in common_rows(t, single)] == [[0, 2, 4], [0, 1, 2]]
-    assert common_rows(t, np.array([0.25]))[0].size == 0 and common_rows(t[:1], t)[0].tolist() == [0]
+    assert common_rows(t, np.array([0.25]))[0].size == 0 and common_rows(t[:1], t)[0].tolist() == [
+        0
+    ]

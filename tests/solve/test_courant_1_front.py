@@ -19,15 +19,38 @@ FRICTION = {
 def main(friction, cells, numerics=None):
     """Case of a main whose demand of 0.1 m3/s at its end stops at 1 s; the front returns from the lake."""
     return {
-        "schema": 1, "ambient_pressure": 5e7,
-        "fluid": {"name": "user", "density": RHO, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 0.0},
-        "nodes": {"lake": {"type": "reservoir", "head": 100.0},
-                  "gate": {"type": "junction", "demand": {"start": 1.0, "duration": 0.0, "value": [0.1, 0.0]}}},
-        "links": {"main": {"type": "pipe", "from": "lake", "to": "gate", "length": LENGTH, "diameter": DIAMETER,
-                           "wave_speed": SPEED, "cells": cells, "friction": FRICTION[friction]}},
-        "numerics": {"end": 30.0, "scheme": "upwind", "method": "euler", "courant": 1.0} | (numerics or {}),
+        "schema": 1,
+        "ambient_pressure": 5e7,
+        "fluid": {
+            "name": "user",
+            "density": RHO,
+            "bulk_modulus": 2.2e9,
+            "viscosity": 1e-3,
+            "vapor_pressure": 0.0,
+        },
+        "nodes": {
+            "lake": {"type": "reservoir", "head": 100.0},
+            "gate": {
+                "type": "junction",
+                "demand": {"start": 1.0, "duration": 0.0, "value": [0.1, 0.0]},
+            },
+        },
+        "links": {
+            "main": {
+                "type": "pipe",
+                "from": "lake",
+                "to": "gate",
+                "length": LENGTH,
+                "diameter": DIAMETER,
+                "wave_speed": SPEED,
+                "cells": cells,
+                "friction": FRICTION[friction],
+            }
+        },
+        "numerics": {"end": 30.0, "scheme": "upwind", "method": "euler", "courant": 1.0}
+        | (numerics or {}),
         "output": {"fields": 0, "every": 0.1, "probes": ["main.flow@0"]},
-    }  # fmt: skip
+    }
 
 
 def head_loss(friction, flow):
@@ -73,7 +96,10 @@ def least_flow(friction, reaches=800):
 def test_the_first_cell_of_a_front_is_damped(friction):
     """The front decays on its way; with the friction of the old waves of a cell its first cell kept -0.1 m3/s."""
     exact = least_flow(friction)
-    errors = [abs(np.min(fvsolve.run(main(friction, cells))["main.flow@0"]) - exact) for cells in (50, 200)]
+    errors = [
+        abs(np.min(fvsolve.run(main(friction, cells))["main.flow@0"]) - exact)
+        for cells in (50, 200)
+    ]
     assert errors[0] < 0.02 * abs(exact) and errors[1] < max(0.4 * errors[0], 1e-3 * abs(exact))
     if friction == "steady":
         assert exact == pytest.approx(-0.0657, abs=2e-4)

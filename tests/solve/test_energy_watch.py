@@ -5,7 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference.scenes import NO_FRICTION, area, chamber, junction, lake, pipe, reservoir, scene, tank, valve
+from reference.scenes import (
+    NO_FRICTION,
+    area,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 
 import fvsolve
 from fvsolve.core.kernels.energy_supply import ERROR, RELEASED, STATES
@@ -29,10 +40,17 @@ def energy_notices(result) -> list:
 
 def ringing(**numerics) -> dict:
     """Frictionless pipe whose outflow stops at once at 0.1 s; its wave has the kinetic energy of the flow."""
-    nodes = {"lake": lake(100.0), "end": junction({"time": [0.0, 0.1], "value": [FLOW, 0.0], "kind": "step"})}
+    nodes = {
+        "lake": lake(100.0),
+        "end": junction({"time": [0.0, 0.1], "value": [FLOW, 0.0], "kind": "step"}),
+    }
     links = {"main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, 50, friction=NO_FRICTION)}
     return scene(
-        nodes, links, 4.0, {"scheme": "upwind", "method": "euler", "courant": 1.0, **numerics}, ["end.pressure"]
+        nodes,
+        links,
+        4.0,
+        {"scheme": "upwind", "method": "euler", "courant": 1.0, **numerics},
+        ["end.pressure"],
     )
 
 
@@ -52,11 +70,14 @@ def amplified(monkeypatch, factor: float, time: float) -> None:
 
 def test_energy_that_nothing_supplies_is_named_with_its_amount(monkeypatch):
     """The flow that returns is -FLOW, a deviation of -2 FLOW: 1.5 times it is -2 FLOW, with 3 times more energy."""
-    wave = 0.5 * 1000.0 * LENGTH * FLOW**2 / area(DIAMETER)  # before: steady flow; after: wave with the deviation
+    # before: steady flow; after: wave with the deviation
+    wave = 0.5 * 1000.0 * LENGTH * FLOW**2 / area(DIAMETER)
     amplified(monkeypatch, 1.5, RETURN)
     result = fvsolve.run(ringing())
     (notice,) = energy_notices(result)
-    assert not result.ok and not notice.ok and notice.place == "main" and result.reason == "finished"
+    assert (
+        not result.ok and not notice.ok and notice.place == "main" and result.reason == "finished"
+    )
     assert notice.limit < notice.value == pytest.approx(3.0 * wave, rel=0.05)
 
 
@@ -83,7 +104,8 @@ def test_energy_from_reservoirs_is_mass_times_pressure_over_density():
     watch = watched(scene(nodes, links, 3.0, {"method": "rk4", "step": 1e-3}, ["vessel.pressure"]))
     entered = volume * (pressure - 2e5) / stiffness
     assert watch.supplied.sum() == pytest.approx((pressure - 101325.0) * entered, rel=1e-3)
-    assert watch.record[ERROR] < 1e-9 * watch.supplied.sum()  # error bound: the pressure is constant
+    # error bound: the pressure is constant
+    assert watch.record[ERROR] < 1e-9 * watch.supplied.sum()
 
 
 def test_a_tank_that_drains_releases_its_stored_energy():
@@ -92,7 +114,9 @@ def test_a_tank_that_drains_releases_its_stored_energy():
     links = {"way": valve("high", "out", 0.01)}
     watch = watched(scene(nodes, links, 20.0, {"method": "rk4", "step": 0.05}, ["high.level"]))
     level = 3.0 + (watch.entered.sum() + watch.left.sum()) / 1000.0
-    assert watch.record[RELEASED] == pytest.approx(0.5 * 1000.0 * 9.80665 * (9.0 - level**2), rel=1e-6)
+    assert watch.record[RELEASED] == pytest.approx(
+        0.5 * 1000.0 * 9.80665 * (9.0 - level**2), rel=1e-6
+    )
     assert watch.supplied.sum() == pytest.approx(0.0, abs=1e-6) and level < 2.9
 
 
@@ -100,11 +124,26 @@ def test_a_tank_that_drains_releases_its_stored_energy():
 def test_levels_that_oscillate_are_no_gain_of_energy(method):
     """Two tanks joined by a rigid column without friction exchange their energy for many periods."""
     nodes = {"one": tank(1.0, 2.0), "two": tank(1.0, 1.0)}
-    links = {"way": {"type": "rigid-column", "from": "one", "to": "two", "length": 100.0, "diameter": 0.5,
-                     "friction": NO_FRICTION}}  # fmt: skip
+    links = {
+        "way": {
+            "type": "rigid-column",
+            "from": "one",
+            "to": "two",
+            "length": 100.0,
+            "diameter": 0.5,
+            "friction": NO_FRICTION,
+        }
+    }
     period = 2.0 * math.pi * math.sqrt(0.5 * 100.0 / (9.80665 * area(0.5)))
     step = period / (2e4 if method == "euler" else 400.0)
-    case = scene(nodes, links, 3.0 * period, {"method": method, "step": step, "initial": "rest"}, ["one.level"], period)
+    case = scene(
+        nodes,
+        links,
+        3.0 * period,
+        {"method": method, "step": step, "initial": "rest"},
+        ["one.level"],
+        period,
+    )
     result = fvsolve.run(case)
     assert result.ok and not energy_notices(result)
 
@@ -133,7 +172,9 @@ def test_two_threads_watch_the_same_states(method):
     assert alone.restart_data[same] == pytest.approx(team.restart_data[same], rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["check-valve-slam", "hydraulic-drive", "pump-trip", "anti-roll-free", "clutch"])
+@pytest.mark.parametrize(
+    "name", ["check-valve-slam", "hydraulic-drive", "pump-trip", "anti-roll-free", "clutch"]
+)
 def test_values_of_sources_are_those_of_the_energy_accounts(name):
     """The watch leaves out functions of powers that no source needs, and takes the energy per mass of a node."""
     model = fvsolve.build(fvsolve.load(CASES / f"{name}.toml"))

@@ -9,7 +9,19 @@ import pytest
 from reference import vessels
 from reference.cylinders import Jack
 from reference.resumed_runs import killed_and_resumed, long_run, same_files
-from reference.scenes import AMBIENT, GRAVITY, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 from reference.still_networks import ROUGH, moved, still_probes, town
 from scipy.integrate import solve_ivp
 
@@ -34,11 +46,19 @@ def settings_text(numerics: dict) -> str:
 def harbour(**numerics) -> dict:
     """Case of pipes, a tank, a chamber and a closing valve."""
     rough = {"friction": {"model": "quasi-steady", "roughness": 2.6e-4}}
-    nodes = {"lake": lake(50.0), "fork": junction(), "tower": tank(2.0, 45.0), "pot": chamber(0.01), "sea": lake(0.0)}
-    links = {"main": pipe("lake", "fork", 300.0, 0.2, 1000.0, 15, **rough),
-             "side": pipe("fork", "tower", 200.0, 0.2, 1000.0, 10, **rough),
-             "neck": pipe("fork", "pot", 100.0, 0.2, 1000.0, 5, **rough),
-             "tap": valve("pot", "sea", 2e-3, ramp(0.2, 0.5, 1.0, 0.3))}  # fmt: skip
+    nodes = {
+        "lake": lake(50.0),
+        "fork": junction(),
+        "tower": tank(2.0, 45.0),
+        "pot": chamber(0.01),
+        "sea": lake(0.0),
+    }
+    links = {
+        "main": pipe("lake", "fork", 300.0, 0.2, 1000.0, 15, **rough),
+        "side": pipe("fork", "tower", 200.0, 0.2, 1000.0, 10, **rough),
+        "neck": pipe("fork", "pot", 100.0, 0.2, 1000.0, 5, **rough),
+        "tap": valve("pot", "sea", 2e-3, ramp(0.2, 0.5, 1.0, 0.3)),
+    }
     probes = ["fork.pressure", "pot.pressure", "tower.level", "tap.flow", "main.flow@0.5"]
     return scene(nodes, links, 2.0, {"scheme": "upwind", **numerics}, probes, 0.05)
 
@@ -46,20 +66,32 @@ def harbour(**numerics) -> dict:
 def jack(**numerics) -> dict:
     """Case of a cylinder whose load oscillates on the oil."""
     one = Jack(v=0.3, stiffness=4e5, free=0.1, damping=3e3, leakage=1e-12, friction=100.0)
-    return scene(one.nodes(), one.links(), 0.02, numerics, ["load.position", "cyl.A.pressure"], 1e-3, fluid=one.fluid())
+    return scene(
+        one.nodes(),
+        one.links(),
+        0.02,
+        numerics,
+        ["load.position", "cyl.A.pressure"],
+        1e-3,
+        fluid=one.fluid(),
+    )
 
 
 @pytest.fixture(scope="module")
 def explicit() -> dict:
-    return {harbour: fvsolve.run(harbour(method="rk4", courant=0.2)),
-            jack: fvsolve.run(jack(method="dormand-prince", rtol=1e-10))}  # fmt: skip
+    return {
+        harbour: fvsolve.run(harbour(method="rk4", courant=0.2)),
+        jack: fvsolve.run(jack(method="dormand-prince", rtol=1e-10)),
+    }
 
 
 def agrees(result, wanted, near: float) -> None:
     assert result.ok, result.reason
     assert result.t == pytest.approx(wanted.t, abs=1e-12)
     for name in map(str, wanted.probes):
-        assert result[name] == pytest.approx(wanted[name], abs=near * np.max(np.abs(wanted[name]))), name
+        assert result[name] == pytest.approx(
+            wanted[name], abs=near * np.max(np.abs(wanted[name]))
+        ), name
     assert result.ledger["mass"]["relative"] < 1e-13
 
 
@@ -72,11 +104,14 @@ def test_error_control_ends_where_the_explicit_run_does(build, numerics, explici
 
 @pytest.mark.parametrize("numerics", GIVEN, ids=settings_text)
 def test_given_steps_end_near_it_and_the_ledger_closes(numerics, explicit):
-    near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)  # order 1; ringing
+    # order 1; ringing
+    near = {"implicit-euler": 0.1, "trapezoid": 0.05}.get(numerics["method"], 0.015)
     agrees(fvsolve.run(harbour(**numerics)), explicit[harbour], near)
 
 
-@pytest.mark.parametrize("method, near", [("implicit-euler", 6e-2), ("gauss-4", 1e-6), ("trapezoid", 1e-3)])
+@pytest.mark.parametrize(
+    "method, near", [("implicit-euler", 6e-2), ("gauss-4", 1e-6), ("trapezoid", 1e-3)]
+)
 def test_given_steps_move_a_cylinder_and_keep_its_oil(method, near, explicit):
     agrees(fvsolve.run(jack(method=method, step=2e-5)), explicit[jack], near)
 
@@ -97,8 +132,10 @@ def test_a_looped_network_without_an_event_does_not_change_any_bit(numerics):
 def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
     """Implicit steps at Courant number 20 end at the steady flow after a slow closure."""
     nodes = {"lake": lake(50.0), "gate": junction(), "sea": lake(0.0)}
-    links = {"main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 100),
-             "tap": valve("gate", "sea", 5e-3, ramp(1.0, 20.0, 1.0, 0.5))}  # fmt: skip
+    links = {
+        "main": pipe("lake", "gate", 500.0, 0.3, 1000.0, 100),
+        "tap": valve("gate", "sea", 5e-3, ramp(1.0, 20.0, 1.0, 0.5)),
+    }
     numerics = {"scheme": "upwind", "method": method, "courant": 20.0}
     result = fvsolve.run(scene(nodes, links, 60.0, numerics, ["gate.head", "tap.flow"], 0.5))
     assert result.ok, result.reason
@@ -108,17 +145,29 @@ def test_twenty_travel_times_a_step_is_no_limit_for_implicit_methods(method):
 
 
 @pytest.mark.parametrize(
-    "numerics", [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}], ids=settings_text
+    "numerics",
+    [{"method": "radau-iia-5", "rtol": 1e-7}, {"method": "esdirk-4", "step": 0.01}],
+    ids=settings_text,
 )
 def test_dense_banded_and_sparse_algebra_give_the_same_run(numerics):
-    runs = [fvsolve.run(harbour(linear_algebra=kind, **numerics)) for kind in ("dense", "banded", "sparse")]
+    runs = [
+        fvsolve.run(harbour(linear_algebra=kind, **numerics))
+        for kind in ("dense", "banded", "sparse")
+    ]
     for other in runs[1:]:
-        assert other.ok and other.summary["steps"] == pytest.approx(runs[0].summary["steps"], rel=0.02)
+        assert other.ok and other.summary["steps"] == pytest.approx(
+            runs[0].summary["steps"], rel=0.02
+        )
         for name in map(str, other.probes):
-            assert other[name] == pytest.approx(runs[0][name], abs=1e-8 * np.max(np.abs(runs[0][name]))), name
+            assert other[name] == pytest.approx(
+                runs[0][name], abs=1e-8 * np.max(np.abs(runs[0][name]))
+            ), name
 
 
-EVENTS = [{"method": name, "rtol": 1e-8} for name in ("radau-iia-5", "rodas-5p", "auto", "esdirk-4", "tr-bdf2")]
+EVENTS = [
+    {"method": name, "rtol": 1e-8}
+    for name in ("radau-iia-5", "rodas-5p", "auto", "esdirk-4", "tr-bdf2")
+]
 EVENTS += [{"method": name, "step": 0.05} for name in ("gauss-4", "trapezoid")]
 
 
@@ -127,7 +176,9 @@ def test_a_tank_runs_dry_at_torricellis_time(numerics):
     slope = 0.01 * math.sqrt(2 * GRAVITY) / 2.0
     dry = 2 * (math.sqrt(3.5) - math.sqrt(2.0)) / slope
     nodes = {"basin": tank(2.0, 1.5, elevation=10.0), "air": reservoir(AMBIENT, elevation=8.0)}
-    case = scene(nodes, {"hole": valve("basin", "air", 0.01)}, dry + 20.0, numerics, ["basin.level"], 1.0)
+    case = scene(
+        nodes, {"hole": valve("basin", "air", 0.01)}, dry + 20.0, numerics, ["basin.level"], 1.0
+    )
     result = fvsolve.run(case)
     (mark,) = result.marks
     assert (mark.what, mark.time) == ("dry", pytest.approx(dry, abs=1e-6))
@@ -139,10 +190,15 @@ def test_a_tank_runs_dry_at_torricellis_time(numerics):
 @pytest.mark.parametrize("numerics", EVENTS, ids=settings_text)
 def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
-    case = scene(nodes, {"pipe": valve("spring", "basin", 0.05)}, 100.0, numerics, ["basin.level"], 1.0)
+    case = scene(
+        nodes, {"pipe": valve("spring", "basin", 0.05)}, 100.0, numerics, ["basin.level"], 1.0
+    )
     result = fvsolve.run(case)
     (note,) = (one for one in result.warnings if one.kind == "spilling")
-    assert (note.place, note.value) == ("nodes.basin", pytest.approx(50.0, abs=1e-9)) and not result.marks
+    assert (note.place, note.value) == (
+        "nodes.basin",
+        pytest.approx(50.0, abs=1e-9),
+    ) and not result.marks
     assert result.ledger["mass"]["spilled"] == pytest.approx(1000.0, rel=1e-12)
     assert result["basin.level"] == pytest.approx(np.minimum(1.0 + 0.01 * result.t, 1.5), abs=1e-9)
 
@@ -172,7 +228,8 @@ def busy(numerics: dict) -> dict:
     return case
 
 
-BALL = {  # rtol, method: errors at the end as measured, of the position [m] and of the velocity [m/s]
+# rtol, method: errors at the end as measured, of the position [m] and of the velocity [m/s]
+BALL = {
     (1e-4, "dormand-prince"): (5.2e-4, 1.7e-2),
     (1e-4, "auto"): (5.2e-4, 1.7e-2),
     (1e-4, "rodas-5p"): (4.4e-5, 1.6e-5),
@@ -194,13 +251,30 @@ def test_a_ball_on_a_damped_stop_bounces_as_by_solve_ivp(rtol, method):
 
     The force of the damper starts with a jump, which difference quotients must not treat as a slope.
     """
-    nodes = {"ground": {"type": "frame"}, "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1}}
+    nodes = {
+        "ground": {"type": "frame"},
+        "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1},
+    }
     nodes["ball"]["initial_velocity"] = -1.0
     links = {
-        "stop": {"type": "end-stop", "from": "ground", "to": "ball", "minimum": 0.0, "stiffness": 1e5, "damping": 60.0},
+        "stop": {
+            "type": "end-stop",
+            "from": "ground",
+            "to": "ball",
+            "minimum": 0.0,
+            "stiffness": 1e5,
+            "damping": 60.0,
+        },
         "weight": {"type": "force", "to": "ball", "force": -20.0},
     }
-    case = scene(nodes, links, 0.5, {"method": method, "rtol": rtol}, ["ball.position", "ball.velocity"], 0.01)
+    case = scene(
+        nodes,
+        links,
+        0.5,
+        {"method": method, "rtol": rtol},
+        ["ball.position", "ball.velocity"],
+        0.01,
+    )
     result = fvsolve.run(case)
     x, v, t = 0.1, -1.0, 0.0
     while True:  # flight to the stop, then contact until its force would pull
@@ -211,13 +285,19 @@ def test_a_ball_on_a_damped_stop_bounces_as_by_solve_ivp(rtol, method):
             break
         t, v = t + down, v - 10.0 * down
         contact = solve_ivp(
-            lambda _, s: [s[1], -10.0 - 5e4 * s[0] - 30.0 * s[1]], (0.0, 1.0), [0.0, v], "DOP853", events=released,
-            rtol=1e-12, atol=1e-14,
-        )  # fmt: skip
+            lambda _, s: [s[1], -10.0 - 5e4 * s[0] - 30.0 * s[1]],
+            (0.0, 1.0),
+            [0.0, v],
+            "DOP853",
+            events=released,
+            rtol=1e-12,
+            atol=1e-14,
+        )
         t, (x, v) = t + contact.t[-1], contact.y[:, -1]
     of_x, of_v = BALL[rtol, method]
     assert result["ball.position"][-1] == pytest.approx(x, abs=1.5 * of_x)
-    assert result["ball.velocity"][-1] == pytest.approx(v, abs=max(1.5 * of_v, rtol))  # rodas-5p is accurate by chance
+    # rodas-5p is accurate by chance
+    assert result["ball.velocity"][-1] == pytest.approx(v, abs=max(1.5 * of_v, rtol))
 
 
 def released(_, s):
@@ -232,7 +312,9 @@ released.terminal, released.direction = True, -1
 def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
     nodes = {"a": tank(1.0, 0.5), "b": tank(0.3, 0.1, height=0.6), "sink": reservoir(90000.0)}
     links = {"v": valve("a", "b", 0.01), "d": valve("a", "sink", 0.02)}
-    result = fvsolve.run(scene(nodes, links, 60.0, {"method": "esdirk-4", "rtol": rtol}, ["a.level"], 1.0))
+    result = fvsolve.run(
+        scene(nodes, links, 60.0, {"method": "esdirk-4", "rtol": rtol}, ["a.level"], 1.0)
+    )
     assert result.ok, result.reason
     assert result.ledger["mass"]["relative"] < 1e-13
 
@@ -244,8 +326,12 @@ def test_a_tank_that_runs_dry_through_another_does_not_stop_newton(rtol):
 )
 def test_a_scene_without_a_state_runs_as_any_other(numerics):
     nodes = {"high": reservoir(3e5), "low": reservoir(1e5)}
-    result = fvsolve.run(scene(nodes, {"hole": valve("high", "low", 1e-3)}, 1.0, numerics, ["hole.flow"], 0.1))
-    assert result.ok and result["hole.flow"] == pytest.approx(1e-3 * math.sqrt(2 * 2e5 / 1000.0), rel=1e-12)
+    result = fvsolve.run(
+        scene(nodes, {"hole": valve("high", "low", 1e-3)}, 1.0, numerics, ["hole.flow"], 0.1)
+    )
+    assert result.ok and result["hole.flow"] == pytest.approx(
+        1e-3 * math.sqrt(2 * 2e5 / 1000.0), rel=1e-12
+    )
 
 
 UNDAMPED = {"links.cyl.viscous_friction": 0.0, "links.damper.damping": 1.0, "output.fields": 0}
@@ -262,7 +348,9 @@ def set_free() -> tuple[float, float]:
     model = fvsolve.build(fvsolve.load("cylinder-servo", {**UNDAMPED, **numerics}))
     before, scale = fvsolve.advance(model, fvsolve.initial_state(model), SHUT - 1e-3), model.scale
     rates = lambda t, z: model.evaluate(t, z * scale, SHUT)[0] / scale  # noqa: E731
-    found = solve_ivp(rates, (SHUT - 1e-3, SHUT), before.y / scale, "Radau", rtol=1e-11, atol=1e-14, max_step=1e-5)
+    found = solve_ivp(
+        rates, (SHUT - 1e-3, SHUT), before.y / scale, "Radau", rtol=1e-11, atol=1e-14, max_step=1e-5
+    )
     return tuple(found.y[2:4, -1] * scale[2:4])
 
 
@@ -285,21 +373,46 @@ def test_no_step_passes_the_motion_that_a_shutting_valve_releases(method, rtol, 
 
 def basin_between_a_tank_and_a_pipe(rtol: float) -> dict:
     """Case of a pool with a hole in its plan, whose patches a tank and a short elastic pipe join."""
-    pool = {"type": "basin", "physics": "free-surface", "size": [4.0, 3.0], "cells": [8, 6], "elevation": 3.0,
-            "holes": [[1.5, 1.0, 2.0, 1.5]], "level": 1.0,
-            "start": {"level": "1 + 0.061*exp(-1.881*((x - 2.247)^2 + (y - 2.161)^2))"},
-            "patches": {side: {"side": side, "span": [0.5, 1.5]} for side in ("east", "west")}}  # fmt: skip
+    pool = {
+        "type": "basin",
+        "physics": "free-surface",
+        "size": [4.0, 3.0],
+        "cells": [8, 6],
+        "elevation": 3.0,
+        "holes": [[1.5, 1.0, 2.0, 1.5]],
+        "level": 1.0,
+        "start": {"level": "1 + 0.061*exp(-1.881*((x - 2.247)^2 + (y - 2.161)^2))"},
+        "patches": {side: {"side": side, "span": [0.5, 1.5]} for side in ("east", "west")},
+    }
     flow = {"time": [0, 1.0], "value": [0.0, 0.009713529435091073]}
     tower = {**tank(4.65654565274293, 1.0212928685651188), "elevation": 3.0}
-    feed = pipe("source", "pool.west", 10.0, 0.2, 60.0, 4, friction={"model": "steady", "factor": 0.03})
+    feed = pipe(
+        "source", "pool.west", 10.0, 0.2, 60.0, 4, friction={"model": "steady", "factor": 0.03}
+    )
     return {
-        "fluid": {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2e3,
-                  "law": "linear"},
-        "nodes": {"pool": pool, "tower": tower, "source": {"type": "inflow", "elevation": 3.0, "flow": flow}},
+        "fluid": {
+            "name": "user",
+            "density": 1000.0,
+            "bulk_modulus": 2.2e9,
+            "viscosity": 1e-3,
+            "vapor_pressure": 2e3,
+            "law": "linear",
+        },
+        "nodes": {
+            "pool": pool,
+            "tower": tower,
+            "source": {"type": "inflow", "elevation": 3.0, "flow": flow},
+        },
         "links": {"gate": valve("pool.east", "tower", 0.61 * 0.05, 1), "feed": feed},
-        "numerics": {"end": 1.0, "scheme": "upwind", "limiter": "minmod", "method": "radau-iia-5", "rtol": rtol},
+        "numerics": {
+            "end": 1.0,
+            "scheme": "upwind",
+            "limiter": "minmod",
+            "method": "radau-iia-5",
+            "rtol": rtol,
+        },
         "output": {"every": 0.05, "fields": 1, "probes": ["pool.volume", "tower.level"]},
-    }  # fmt: skip
+    }
 
 
 def test_a_pool_between_a_tank_and_a_pipe_needs_steps_of_its_tolerance():
@@ -314,7 +427,12 @@ def test_a_pool_between_a_tank_and_a_pipe_needs_steps_of_its_tolerance():
 def test_a_run_with_steps_that_no_longer_advance_ends_with_the_reason(monkeypatch):
     """With the whole run as the least advance of 20 attempts every run counts as stalled; given steps never do."""
     module = import_module("fvsolve.core.solve.solve")
-    for name, value in {"STALLED_ATTEMPTS": 20, "STALLED_ADVANCE": 1.0, "CHUNK_SECONDS": 0.0, "FIRST_CHUNK": 1}.items():
+    for name, value in {
+        "STALLED_ATTEMPTS": 20,
+        "STALLED_ADVANCE": 1.0,
+        "CHUNK_SECONDS": 0.0,
+        "FIRST_CHUNK": 1,
+    }.items():
         monkeypatch.setattr(module, name, value)
     stalled = fvsolve.run(harbour(method="rodas-5p", rtol=1e-7))
     assert not stalled.ok and "the step became too small at t = " in stalled.reason

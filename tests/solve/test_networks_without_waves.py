@@ -6,7 +6,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reference.networks_without_waves import DIAMETER, FACTOR, FALLING, LENGTH, SIZE, pipe, reducing, town
+from reference.networks_without_waves import (
+    DIAMETER,
+    FACTOR,
+    FALLING,
+    LENGTH,
+    SIZE,
+    pipe,
+    reducing,
+    town,
+)
 from reference.scenes import AMBIENT, RHO, WATER
 from reference.scenes import GRAVITY as G
 from scipy.integrate import solve_ivp
@@ -47,11 +56,20 @@ def test_a_reducing_valve_that_acts_at_once_holds_its_set_pressure():
 
         return signed_root(brentq(imbalance, 0.0, 100.0, xtol=1e-13) - 30.0 - level)
 
-    exact = solve_ivp(lambda t, y: [fill(y[0]) / 50.0], (0.0, 20000.0), [3.0], rtol=1e-10, atol=1e-10, t_eval=found.t)
+    exact = solve_ivp(
+        lambda t, y: [fill(y[0]) / 50.0],
+        (0.0, 20000.0),
+        [3.0],
+        rtol=1e-10,
+        atol=1e-10,
+        t_eval=found.t,
+    )
     assert found["tower.level"] == pytest.approx(exact.y[0], abs=1e-6)
     assert found["b.head"] == pytest.approx(np.full(found.t.size, 45.0), abs=1e-9)
     assert found["v.flow"] == pytest.approx(found["p3.flow"] + demand, abs=1e-9)
-    full = math.pi / 4.0 * DIAMETER**2 * np.sqrt(2.0 * G * (found["a.head"] - found["b.head"]) / 0.5)
+    full = (
+        math.pi / 4.0 * DIAMETER**2 * np.sqrt(2.0 * G * (found["a.head"] - found["b.head"]) / 0.5)
+    )
     assert found["v.opening"] == pytest.approx(found["v.flow"] / full, rel=1e-6)
     assert found.summary["steps"] < 100
 
@@ -64,7 +82,11 @@ def test_a_flow_control_valve_that_acts_at_once_holds_its_set_flow():
 
 
 def test_a_sustaining_valve_that_acts_at_once_holds_the_upstream_pressure():
-    valve = {"type": "pressure-sustaining", "set_pressure": AMBIENT + 70.0 * RHO * G, "time_constant": 0.0}
+    valve = {
+        "type": "pressure-sustaining",
+        "set_pressure": AMBIENT + 70.0 * RHO * G,
+        "time_constant": 0.0,
+    }
     found = run(town(valve, end=15000.0))
     assert found["a.head"] == pytest.approx(np.full(found.t.size, 70.0), abs=1e-9)
     assert found["v.flow"] == pytest.approx(np.full(found.t.size, signed_root(10.0)), abs=1e-9)
@@ -75,9 +97,16 @@ def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_valve():
     found = run(town(reducing(), source=FALLING))
     fast = run(town(reducing(time_constant=0.05), source=FALLING, method="radau-iia-5"))
     assert found["tower.level"] == pytest.approx(fast["tower.level"], abs=1e-4)
-    times = [{event["what"]: event["time"] for event in reversed(one.summary["events"]) if event["name"] == "v"}
-             for one in (found, fast)]  # fmt: skip
-    assert times[0]["is fully open"] == pytest.approx(times[1]["is fully open"], abs=6.0)  # the other valve moves
+    times = [
+        {
+            event["what"]: event["time"]
+            for event in reversed(one.summary["events"])
+            if event["name"] == "v"
+        }
+        for one in (found, fast)
+    ]
+    # the other valve moves
+    assert times[0]["is fully open"] == pytest.approx(times[1]["is fully open"], abs=6.0)
     for what in ("shuts against reversed flow", "opens again"):
         assert times[0][what] == pytest.approx(times[1][what], abs=0.1)
     last = [one.summary["events"][-1] for one in (found, fast)]
@@ -87,7 +116,9 @@ def test_a_valve_that_acts_at_once_opens_and_shuts_as_a_fast_valve():
 
 def test_methods_agree_for_a_valve_that_acts_at_once():
     methods = ("dormand-prince", "radau-iia-5", "rodas-5p", "esdirk-5")
-    levels = [run(town(reducing(), source=FALLING, method=method))["tower.level"] for method in methods]
+    levels = [
+        run(town(reducing(), source=FALLING, method=method))["tower.level"] for method in methods
+    ]
     for level in levels[1:]:
         assert level == pytest.approx(levels[0], abs=1e-6)
 
@@ -97,7 +128,9 @@ def test_a_valve_acts_at_once_only_between_pipes_without_waves():
     case["numerics"] = {"end": 1.0, "pipe_model": "finite-volume"}
     for name in ("p1", "p2", "p3"):
         case["links"][name]["wave_speed"] = 1000.0
-    with pytest.raises(fvsolve.CaseError, match=r"v\.time_constant: 0 s: .*without waves.*quasi-steady"):
+    with pytest.raises(
+        fvsolve.CaseError, match=r"v\.time_constant: 0 s: .*without waves.*quasi-steady"
+    ):
         fvsolve.build(fvsolve.load(case))
 
 
@@ -118,13 +151,19 @@ def test_a_valve_with_a_time_constant_is_stepped_by_an_implicit_method():
 def test_a_shut_check_valve_stays_shut_at_the_start():
     """If `cb` were open at the start, the flow through it from the high lake would shut `ca`, and nothing opens it."""
     case = town(reducing())
-    case["nodes"] |= {"high": {"type": "reservoir", "head": 200.0}, "c": {"type": "junction", "elevation": 0.0},
-                      "d": {"type": "junction", "elevation": 0.0}, "j": {"type": "junction", "demand": 0.005,
-                                                                         "elevation": 0.0},
-                      "lower": {"type": "reservoir", "head": 50.0}}  # fmt: skip
-    case["links"] |= {"pa": pipe("lower", "c"), "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
-                      "pb": pipe("high", "d"),
-                      "cb": {"type": "check-valve", "from": "j", "to": "d", **SIZE}}  # fmt: skip
+    case["nodes"] |= {
+        "high": {"type": "reservoir", "head": 200.0},
+        "c": {"type": "junction", "elevation": 0.0},
+        "d": {"type": "junction", "elevation": 0.0},
+        "j": {"type": "junction", "demand": 0.005, "elevation": 0.0},
+        "lower": {"type": "reservoir", "head": 50.0},
+    }
+    case["links"] |= {
+        "pa": pipe("lower", "c"),
+        "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
+        "pb": pipe("high", "d"),
+        "cb": {"type": "check-valve", "from": "j", "to": "d", **SIZE},
+    }
     case["links"]["joint"] = pipe("lake", "lower")  # between given heads
     case["numerics"]["end"] = 100.0
     case["output"]["probes"] = ["pa.flow", "pb.flow"]
@@ -138,9 +177,17 @@ def latches(count):
     blocks = {}
     for k in range(count):
         blocks[f"set-{k}"] = {"type": "function", "formula": "0"}
-        blocks[f"reset-{k}"] = {"type": "function", "formula": "(level > 9)", "inputs": {"level": "tower.level"}}
-        blocks[f"latch-{k}"] = {"type": "latch", "set": f"controls.set-{k}", "reset": f"controls.reset-{k}",
-                                "initial": 1}  # fmt: skip
+        blocks[f"reset-{k}"] = {
+            "type": "function",
+            "formula": "(level > 9)",
+            "inputs": {"level": "tower.level"},
+        }
+        blocks[f"latch-{k}"] = {
+            "type": "latch",
+            "set": f"controls.set-{k}",
+            "reset": f"controls.reset-{k}",
+            "initial": 1,
+        }
     return blocks
 
 
@@ -154,30 +201,51 @@ def test_constant_blocks_cost_no_steady_states_at_the_start(count, monkeypatch):
     case["links"]["v"]["time_constant"] = 5.0
     case["links"]["p3"]["to"] = "end"
     case["nodes"]["end"] = {"type": "junction", "elevation": 0.0}
-    case["links"]["gate"] = {"type": "valve", "from": "end", "to": "tower", **SIZE,
-                             "opening": {"control": "inverse"}}  # fmt: skip
+    case["links"]["gate"] = {
+        "type": "valve",
+        "from": "end",
+        "to": "tower",
+        **SIZE,
+        "opening": {"control": "inverse"},
+    }
     case["controls"] = latches(count) | {
-        "inverse": {"type": "function", "formula": "1 - 0.5*other", "inputs": {"other": "controls.latch-0"}}
+        "inverse": {
+            "type": "function",
+            "formula": "1 - 0.5*other",
+            "inputs": {"other": "controls.latch-0"},
+        }
     }
     for k in range(1, count):
         name = f"drain-{k}"
-        case["links"][name] = {"type": "valve", "from": "town", "to": "lake", "diameter": 0.001,
-                               "discharge_coefficient": 0.6, "opening": {"control": f"latch-{k}"}}  # fmt: skip
+        case["links"][name] = {
+            "type": "valve",
+            "from": "town",
+            "to": "lake",
+            "diameter": 0.001,
+            "discharge_coefficient": 0.6,
+            "opening": {"control": f"latch-{k}"},
+        }
     model = fvsolve.build(fvsolve.load(case))
     assert len(solved) <= 3
     start = blocks_of(model)["start"]
     names = list(fvsolve.load(case).controls)
-    known = {name: value for name, value in zip(model.tables and sorted(names), start, strict=False)}
+    known = {
+        name: value for name, value in zip(model.tables and sorted(names), start, strict=False)
+    }
     assert sorted(start) == sorted([0.0] * 2 * count + [1.0] * count + [0.5]) and known
 
 
 def test_the_sparse_elimination_solves_random_matrices():
     rng = np.random.default_rng(3)
     for n in (1, 2, 7, 60):
-        ends = [(int(rng.integers(-1, k)), k) for k in range(n)] + [tuple(rng.integers(0, n, 2)) for _ in range(n // 2)]
+        ends = [(int(rng.integers(-1, k)), k) for k in range(n)] + [
+            tuple(rng.integers(0, n, 2)) for _ in range(n // 2)
+        ]
         ends = [(i, j) for i, j in ends if i != j]
         rows = [{"from_node": i if i >= 0 else n, "to_node": j} for i, j in ends]
-        matrix = SparseMatrix(SimpleNamespace(valve_table=rows), list(range(n)), list(range(len(rows))), [], {})
+        matrix = SparseMatrix(
+            SimpleNamespace(valve_table=rows), list(range(n)), list(range(len(rows))), [], {}
+        )
         full, values = np.diag(rng.uniform(1.0, 2.0, n)), np.zeros(matrix.size)
         for i, j in ends:
             if i >= 0:
@@ -196,13 +264,19 @@ def test_the_sparse_elimination_solves_random_matrices():
 def test_a_demand_opens_the_check_valve_that_isolates_it():
     """A valve shuts at once what supplies the demand, and a check valve from a lower lake opens at the same moment."""
     case = town(reducing())
-    case["nodes"] |= {"j": {"type": "junction", "demand": 0.005, "elevation": 0.0},
-                      "c": {"type": "junction", "elevation": 0.0}, "d": {"type": "junction", "elevation": 0.0},
-                      "lower": {"type": "reservoir", "head": 50.0}}  # fmt: skip
+    case["nodes"] |= {
+        "j": {"type": "junction", "demand": 0.005, "elevation": 0.0},
+        "c": {"type": "junction", "elevation": 0.0},
+        "d": {"type": "junction", "elevation": 0.0},
+        "lower": {"type": "reservoir", "head": 50.0},
+    }
     opening = {"time": [0, 1000], "value": [1, 0], "kind": "step"}
-    case["links"] |= {"pa": pipe("lower", "c"), "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
-                      "pb": pipe("lake", "d"), "gate": {"type": "valve", "from": "d", "to": "j", **SIZE,
-                                                        "opening": opening}}  # fmt: skip
+    case["links"] |= {
+        "pa": pipe("lower", "c"),
+        "ca": {"type": "check-valve", "from": "c", "to": "j", **SIZE},
+        "pb": pipe("lake", "d"),
+        "gate": {"type": "valve", "from": "d", "to": "j", **SIZE, "opening": opening},
+    }
     case["numerics"]["end"] = 2000.0
     case["output"] = {"every": 100.0, "probes": ["pa.flow", "pb.flow"]}
     found = run(case)
@@ -215,13 +289,19 @@ def test_a_demand_opens_the_check_valve_that_isolates_it():
 def test_an_inflow_opens_the_check_valve_that_isolates_it():
     """A valve shuts at once what takes the inflow, and a check valve to a higher lake opens at the same moment."""
     case = town(reducing())
-    case["nodes"] |= {"j": {"type": "junction", "demand": -0.005, "elevation": 0.0},
-                      "c": {"type": "junction", "elevation": 0.0}, "d": {"type": "junction", "elevation": 0.0},
-                      "upper": {"type": "reservoir", "head": 150.0}}  # fmt: skip
+    case["nodes"] |= {
+        "j": {"type": "junction", "demand": -0.005, "elevation": 0.0},
+        "c": {"type": "junction", "elevation": 0.0},
+        "d": {"type": "junction", "elevation": 0.0},
+        "upper": {"type": "reservoir", "head": 150.0},
+    }
     opening = {"time": [0, 1000], "value": [1, 0], "kind": "step"}
-    case["links"] |= {"pa": pipe("c", "upper"), "ca": {"type": "check-valve", "from": "j", "to": "c", **SIZE},
-                      "pb": pipe("lake", "d"), "gate": {"type": "valve", "from": "d", "to": "j", **SIZE,
-                                                        "opening": opening}}  # fmt: skip
+    case["links"] |= {
+        "pa": pipe("c", "upper"),
+        "ca": {"type": "check-valve", "from": "j", "to": "c", **SIZE},
+        "pb": pipe("lake", "d"),
+        "gate": {"type": "valve", "from": "d", "to": "j", **SIZE, "opening": opening},
+    }
     case["numerics"]["end"] = 2000.0
     case["output"] = {"every": 100.0, "probes": ["pa.flow", "pb.flow"]}
     found = run(case)
@@ -257,8 +337,14 @@ def side_by_side(method, rtol, pattern, length=20.0):
     }
     links = {"p": joint, "in": pipe("well", "left")}
     numerics = {"end": 86400.0, "pipe_model": "quasi-steady", "method": method, "rtol": rtol}
-    return {"schema": 1, "fluid": WATER, "nodes": nodes, "links": links, "numerics": numerics,
-            "output": {"every": 1800.0, "probes": ["left.level", "right.level", "p.flow"]}}  # fmt: skip
+    return {
+        "schema": 1,
+        "fluid": WATER,
+        "nodes": nodes,
+        "links": links,
+        "numerics": numerics,
+        "output": {"every": 1800.0, "probes": ["left.level", "right.level", "p.flow"]},
+    }
 
 
 @pytest.mark.parametrize("rtol, within", [(1e-6, 1e-4), (1e-8, 2e-5)])
@@ -299,12 +385,27 @@ def test_an_event_is_located_in_few_attempts_where_another_jumps_beyond_it():
     """
     case = side_by_side("dormand-prince", 1e-7, [0.0])
     del case["links"]["p"], case["links"]["in"], case["nodes"]["well"]
-    case["nodes"] |= {"lake": {"type": "reservoir", "head": 30.0}, "a": {"type": "junction", "elevation": 0.0}}
+    case["nodes"] |= {
+        "lake": {"type": "reservoir", "head": 30.0},
+        "a": {"type": "junction", "elevation": 0.0},
+    }
     valve = {"type": "altitude-valve", "from": "a", "to": "right", "full_level": 5.5, **SIZE}
-    case["links"] |= {"fill": pipe("lake", "left") | {"diameter": 0.1}, "p": pipe("lake", "a"), "v": valve,
-                      "gate": {"type": "valve", "from": "lake", "to": "left", "diameter": 0.05,
-                               "loss_coefficient": 50.0, "opening": {"control": "stop"}}}  # fmt: skip
-    case["controls"] = {"stop": {"type": "relay", "input": "nodes.left.level", "on": 4.0, "off": 5.05, "initial": 1}}
+    case["links"] |= {
+        "fill": pipe("lake", "left") | {"diameter": 0.1},
+        "p": pipe("lake", "a"),
+        "v": valve,
+        "gate": {
+            "type": "valve",
+            "from": "lake",
+            "to": "left",
+            "diameter": 0.05,
+            "loss_coefficient": 50.0,
+            "opening": {"control": "stop"},
+        },
+    }
+    case["controls"] = {
+        "stop": {"type": "relay", "input": "nodes.left.level", "on": 4.0, "off": 5.05, "initial": 1}
+    }
     found = run(case)
     events = {event["name"]: event["time"] for event in found.summary["events"]}
     assert events["controls.stop"] < events["v"]
@@ -332,9 +433,11 @@ def test_given_steps_miss_no_time_after_a_kink_or_an_event(method, step):
 def filled_by_a_relay(method):
     """Case of a tank that a relay fills between two levels, with a demand on the way."""
     case = side_by_side(method, 1e-6, [0.0])
-    case["nodes"] = {"lake": {"type": "reservoir", "head": 30.0},
-                     "town": {"type": "junction", "elevation": 0.0, "demand": 0.004},
-                     "tower": {"type": "tank", "elevation": 15.0, "area": 150.0, "level": 2.0}}  # fmt: skip
+    case["nodes"] = {
+        "lake": {"type": "reservoir", "head": 30.0},
+        "town": {"type": "junction", "elevation": 0.0, "demand": 0.004},
+        "tower": {"type": "tank", "elevation": 15.0, "area": 150.0, "level": 2.0},
+    }
     gate = {"type": "valve", "from": "lake", "to": "a", **SIZE, "opening": {"control": "fill"}}
     case["nodes"]["a"] = {"type": "junction", "elevation": 0.0}
     case["links"] = {"gate": gate, "main": pipe("a", "town"), "p": pipe("town", "tower")}
@@ -347,7 +450,11 @@ def filled_by_a_relay(method):
 def test_a_step_that_ends_at_an_event_is_not_searched_for_earlier_ones():
     """The level is nearly straight between two switches, so it cannot have reached the threshold earlier."""
     found = run(filled_by_a_relay("rodas-5p"))
-    events, tries, stages = len(found.summary["events"]), found.summary["steps"] + found.summary["rejections"], 9
+    events, tries, stages = (
+        len(found.summary["events"]),
+        found.summary["steps"] + found.summary["rejections"],
+        9,
+    )
     assert events == 8 and found["tower.level"].min() == pytest.approx(1.5, abs=0.05)
     assert found.summary["rhs"] < stages * (tries + 4 * events)
 
@@ -355,8 +462,13 @@ def test_a_step_that_ends_at_an_event_is_not_searched_for_earlier_ones():
 def test_a_step_that_an_event_shortens_does_not_shorten_the_next():
     """An event 1e-8 s after another one left a step of 2e-9 s, from which steps grew again by a factor of 8."""
     control, state = np.zeros(1, loop_records.CONTROL)[0], np.zeros(1, loop_records.STATE)[0]
-    control["kind"], control["mode"], control["order"] = loop_records.LINEARLY_IMPLICIT, loop_records.TOLERANCE, 5.0
-    for error, expected in ((1e-20, 600.0), (0.99, 0.9 * 1e-8)):  # unless its own error is near the tolerance
+    control["kind"], control["mode"], control["order"] = (
+        loop_records.LINEARLY_IMPLICIT,
+        loop_records.TOLERANCE,
+        5.0,
+    )
+    # unless its own error is near the tolerance
+    for error, expected in ((1e-20, 600.0), (0.99, 0.9 * 1e-8)):
         state["step"], state["last"], state["error_old"], state["steps"] = 600.0, 500.0, 1e-3, 7.0
         getattr(store_next, "py_func", store_next)(control, state, 1e-8, error, True, False, 0.0)
         assert state["step"] == pytest.approx(expected, rel=0.01)
@@ -367,8 +479,18 @@ def test_the_jacobian_of_a_run_has_the_derivatives_of_the_converged_network():
     of 1e-7."""
     case = side_by_side("rodas-5p", 1e-6, [0.01])
     case["nodes"]["town"] = {"type": "junction", "elevation": 0.0, "demand": 0.02}
-    case["nodes"]["tower"] = {"type": "tank", "elevation": 0.0, "level": 8.0, "area": 30.0, "height": 40.0}
-    case["links"] |= {"a": pipe("left", "town"), "b": pipe("right", "town"), "c": pipe("town", "tower")}
+    case["nodes"]["tower"] = {
+        "type": "tank",
+        "elevation": 0.0,
+        "level": 8.0,
+        "area": 30.0,
+        "height": 40.0,
+    }
+    case["links"] |= {
+        "a": pipe("left", "town"),
+        "b": pipe("right", "town"),
+        "c": pipe("town", "tower"),
+    }
     case["numerics"]["end"] = 3000.0
     model = fvsolve.build(fvsolve.load(case))
     sink, state = MemorySink(model), initial_state(model)
@@ -377,6 +499,11 @@ def test_the_jacobian_of_a_run_has_the_derivatives_of_the_converged_network():
     assert course.go().reason == "finished"
     stepper = course.loop.stepper
     first = stepper.y[int(stepper.progress["old"][0])]
-    matrix = csc_array((stepper.jacobian, *(getattr(model.structure.pattern, key) for key in ("indices", "indptr"))))
+    matrix = csc_array(
+        (
+            stepper.jacobian,
+            *(getattr(model.structure.pattern, key) for key in ("indices", "indptr")),
+        )
+    )
     exact = model.jacobian(float(stepper.progress["t_old"][0]), first)
     assert matrix.toarray()[: model.y_size] == pytest.approx(exact, rel=1e-5, abs=1e-9)

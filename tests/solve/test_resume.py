@@ -59,7 +59,8 @@ def test_killed_at_random_moments_and_resumed_is_the_unbroken_run(tmp_path, nume
         running.kill()
         running.communicate()
         before, reached = reached, checkpoint(broken)
-        assert running.returncode != 0 and before <= wanted < reached < whole.t[-1]  # within the run
+        # within the run
+        assert running.returncode != 0 and before <= wanted < reached < whole.t[-1]
     said = started(script, file, broken).communicate()
     assert said == ("finished\n", "")
     same_files(tmp_path / "whole", broken)
@@ -117,10 +118,15 @@ def test_resume_needs_a_directory():
 def test_a_checkpoint_of_another_case_is_refused_with_its_keys_and_a_remedy(tmp_path):
     fvsolve.run(branched(), out=tmp_path / "run", pictures=False)
     cells = fvsolve.load(branched()).links["main"].cells
-    with pytest.raises(fvsolve.RunError, match=rf"another case: links.main.cells {cells} \(now 31\)\. .*--force"):
+    with pytest.raises(
+        fvsolve.RunError, match=rf"another case: links.main.cells {cells} \(now 31\)\. .*--force"
+    ):
         fvsolve.run(branched(), set={"links.main.cells": 31}, out=tmp_path / "run", resume=True)
     other = {"numerics.method": "euler", "numerics.scheme": "upwind"}
-    with pytest.raises(fvsolve.RunError, match=r'numerics.method ".*" \(now "euler"\), numerics.scheme.*courant, step'):
+    with pytest.raises(
+        fvsolve.RunError,
+        match=r'numerics.method ".*" \(now "euler"\), numerics.scheme.*courant, step',
+    ):
         fvsolve.run(branched(), set=other, out=tmp_path / "run", resume=True)
     (tmp_path / "run" / "case.toml").write_text("[damaged")
     with pytest.raises(fvsolve.RunError, match="another case. A continued run may change"):
@@ -137,7 +143,11 @@ def ends_at(end: float, **numerics) -> dict:
 @pytest.fixture
 def often(monkeypatch) -> None:
     """Runs of this process pause every 10 steps, and write a checkpoint at each pause."""
-    for name, value in (("FIRST_CHUNK", 10.0), ("CHUNK_SECONDS", 1e-9), ("CHECKPOINT_SECONDS", 0.0)):
+    for name, value in (
+        ("FIRST_CHUNK", 10.0),
+        ("CHUNK_SECONDS", 1e-9),
+        ("CHECKPOINT_SECONDS", 0.0),
+    ):
         monkeypatch.setattr(import_module("fvsolve.core.solve.solve"), name, value)
 
 
@@ -157,48 +167,84 @@ def test_a_run_continues_with_other_steps_and_a_notice(tmp_path, often, first, s
     with np.load(out / "restart.npz") as kept:
         t, y = float(kept["t"]), kept["y"]
     assert 0.3 < t <= 0.5
-    result = fvsolve.run(branched(), set=ends_at(1.0, **second), out=out, resume=True, pictures=False)
+    result = fvsolve.run(
+        branched(), set=ends_at(1.0, **second), out=out, resume=True, pictures=False
+    )
     keys = sorted({*first, *second} - {"method"})
-    change = {"t": t, "keys": {f"numerics.{key}": [first.get(key), second.get(key)] for key in keys}}
-    assert result.ok and begun.summary["continued"] == [] and result.summary["continued"] == [change]
+    change = {
+        "t": t,
+        "keys": {f"numerics.{key}": [first.get(key), second.get(key)] for key in keys},
+    }
+    assert (
+        result.ok and begun.summary["continued"] == [] and result.summary["continued"] == [change]
+    )
     assert fvsolve.open_run(out).summary["continued"] == [change]
     noted = [item["text"] for item in result.summary["warnings"] if item["kind"] == "continued"]
     assert (out / "case.toml").read_text().splitlines()[:1] == [f"# {text}" for text in noted]
     assert noted[0].startswith(f"from t = {t:.9g} s on: numerics.") and "before: " in noted[0]
     if "rtol" not in second:  # from there on twice as many steps in the same time
-        assert result.summary["steps"] == pytest.approx(begun.summary["steps"] * (2.0 * t + 4.0 * (1.0 - t)), rel=0.05)
+        assert result.summary["steps"] == pytest.approx(
+            begun.summary["steps"] * (2.0 * t + 4.0 * (1.0 - t)), rel=0.05
+        )
     model = fvsolve.build(fvsolve.load(branched(), ends_at(1.0, **second)))
     alone = fvsolve.advance(model, fvsolve.State(t, y, {}), 1.0)
     seen = dict(zip([probe.text for probe in model.probes], model.observe(alone), strict=True))
-    assert result["gate.pressure"][-1] == pytest.approx(seen["gate.pressure"], rel=1e-4 if "rtol" in second else 1e-9)
+    assert result["gate.pressure"][-1] == pytest.approx(
+        seen["gate.pressure"], rel=1e-4 if "rtol" in second else 1e-9
+    )
 
 
 def test_every_change_of_steps_is_stored(tmp_path, often):
     for end, courant in ((0.4, 0.8), (0.6, 0.4), (0.8, 0.4), (1.0, 0.6)):
-        result = fvsolve.run(branched(), set=ends_at(end, courant=courant), out=tmp_path, resume=True, pictures=False)
+        result = fvsolve.run(
+            branched(), set=ends_at(end, courant=courant), out=tmp_path, resume=True, pictures=False
+        )
     first, second = result.summary["continued"]
-    assert (first["keys"], second["keys"]) == ({"numerics.courant": [0.8, 0.4]}, {"numerics.courant": [0.4, 0.6]})
+    assert (first["keys"], second["keys"]) == (
+        {"numerics.courant": [0.8, 0.4]},
+        {"numerics.courant": [0.4, 0.6]},
+    )
     assert 0.2 < first["t"] <= 0.4 and 0.6 < second["t"] <= 0.8
     assert fvsolve.load(tmp_path / "case.toml").numerics.courant == 0.6
 
 
 def test_other_steps_are_refused_for_a_finished_run_and_with_histories(tmp_path, often):
     fvsolve.run(branched(), out=tmp_path / "run", pictures=False)
-    with pytest.raises(fvsolve.RunError, match=r"holds the finished run.*numerics.courant = 0.3 \(before: .*--force"):
+    with pytest.raises(
+        fvsolve.RunError,
+        match=r"holds the finished run.*numerics.courant = 0.3 \(before: .*--force",
+    ):
         fvsolve.run(branched(), set={"numerics.courant": 0.3}, out=tmp_path / "run", resume=True)
     lines = {"numerics.pipe_model": "delay-line", "numerics.scheme": "upwind"}
-    fvsolve.run(branched(), set=ends_at(0.5, step=0.01) | lines, out=tmp_path / "lines", pictures=False)
-    with pytest.raises(fvsolve.RunError, match="numerics.step cannot change in a continued run with delay lines"):
-        fvsolve.run(branched(), set=ends_at(1.0, step=0.005) | lines, out=tmp_path / "lines", resume=True)
+    fvsolve.run(
+        branched(), set=ends_at(0.5, step=0.01) | lines, out=tmp_path / "lines", pictures=False
+    )
+    with pytest.raises(
+        fvsolve.RunError, match="numerics.step cannot change in a continued run with delay lines"
+    ):
+        fvsolve.run(
+            branched(), set=ends_at(1.0, step=0.005) | lines, out=tmp_path / "lines", resume=True
+        )
 
 
 def test_the_command_continues_with_other_steps(fvs, tmp_path, often):
-    place = ("--out", tmp_path / "run", "--no-pictures", "--set", "links.main.cells=20", "--set", "output.every=0.05",
-             "--set", "expect={}")  # fmt: skip
+    place = (
+        "--out",
+        tmp_path / "run",
+        "--no-pictures",
+        "--set",
+        "links.main.cells=20",
+        "--set",
+        "output.every=0.05",
+        "--set",
+        "expect={}",
+    )
     assert fvs("run", "valve-closure", *place, "--set", "numerics.end=1")[0] == 0
     more = ("--resume", "--set", "numerics.end=2", "--set", "numerics.courant=0.4")
     code, out, _ = fvs("run", "valve-closure", *place, *more)
-    assert code == 0 and re.search(r"note: from t = 0\.\d+ s on: numerics.courant = 0.4 \(before: 0.9\)", out)
+    assert code == 0 and re.search(
+        r"note: from t = 0\.\d+ s on: numerics.courant = 0.4 \(before: 0.9\)", out
+    )
 
 
 def test_other_claims_and_titles_are_no_other_case(tmp_path):
@@ -238,7 +284,11 @@ def test_a_history_that_lost_rows_is_refused_with_a_remedy(tmp_path):
 
 def test_observations_of_a_basin_before_a_break_are_known_after_it(tmp_path):
     """A resumed run keeps the greatest rates and the shortest waves so far, from which notices are made at its end."""
-    case = alone(basin((40.0, 20.0), (16, 8), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}), 6.0, step=0.05)
+    case = alone(
+        basin((40.0, 20.0), (16, 8), 0.2, start={"level": "where(x < 20, 0.2, 0.1)"}),
+        6.0,
+        step=0.05,
+    )
     case["numerics"].pop("courant", None)
     case["output"] |= {"fields": 12}
     model = fvsolve.build(fvsolve.load(case))
@@ -250,10 +300,16 @@ def test_observations_of_a_basin_before_a_break_are_known_after_it(tmp_path):
 
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
     run.left = 5.0
-    assert run.go().reason.startswith("interrupted") and run.checks.rates and run.watches[0].greatest[0] >= 0.0
+    assert (
+        run.go().reason.startswith("interrupted")
+        and run.checks.rates
+        and run.watches[0].greatest[0] >= 0.0
+    )
     again = Run(model, run.state(), MemorySink(model), None)
     assert again.checks.rates == run.checks.rates
-    assert [one.greatest.tolist() for one in again.watches] == [one.greatest.tolist() for one in run.watches]
+    assert [one.greatest.tolist() for one in again.watches] == [
+        one.greatest.tolist() for one in run.watches
+    ]
 
 
 class Keeping(MemorySink):

@@ -16,15 +16,40 @@ from fvsolve.features.controls.kernels.tables import SLOT
 ADAPTIVE = {"numerics.rtol": 1e-6}
 CASES = {
     "tanks": ("two-tanks", {}, "hole.opening", (0.4, 1.0)),
-    "tanks, implicit": ("two-tanks", {"numerics.method": "radau-iia-5"}, "hole.opening", (0.4, 1.0)),
+    "tanks, implicit": (
+        "two-tanks",
+        {"numerics.method": "radau-iia-5"},
+        "hole.opening",
+        (0.4, 1.0),
+    ),
     "events and columns": ("governor", {}, "controls.governor.setpoint", (1.01, 0.99)),
     "control that is cut": ("governor", {}, "controls.servomotor.output", (0.5, 0.6)),
-    "log law": ("cylinder-servo", {"numerics.method": "dormand-prince", **ADAPTIVE}, "spool.position", (0.3, -0.2)),
-    "change of the method": ("cylinder-servo", {"numerics.method": "auto", **ADAPTIVE}, "spool.position", (0.3, -0.2)),
-    "Rosenbrock": ("cylinder-servo", {"numerics.method": "rodas-5p", **ADAPTIVE}, "spool.position", (0.3, -0.2)),
+    "log law": (
+        "cylinder-servo",
+        {"numerics.method": "dormand-prince", **ADAPTIVE},
+        "spool.position",
+        (0.3, -0.2),
+    ),
+    "change of the method": (
+        "cylinder-servo",
+        {"numerics.method": "auto", **ADAPTIVE},
+        "spool.position",
+        (0.3, -0.2),
+    ),
+    "Rosenbrock": (
+        "cylinder-servo",
+        {"numerics.method": "rodas-5p", **ADAPTIVE},
+        "spool.position",
+        (0.3, -0.2),
+    ),
     "delay and samples": ("digital-pressure", {}, "town.demand", (0.02, 0.04)),
     "network with switches": ("dc-motor-pump", {}, None, ()),
-    "delay lines": ("valve-closure", {"numerics.pipe_model": "delay-line"}, "valve.opening", (0.5, 0.7)),
+    "delay lines": (
+        "valve-closure",
+        {"numerics.pipe_model": "delay-line"},
+        "valve.opening",
+        (0.5, 0.7),
+    ),
     "head of a lake": ("valve-closure", {}, "lake.head", (46.0, 45.0)),
     "check valve": ("check-valve-slam", {}, None, ()),
     "basin": ("tracer-basin", {}, None, ()),
@@ -37,7 +62,11 @@ def model_of(name):
 
 
 def bits(state) -> tuple:
-    return state.t, state.y.tobytes(), {name: array.tobytes() for name, array in state.memory.items()}
+    return (
+        state.t,
+        state.y.tobytes(),
+        {name: array.tobytes() for name, array in state.memory.items()},
+    )
 
 
 def walk(model, inputs, fresh: bool) -> list[tuple]:
@@ -60,7 +89,9 @@ def test_a_used_loop_gives_the_bits_of_a_new_loop(name):
     assert walk(model, inputs, fresh=False) == walk(model, inputs, fresh=True)
 
 
-@pytest.mark.parametrize("name", ["tanks", "events and columns", "log law", "delay and samples", "delay lines"])
+@pytest.mark.parametrize(
+    "name", ["tanks", "events and columns", "log law", "delay and samples", "delay lines"]
+)
 def test_probes_with_held_inputs_are_those_of_the_held_model(name):
     model, (first, second) = model_of(name)
     state = initial_state(model)
@@ -113,7 +144,11 @@ def test_probes_of_a_state_see_the_last_sample():
     later = advance(model, start, 1.0, {"town.demand": 0.031})
     later = advance(model, later, 3.2, {"town.demand": 0.031})
     blank = fvsolve.State(
-        later.t, later.y, later.memory | {"discrete": np.array(with_slot(model.features, SLOT).discrete)}
+        later.t,
+        later.y,
+        later.memory | {"discrete": np.array(with_slot(model.features, SLOT).discrete)},
     )
     output = [probe.text for probe in model.probes].index("controls.pressure.output")
-    assert model.observe(later)[output] != model.observe(start)[output] == model.observe(blank)[output]
+    assert (
+        model.observe(later)[output] != model.observe(start)[output] == model.observe(blank)[output]
+    )

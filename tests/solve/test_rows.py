@@ -39,7 +39,10 @@ FIXED = {
 }
 SETTINGS = {
     **FIXED,
-    **{name: {"method": name, "rtol": 1e-4} for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")},
+    **{
+        name: {"method": name, "rtol": 1e-4}
+        for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")
+    },
 }
 SETTINGS["given"] = {"method": "radau-iia-5", "courant": 20.0}
 
@@ -47,30 +50,71 @@ SETTINGS["given"] = {"method": "radau-iia-5", "courant": 20.0}
 def slam(numerics: dict) -> dict:
     """Case of a main with a check valve that slams after a pressure drop, and of a tank on a rigid column."""
     nodes = {
-        "source": reservoir(step(0.2, 8e5, 3e5)), "in": junction(), "out": junction(), "gate": junction(),
-        "lake": lake(45.0), "shaft": tank(0.02, 44.0),
-    }  # fmt: skip
+        "source": reservoir(step(0.2, 8e5, 3e5)),
+        "in": junction(),
+        "out": junction(),
+        "gate": junction(),
+        "lake": lake(45.0),
+        "shaft": tank(0.02, 44.0),
+    }
     links = {
         "feed": pipe("source", "in", 60.0, 0.3, 1000.0, 6),
-        "check": {"type": "check-valve", "from": "in", "to": "out", "area": 0.05, "discharge_coefficient": 0.6},
-        "main": pipe("out", "gate", 300.0, 0.3, 1000.0, 24, friction={"model": "steady", "factor": 0.02}),
+        "check": {
+            "type": "check-valve",
+            "from": "in",
+            "to": "out",
+            "area": 0.05,
+            "discharge_coefficient": 0.6,
+        },
+        "main": pipe(
+            "out", "gate", 300.0, 0.3, 1000.0, 24, friction={"model": "steady", "factor": 0.02}
+        ),
         "valve": valve("gate", "lake", 0.01, ramp(0.5, 0.3, 1.0, 0.3)),
-        "column": {"type": "rigid-column", "from": "lake", "to": "shaft", "length": 5.0, "diameter": 0.1,
-                   "friction": FRICTION},
-    }  # fmt: skip
-    probes = ["in.pressure", "out.pressure", "check.flow", "gate.head", "valve.flow", "main.pressure@0.37",
-              "main.velocity@1.0", "shaft.level", "column.flow"]  # fmt: skip
+        "column": {
+            "type": "rigid-column",
+            "from": "lake",
+            "to": "shaft",
+            "length": 5.0,
+            "diameter": 0.1,
+            "friction": FRICTION,
+        },
+    }
+    probes = [
+        "in.pressure",
+        "out.pressure",
+        "check.flow",
+        "gate.head",
+        "valve.flow",
+        "main.pressure@0.37",
+        "main.velocity@1.0",
+        "shaft.level",
+        "column.flow",
+    ]
     return scene(nodes, links, 1.2, numerics, probes)
 
 
 def surging(numerics: dict) -> dict:
     """Case of two pipes and a closing valve, suitable for fused steps."""
-    nodes = {"lake": lake(60.0), "fork": junction(ramp(0.3, 0.1, 0.0, 0.02)), "gate": junction(),
-             "out": reservoir(AMBIENT)}  # fmt: skip
-    links = {"main": pipe("lake", "fork", 1200.0, 0.5, 1000.0, 60, friction={"model": "steady", "factor": 0.018}),
-             "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
-             "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0))}  # fmt: skip
-    return scene(nodes, links, 2.0, numerics, ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"])
+    nodes = {
+        "lake": lake(60.0),
+        "fork": junction(ramp(0.3, 0.1, 0.0, 0.02)),
+        "gate": junction(),
+        "out": reservoir(AMBIENT),
+    }
+    links = {
+        "main": pipe(
+            "lake", "fork", 1200.0, 0.5, 1000.0, 60, friction={"model": "steady", "factor": 0.018}
+        ),
+        "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
+        "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0)),
+    }
+    return scene(
+        nodes,
+        links,
+        2.0,
+        numerics,
+        ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"],
+    )
 
 
 SCENES = {"slam": slam, "surging": surging}
@@ -82,7 +126,10 @@ def with_rows(case: dict, every: float):
 
 def excess(result) -> float:
     """Greatest distance of a row outside the printed extremes."""
-    found = [(result[p].max() - e.maximum, e.minimum - result[p].min()) for p, e in result.extremes.items()]
+    found = [
+        (result[p].max() - e.maximum, e.minimum - result[p].min())
+        for p, e in result.extremes.items()
+    ]
     return float(np.max(found))
 
 
@@ -98,7 +145,8 @@ def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scen
         for probe, extremes in result.extremes.items():
             assert result[probe][-1] == alone[probe][-1], (probe, every)
             assert (
-                extremes.minimum <= alone.extremes[probe].minimum and extremes.maximum >= alone.extremes[probe].maximum
+                extremes.minimum <= alone.extremes[probe].minimum
+                and extremes.maximum >= alone.extremes[probe].maximum
             )
         assert result.ledger["mass"]["remainder"] == alone.ledger["mass"]["remainder"]
         assert excess(result) <= 0.0
@@ -109,14 +157,25 @@ def test_rows_between_steps_keep_their_order_at_peaks():
 
     x = e^(-z w t) (cos w' t + z w / w' sin w' t)
     """
-    nodes = {"wall": {"type": "frame"}, "body": {"type": "mass", "mass": 4.0, "initial_position": 1.0}}
+    nodes = {
+        "wall": {"type": "frame"},
+        "body": {"type": "mass", "mass": 4.0, "initial_position": 1.0},
+    }
     links = {
-        "spring": {"type": "spring", "from": "wall", "to": "body", "stiffness": 400.0, "free_length": 0.0},
+        "spring": {
+            "type": "spring",
+            "from": "wall",
+            "to": "body",
+            "stiffness": 400.0,
+            "free_length": 0.0,
+        },
         "oil": {"type": "damper", "from": "wall", "to": "body", "damping": 8.0},
     }
     far, decay, swing = [], 1.0, math.sqrt(99.0)
     for size in (0.02, 0.01):
-        case = scene(nodes, links, 3.0, {"method": "rk4", "step": size}, ["body.position"], every=0.0013)
+        case = scene(
+            nodes, links, 3.0, {"method": "rk4", "step": size}, ["body.position"], every=0.0013
+        )
         result = fvsolve.run(case)
         t = np.asarray(result.t)
         x = np.exp(-decay * t) * (np.cos(swing * t) + decay / swing * np.sin(swing * t))
@@ -125,8 +184,13 @@ def test_rows_between_steps_keep_their_order_at_peaks():
     assert far[0] / far[1] == pytest.approx(16.0, rel=0.2)
 
 
-WAYS = [{"method": name, "step": 2e-4} for name in ("rk4", "trapezoid", "rodas-5p", "radau-iia-5", "implicit-euler")]
-WAYS += [{"method": name, "rtol": 1e-8} for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")]
+WAYS = [
+    {"method": name, "step": 2e-4}
+    for name in ("rk4", "trapezoid", "rodas-5p", "radau-iia-5", "implicit-euler")
+]
+WAYS += [
+    {"method": name, "rtol": 1e-8} for name in ("dormand-prince", "rodas-5p", "radau-iia-5", "auto")
+]
 ROUNDINGS = (-5, -2, -1, 0, 1, 2, 5)
 
 

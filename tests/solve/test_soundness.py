@@ -14,7 +14,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.basin_scenes import liquid
-from reference.scenes import area, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.scenes import (
+    area,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 
 import fvsolve
 from fvsolve.case.text import write
@@ -41,15 +52,40 @@ def main_case(**numerics):
 
 def closing(cells: int = 40, beta: float = 2.2e9, **numerics) -> dict:
     """Case of a frictionless main whose outflow stops at once at 0.5 s."""
-    fluid = {"name": "user", "density": 1000.0, "bulk_modulus": beta, "viscosity": 1e-3, "vapor_pressure": 0.0}
+    fluid = {
+        "name": "user",
+        "density": 1000.0,
+        "bulk_modulus": beta,
+        "viscosity": 1e-3,
+        "vapor_pressure": 0.0,
+    }
     speed = math.sqrt(beta / 1000.0)
     nodes = {
         "lake": {"type": "reservoir", "pressure": 201325.0},
-        "gate": {"type": "junction", "demand": {"time": [0.0, 0.5], "value": [1e-3, 0.0], "kind": "step"}},
+        "gate": {
+            "type": "junction",
+            "demand": {"time": [0.0, 0.5], "value": [1e-3, 0.0], "kind": "step"},
+        },
     }
-    pipe = {"type": "pipe", "from": "lake", "to": "gate", "length": speed, "diameter": 0.3, "wall": "rigid",
-            "cells": cells, "friction": {"model": "none"}}  # fmt: skip
-    return scene(nodes, {"main": pipe}, 3.0, numerics, ["gate.pressure"], 0.1, fluid={**fluid, "law": "linear"})
+    pipe = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "gate",
+        "length": speed,
+        "diameter": 0.3,
+        "wall": "rigid",
+        "cells": cells,
+        "friction": {"model": "none"},
+    }
+    return scene(
+        nodes,
+        {"main": pipe},
+        3.0,
+        numerics,
+        ["gate.pressure"],
+        0.1,
+        fluid={**fluid, "law": "linear"},
+    )
 
 
 @pytest.mark.parametrize("setting", ["numerics.step=0.1", "numerics.courant=1.25"])
@@ -58,8 +94,13 @@ def test_the_main_case_beyond_its_limit_is_not_ok_grown_or_not(setting, fvs, tmp
     slots = json.loads((tmp_path / "run" / "summary.json").read_text())
     (limit,) = [one for one in slots["warnings"] if one["kind"] == "step-limit"]
     assert code == 1 and not slots["ok"] and not limit["ok"] and limit["place"] == "links.main"
-    assert limit["limit"] == pytest.approx(pipe_limit("fromm", "ssp-rk3", 160), rel=1e-12)  # 200 cells: 160 bound it
-    assert 0.98 * advection_limit("fromm", "ssp-rk3").limit < limit["limit"] < advection_limit("fromm", "ssp-rk3").limit
+    # 200 cells: 160 bound it
+    assert limit["limit"] == pytest.approx(pipe_limit("fromm", "ssp-rk3", 160), rel=1e-12)
+    assert (
+        0.98 * advection_limit("fromm", "ssp-rk3").limit
+        < limit["limit"]
+        < advection_limit("fromm", "ssp-rk3").limit
+    )
     assert limit["value"] > limit["limit"] and "or less" in limit["text"]
     assert "not to be trusted" in " ".join(out.split())
     before = json.loads(fvs("check", MAIN, "--set", setting, "--json")[1])
@@ -79,7 +120,10 @@ def test_exactly_at_the_limit_is_sound_and_just_beyond_it_is_not(pair):
     limit = advection_limit(scheme, method).limit
     for factor, ok in ((1.0, True), (1.001, False)):
         result = fvsolve.run(closing(scheme=scheme, method=method, courant=factor * limit))
-        assert result.ok is ok and len(notices_of(result, "step-limit")) == (not ok), (factor, result.warnings)
+        assert result.ok is ok and len(notices_of(result, "step-limit")) == (not ok), (
+            factor,
+            result.warnings,
+        )
 
 
 @pytest.mark.parametrize("cells", [20, 40, 80, 200])
@@ -96,28 +140,40 @@ def test_the_ends_of_a_pipe_of_any_length_reduce_the_limit_of_wide_stencils(pair
     beyond = fvsolve.run(case)
     (notice,) = notices_of(beyond, "step-limit")
     assert limit < long and not beyond.ok and notice.limit == pytest.approx(limit, rel=1e-9)
-    assert "with reflections at the ends" in notice.text and np.ptp(beyond["gate.pressure"]) > 10.0 * jump
+    assert (
+        "with reflections at the ends" in notice.text
+        and np.ptp(beyond["gate.pressure"]) > 10.0 * jump
+    )
 
 
 def test_a_limit_stated_as_a_step_is_that_of_its_courant_number():
     case = closing(scheme="upwind", method="euler", courant=1.2)
     (by_courant,) = notices_of(fvsolve.run(case), "step-limit")
     case["numerics"].pop("courant")
-    (by_step,) = notices_of(fvsolve.run(case | {"numerics": {**case["numerics"], "step": 1.2 / 40}}), "step-limit")
+    (by_step,) = notices_of(
+        fvsolve.run(case | {"numerics": {**case["numerics"], "step": 1.2 / 40}}), "step-limit"
+    )
     assert (by_step.key, by_courant.key) == ("step", "courant")
-    assert by_step.value == pytest.approx(by_courant.value, rel=1e-12) and by_step.limit == by_courant.limit
+    assert (
+        by_step.value == pytest.approx(by_courant.value, rel=1e-12)
+        and by_step.limit == by_courant.limit
+    )
     assert "give numerics.step = 0.025 s or less" in by_step.text
 
 
 def test_an_estimate_that_is_hardly_passed_is_doubtful_and_beyond_five_percent_wrong():
     limit = pipe_limit("fromm", "ssp-rk3", 40)  # that of `closing`, with its ends
     for factor, ok in ((1.02, True), (1.06, False)):
-        (one,) = step_limits(model_of(closing(scheme="muscl", method="ssp-rk3", courant=factor * limit)))
+        (one,) = step_limits(
+            model_of(closing(scheme="muscl", method="ssp-rk3", courant=factor * limit))
+        )
         assert one.ok is ok and "an estimate" in one.text
 
 
 def test_implicit_methods_and_error_control_have_no_limit():
-    assert not step_limits(model_of(closing(scheme="upwind", method="implicit-euler", courant=20.0)))
+    assert not step_limits(
+        model_of(closing(scheme="upwind", method="implicit-euler", courant=20.0))
+    )
     assert not step_limits(model_of(closing(scheme="upwind5", method="dormand-prince", rtol=1e-4)))
 
 
@@ -140,20 +196,39 @@ def test_soft_fluids_pass(beta):
 def test_water_at_a_step_beyond_its_limit_is_reported_by_check_and_run(fvs):
     found = json.loads(fvs("check", "sloshing-tank", "--set", "numerics.courant=2.2", "--json")[1])
     (one,) = [w for w in found["warnings"] if w["kind"] == "step-limit"]
-    assert one["place"] == "nodes.tank" and one["value"] == 2.2 and one["limit"] == pytest.approx(2.0, rel=1e-6)
-    result = fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 2.2, "numerics.end": 2.5, "expect": {}})
+    assert (
+        one["place"] == "nodes.tank"
+        and one["value"] == 2.2
+        and one["limit"] == pytest.approx(2.0, rel=1e-6)
+    )
+    result = fvsolve.run(
+        "cases/sloshing-tank.toml", set={"numerics.courant": 2.2, "numerics.end": 2.5, "expect": {}}
+    )
     assert not result.ok and notices_of(result, "step-limit")
-    assert fvsolve.run("cases/sloshing-tank.toml", set={"numerics.courant": 1.9, "numerics.end": 2.5, "expect": {}}).ok
+    assert fvsolve.run(
+        "cases/sloshing-tank.toml", set={"numerics.courant": 1.9, "numerics.end": 2.5, "expect": {}}
+    ).ok
 
 
 def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
     """A step within the limit of the initial depth gives a notice when an incoming wave is deeper."""
-    pool = {"type": "basin", "size": [10.0, 1.0], "cells": [40, 4], "level": 0.1, "patches": {"in": {"side": "west"}}}
+    pool = {
+        "type": "basin",
+        "size": [10.0, 1.0],
+        "cells": [40, 4],
+        "level": 0.1,
+        "patches": {"in": {"side": "west"}},
+    }
     flow = {"time": [0.0, 1.0], "value": [0.0, 2.0], "kind": "linear"}
     nodes = {"pool": pool, "feed": {"type": "inflow", "flow": flow}}
     link = {"type": "valve", "from": "feed", "to": "pool.in", "area": 1.0}
     case = scene(
-        nodes, {"tap": link}, 3.0, {"scheme": "upwind", "method": "euler", "step": 0.1}, ["pool.depth@5,0.5"], 0.1
+        nodes,
+        {"tap": link},
+        3.0,
+        {"scheme": "upwind", "method": "euler", "step": 0.1},
+        ["pool.depth@5,0.5"],
+        0.1,
     )
     model = model_of(case)
     assert not step_limits(model)
@@ -161,7 +236,9 @@ def test_water_that_gets_deeper_in_a_run_is_watched_at_fixed_steps():
     assert not result.ok and notices_of(result, "step-limit") + notices_of(result, "growth")
 
 
-@pytest.mark.parametrize("scheme, method", [("upwind", "euler"), ("upwind5", "rk4"), ("fromm", "ssp-rk3")])
+@pytest.mark.parametrize(
+    "scheme, method", [("upwind", "euler"), ("upwind5", "rk4"), ("fromm", "ssp-rk3")]
+)
 def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(scheme, method):
     """Limits in the plane for waves along an axis equal those on a line, to a few 1e-3 for 33 sampled phases."""
     line = advection_limit(scheme, method).limit
@@ -174,10 +251,22 @@ def test_limits_in_the_plane_are_those_along_a_line_where_all_goes_along_it(sche
 def test_a_liquid_in_the_plane_holds_below_its_predicted_limit_and_grows_beyond_it(scheme, method):
     limit = plane_limit(scheme, method, 0.5)
     rng = np.random.default_rng(3)
-    box = {"type": "basin", "physics": "liquid", "size": [1.0, 1.0], "cells": [16, 16], "pressure": 3e5,
-           "thickness": 0.1}  # fmt: skip
+    box = {
+        "type": "basin",
+        "physics": "liquid",
+        "size": [1.0, 1.0],
+        "cells": [16, 16],
+        "pressure": 3e5,
+        "thickness": 0.1,
+    }
     for factor, grows in ((0.98, False), (1.05, True)):
-        case = scene({"box": box}, {}, 1.0, {"scheme": scheme, "method": method, "step": 1.0}, ["box.pressure@0.5,0.5"])
+        case = scene(
+            {"box": box},
+            {},
+            1.0,
+            {"scheme": scheme, "method": method, "step": 1.0},
+            ["box.pressure@0.5,0.5"],
+        )
         rate = model_of(case).meshed[0].max_rate(model_of(case).start)[0]
         case["numerics"] |= {"step": factor * limit / rate, "end": 300 * limit / rate}
         case["output"]["every"] = 100 * limit / rate
@@ -221,7 +310,9 @@ def test_the_relative_remainder_is_over_the_inflow_where_a_scene_starts_empty():
 
 
 def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
-    found = sweep(closing(scheme="upwind", method="euler"), {"numerics.courant": [1.0, 1.1]}, out=tmp_path)
+    found = sweep(
+        closing(scheme="upwind", method="euler"), {"numerics.courant": [1.0, 1.1]}, out=tmp_path
+    )
     sound, beyond = found.rows
     assert sound["ok"] and sound["warnings"] == [] and not beyond["ok"]
     assert [one["kind"] for one in beyond["warnings"]][0] == "step-limit"
@@ -232,8 +323,13 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
 def test_the_bound_of_growth_follows_the_start_and_the_given_values():
     """The growth check stops a run above its threshold, which is at least 1e6 kg/s for an initial flow of 1 kg/s."""
     watch = RunChecks(RunData(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
-    assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
-    assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(0.0, 1.01 * watch.largest).startswith("stopped: ")
+    assert (
+        watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0]))
+        and watch.largest[0] >= 1e6
+    )
+    assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(
+        0.0, 1.01 * watch.largest
+    ).startswith("stopped: ")
 
 
 def test_growth_without_pipes_is_stopped_too():
@@ -241,24 +337,38 @@ def test_growth_without_pipes_is_stopped_too():
     fixed = {"method": "rk4", "step": 0.03}
     body = {"type": "mass", "mass": 10.0, "initial_position": 0.01}
     spring = {"type": "spring", "from": "wall", "to": "load", "stiffness": 1e5}
-    swings = scene({"wall": {"type": "frame"}, "load": body}, {"s": spring}, 6.0, fixed, ["load.position"], 0.1)
+    swings = scene(
+        {"wall": {"type": "frame"}, "load": body}, {"s": spring}, 6.0, fixed, ["load.position"], 0.1
+    )
     vessel = {"type": "chamber", "volume": 0.01, "initial_pressure": 3e5}
-    nodes = {"high": {"type": "reservoir", "pressure": 5e5}, "v": vessel, "low": {"type": "reservoir", "pressure": 2e5}}
-    column = {"type": "rigid-column", "length": 5.0, "diameter": 0.02, "friction": {"model": "none"}}
+    nodes = {
+        "high": {"type": "reservoir", "pressure": 5e5},
+        "v": vessel,
+        "low": {"type": "reservoir", "pressure": 2e5},
+    }
+    column = {
+        "type": "rigid-column",
+        "length": 5.0,
+        "diameter": 0.02,
+        "friction": {"model": "none"},
+    }
     hole = {"type": "valve", "from": "v", "to": "low", "diameter": 0.002}
     links = {"c": {**column, "from": "high", "to": "v", "initial_flow": 0.0}, "hole": hole}
     squeezed = scene(nodes, links, 100.0, {"method": "euler", "step": 0.5}, ["v.pressure"], 1.0)
     for case in (swings, squeezed):
         result = fvsolve.run(case)
-        assert not result.ok and (notices_of(result, "growth") or "not finite" in result.reason), result.summary[
-            "warnings"
-        ]
+        assert not result.ok and (notices_of(result, "growth") or "not finite" in result.reason), (
+            result.summary["warnings"]
+        )
 
 
 def chattering(step: float) -> dict:
     """Case of a check valve before a wide tank, which 1500 pressure cycles per second open and shut."""
     swings = 1500
-    pressure = {"time": [i / (2 * swings) for i in range(2 * swings + 1)], "value": [1.2e5, 3e5] * swings + [1.2e5]}
+    pressure = {
+        "time": [i / (2 * swings) for i in range(2 * swings + 1)],
+        "value": [1.2e5, 3e5] * swings + [1.2e5],
+    }
     nodes = {
         "source": {"type": "reservoir", "pressure": pressure},
         "wide": {"type": "tank", "area": 100.0, "level": 10.0},
@@ -271,7 +381,11 @@ def test_events_that_crowd_within_a_step_are_bounded_where_nothing_grows():
     """A run with 3000 events in a step of 1 s stops with the name of the valve; steps of 0.1 s finish."""
     result = fvsolve.run(chattering(1.0))
     model = model_of(chattering(1.0))
-    assert "check changes its state without end" in result.reason and not result.ok and not notices_of(result, "growth")
+    assert (
+        "check changes its state without end" in result.reason
+        and not result.ok
+        and not notices_of(result, "growth")
+    )
     times = [event["time"] for event in result.summary["events"]]
     assert len(times) == MOST_EVENTS_IN_SPAN + 4 * model.shapes.armed and times[-1] - times[0] < 1.0
     finer = fvsolve.run(chattering(0.1))
@@ -297,19 +411,31 @@ def test_a_store_that_fills_within_a_linearised_step_is_reported(step, opens):
     """A Rosenbrock step much longer than the filling time of a chamber gives a notice, also after an opening."""
     nodes = {"pump": reservoir(8e6), "pot": chamber(1e-4, 1e6)}
     opening = {"time": [0.0, opens], "value": [0.0, 1.0], "kind": "step"} if opens else 1.0
-    case = scene(nodes, {"in": valve("pump", "pot", 1e-5, opening)}, opens + 200 * step,
-                 {"method": "rodas-5p", "step": step}, ["pot.pressure"])  # fmt: skip
+    case = scene(
+        nodes,
+        {"in": valve("pump", "pot", 1e-5, opening)},
+        opens + 200 * step,
+        {"method": "rodas-5p", "step": step},
+        ["pot.pressure"],
+    )
     found = {one.kind: one for one in fvsolve.run(case).warnings}
     assert "pot.mass" in found["step-error"].place and found["step-error"].value > 0.005
     case["numerics"]["method"] = "radau-iia-5"
     assert "step-error" not in {one.kind for one in fvsolve.run(case).warnings}
 
 
-@pytest.mark.parametrize("level, area", [(2.0, 1e-4), (11.0, 3e-4), (11.9, 1e-3), (12.08, 2e-4), (60.0, 3e-5)])
+@pytest.mark.parametrize(
+    "level, area", [(2.0, 1e-4), (11.0, 3e-4), (11.9, 1e-3), (12.08, 2e-4), (60.0, 3e-5)]
+)
 def test_a_tank_that_fills_within_a_few_linearised_steps_is_reported(level, area):
     """A tank whose level stays wrong by more than 0.5 % of its range, up to 1.1 m, gives a notice."""
-    case = scene({"lake": lake(12.0), "pot": tank(area, level)}, {"in": valve("lake", "pot", 1e-3)}, 10.0,
-                 {"method": "rodas-5p", "step": 0.05}, ["pot.level"])  # fmt: skip
+    case = scene(
+        {"lake": lake(12.0), "pot": tank(area, level)},
+        {"in": valve("lake", "pot", 1e-3)},
+        10.0,
+        {"method": "rodas-5p", "step": 0.05},
+        ["pot.level"],
+    )
     found = fvsolve.run(case)
     wrong = np.mean(np.abs(found["pot.level"][-50:] - 12.0)) / np.ptp(found["pot.level"])
     (told,) = [one for one in found.warnings if one.kind == "step-error"]
@@ -355,7 +481,10 @@ def test_threads_stop_at_the_same_step(returns):
     case["numerics"] |= {"courant": 2.0, "end": 1.0}
     one, three = (fvsolve.run(case, threads=many) for many in (1, 3))
     assert [one.summary["threads"], three.summary["threads"]] == [1, 3] and returns["returns"] < 10
-    assert one.summary["steps"] % GROWTH_CHECK_STEPS == 0 and one.summary["steps"] == three.summary["steps"]
+    assert (
+        one.summary["steps"] % GROWTH_CHECK_STEPS == 0
+        and one.summary["steps"] == three.summary["steps"]
+    )
     assert notices_of(one, "growth") == notices_of(three, "growth") != []
 
 
@@ -364,16 +493,35 @@ LARGEST = 1e4  # [m], far above true heads: a closure from 2 m/s gives 200 m by 
 
 def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
     """Case of a pipe in steady flow at Courant number 4 by default, with a valve that shuts from 0.5 s on."""
-    nodes = {"lake": lake(50.0, elevation=0.0), "gate": junction(elevation=0.0),
-             "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
-    links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 60),
-             "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.5, 0.1, 1.0, 0.0))}  # fmt: skip
-    limits = {"top": {"on": "main", "maximum": "200 bar"}, "low": {"on": "main", "quantity": "head", "minimum": -1e3},
-              "start": {"on": "main", "quantity": "head", "maximum": 40.0}}  # fmt: skip
-    claims = {text: {"value": 0.0, "atol": 1e29}
-              for text in ("max(gate.head)", "final(gate.head)", "max(main.head)", "mean(gate.head)")}  # fmt: skip
+    nodes = {
+        "lake": lake(50.0, elevation=0.0),
+        "gate": junction(elevation=0.0),
+        "air": reservoir(1e5, elevation=0.0),
+    }
+    links = {
+        "main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 60),
+        "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.5, 0.1, 1.0, 0.0)),
+    }
+    limits = {
+        "top": {"on": "main", "maximum": "200 bar"},
+        "low": {"on": "main", "quantity": "head", "minimum": -1e3},
+        "start": {"on": "main", "quantity": "head", "maximum": 40.0},
+    }
+    claims = {
+        text: {"value": 0.0, "atol": 1e29}
+        for text in ("max(gate.head)", "final(gate.head)", "max(main.head)", "mean(gate.head)")
+    }
     numerics = {"scheme": scheme, "method": "ssp-rk2", "step": step}
-    return scene(nodes, links, 5.0, numerics, ["gate.head", "lake.pressure"], limits=limits, expect=claims, **more)
+    return scene(
+        nodes,
+        links,
+        5.0,
+        numerics,
+        ["gate.head", "lake.pressure"],
+        limits=limits,
+        expect=claims,
+        **more,
+    )
 
 
 def numbers(value) -> list[float]:
@@ -390,10 +538,24 @@ def numbers(value) -> list[float]:
 def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) -> None:
     result = fvsolve.run(blown(step, scheme))
     summary = result.summary
-    assert not result.ok and summary["invalid_from"] is not None and summary["invalid_from"] <= summary["t"]
-    heads = [one for key in ("extremes", "verdicts", "expectations") for one in numbers(summary[key])]
+    assert (
+        not result.ok
+        and summary["invalid_from"] is not None
+        and summary["invalid_from"] <= summary["t"]
+    )
+    heads = [
+        one for key in ("extremes", "verdicts", "expectations") for one in numbers(summary[key])
+    ]
     assert max(map(abs, heads)) <= 1e29  # tolerance of the expectations
-    assert max(map(abs, numbers({name: one for name, one in summary["extremes"].items() if "head" in name}))) < LARGEST
+    assert (
+        max(
+            map(
+                abs,
+                numbers({name: one for name, one in summary["extremes"].items() if "head" in name}),
+            )
+        )
+        < LARGEST
+    )
     assert {one.state for one in result.expectations} == {"open"}
     states = {one.name: one.state for one in result.verdicts}
     assert states["top"] == states["low"] == "open"
@@ -409,14 +571,25 @@ def test_all_printed_notices_state_their_first_time(fvs, tmp_path, monkeypatch) 
     assert "e+1" not in text.replace("1e+60", "").partition("note:")[0]
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert fvs("report", "run", "--xlsx")[0] == 0
-    assert f"not valid from t = {summary['invalid_from']:.6g} s on" in (tmp_path / "run" / "report.html").read_text()
+    assert (
+        f"not valid from t = {summary['invalid_from']:.6g} s on"
+        in (tmp_path / "run" / "report.html").read_text()
+    )
     (tmp_path / "two.toml").write_text('case = "scene.toml"\n[events.close]\n')
     found = scenarios.study(tmp_path / "two.toml", tmp_path / "out")
-    assert not found.ok and found.holds == [] and "not valid from t = " in fvs("study", "two.toml", "--out", "out")[1]
+    assert (
+        not found.ok
+        and found.holds == []
+        and "not valid from t = " in fvs("study", "two.toml", "--out", "out")[1]
+    )
     assert fvs("report", "out")[0] == 0
     assert "not valid from t = " in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_sound_run_is_valid_to_its_end() -> None:
     result = fvsolve.run(blown(0.004))
-    assert result.ok and result.summary["invalid_from"] is None and result.extremes["gate.head"].maximum < LARGEST
+    assert (
+        result.ok
+        and result.summary["invalid_from"] is None
+        and result.extremes["gate.head"].maximum < LARGEST
+    )

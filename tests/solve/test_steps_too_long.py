@@ -36,7 +36,13 @@ LONG = [  # opening, method, key, value, greatest stable value of the key or Non
     (ramp(1.0, 0.05, 0.5), "euler", "step", 10.0, None),
     (ramp(1.0, 0.05, 0.999), "ssp-rk3", "courant", 1e3, pipe_limit("fromm", "ssp-rk3", CELLS)),
     (ramp(0.0, 2.0, 0.5), "ssp-rk3", "courant", 1e3, pipe_limit("fromm", "ssp-rk3", CELLS)),
-    (ramp(1.0, 0.05, 0.0), "ssp-rk3", "step", 0.1, CELL_TIME * pipe_limit("fromm", "ssp-rk3", CELLS)),
+    (
+        ramp(1.0, 0.05, 0.0),
+        "ssp-rk3",
+        "step",
+        0.1,
+        CELL_TIME * pipe_limit("fromm", "ssp-rk3", CELLS),
+    ),
 ]
 
 

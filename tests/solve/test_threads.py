@@ -41,9 +41,20 @@ def result_bytes(case, threads: int, state=None):
     summary = run.go()
     assert summary.reason == "finished", summary.reason
     loop = run.loop
-    cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet", "round", "other") if name in frame
-             for array in frame[name].values()]  # fmt: skip
-    kept = [loop.now, *loop.stepper.restart_arrays().values(), run.run_data.marks, run.run_data.extremes, sink.table()]
+    cells = [
+        np.asarray(array)
+        for frame in sink.frames
+        for name in ("pool", "sheet", "round", "other")
+        if name in frame
+        for array in frame[name].values()
+    ]
+    kept = [
+        loop.now,
+        *loop.stepper.restart_arrays().values(),
+        run.run_data.marks,
+        run.run_data.extremes,
+        sink.table(),
+    ]
     kept += cells
     return [np.array(one).tobytes() for one in kept], summary
 
@@ -59,9 +70,20 @@ def test_any_number_of_threads_gives_the_same_bits(name):
         assert summary.threads == threads and summary.ledgers == one.ledgers
 
 
-FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk3", "a tolerance",
-          "a tolerance, first same as last", "a liquid", "a liquid between walls", "a liquid, upwind5", "a dye",
-          "walls all around", "rain and Horton", "rain and Green-Ampt, rk4")  # fmt: skip
+FORMED = (
+    "muscl, ssp-rk2",
+    "muscl, a limiter of its own, rk4",
+    "upwind5, ssp-rk3",
+    "a tolerance",
+    "a tolerance, first same as last",
+    "a liquid",
+    "a liquid between walls",
+    "a liquid, upwind5",
+    "a dye",
+    "walls all around",
+    "rain and Horton",
+    "rain and Green-Ampt, rk4",
+)
 
 
 @pytest.mark.in_turn
@@ -86,10 +108,21 @@ def test_number_of_threads_may_equal_that_of_rows():
 def test_two_basins_with_a_basin_that_each_thread_steps_as_a_whole():
     """Several basins give equal bits, although each thread computes all cells of a small mesh that is not a grid."""
     case = water()
-    case["nodes"]["round"] = {"type": "basin", "size": [2.0, 2.0], "cells": [6, 6], "holes": [[0.0, 0.0, 1.0, 1.0]],
-                              "level": 0.4, "patches": {"near": {"side": "east"}}}  # fmt: skip
-    case["nodes"]["other"] = {"type": "basin", "size": [2.0, 2.0], "cells": [5, 7], "level": 0.7,
-                              "patches": {"near": {"side": "east"}}}  # fmt: skip
+    case["nodes"]["round"] = {
+        "type": "basin",
+        "size": [2.0, 2.0],
+        "cells": [6, 6],
+        "holes": [[0.0, 0.0, 1.0, 1.0]],
+        "level": 0.4,
+        "patches": {"near": {"side": "east"}},
+    }
+    case["nodes"]["other"] = {
+        "type": "basin",
+        "size": [2.0, 2.0],
+        "cells": [5, 7],
+        "level": 0.7,
+        "patches": {"near": {"side": "east"}},
+    }
     for name in ("round", "other"):
         case["links"][name] = VALVE | {"from": f"{name}.near", "to": "pool.near"}
     case = with_maxima(case, "pool", "round", "other")
@@ -135,9 +168,9 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
     def race(team):
         for member in team.members:
             member.written.joint[band_exchange.BAND_COUNT] = 1
-            team.board.view(np.int64)[band_exchange.LINE * member.number + band_exchange.SHARED_ADDRESS] = (
-                member.stepper.y.ctypes.data
-            )
+            team.board.view(np.int64)[
+                band_exchange.LINE * member.number + band_exchange.SHARED_ADDRESS
+            ] = member.stepper.y.ctypes.data
 
     case = water(basin={"patches": {}, "cells": [40, 40]}, link=None, step=1e-3)
     whole = stepped(case, 1)
@@ -170,13 +203,17 @@ def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path
             raise KeyboardInterrupt
 
     broken = fvsolve.run(case, out=tmp_path / "broken", threads=3, progress=stop, pictures=False)
-    assert broken.reason.startswith("interrupted") and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.2
+    assert (
+        broken.reason.startswith("interrupted")
+        and 0.0 < np.load(tmp_path / "broken" / "restart.npz")["t"] < 0.2
+    )
     again = {"out": tmp_path / "broken", "resume": True, "pictures": False}
     broken = fvsolve.run(tmp_path / "broken" / "case.toml", threads=2, **again)
     assert broken.ok and broken.summary["threads"] == 2
     assert whole.ok and whole.ledger == broken.ledger
     files = [
-        sorted([*(tmp_path / name).rglob("*.vtu"), tmp_path / name / "history.csv"]) for name in ("whole", "broken")
+        sorted([*(tmp_path / name).rglob("*.vtu"), tmp_path / name / "history.csv"])
+        for name in ("whole", "broken")
     ]
     assert len(files[0]) == len(files[1]) > 2
     assert all(one.read_bytes() == other.read_bytes() for one, other in zip(*files, strict=True))
@@ -195,16 +232,22 @@ def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
     assert not [one for one in threading.enumerate() if one.name.startswith("band")]
 
 
-NETWORK = scene({"a": reservoir(AMBIENT), "b": reservoir(2 * AMBIENT)},
-                {"v": {"type": "valve", "from": "a", "to": "b", "area": 1e-3}}, 0.1,
-                {"method": "rk4", "step": 0.01})  # fmt: skip
+NETWORK = scene(
+    {"a": reservoir(AMBIENT), "b": reservoir(2 * AMBIENT)},
+    {"v": {"type": "valve", "from": "a", "to": "b", "area": 1e-3}},
+    0.1,
+    {"method": "rk4", "step": 0.01},
+)
 ALONE = {
     "an implicit method": (water(method="tr-bdf2"), "tr-bdf2 solves for all states at once"),
     "no basin": (NETWORK, "the case has no basin"),
     "fifth order of a dye": (carried("weno5"), "sheet: its scalars use the scheme weno5"),
     "a dye that decays": (dyed(decay=0.1), "pool: dye decays"),
-    "a dye on a mesh": (dyed(mesh=DYED_MESH), "pool: its mesh is not a full rectangle and carries scalars"),
-}  # fmt: skip
+    "a dye on a mesh": (
+        dyed(mesh=DYED_MESH),
+        "pool: its mesh is not a full rectangle and carries scalars",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", ALONE)
@@ -214,7 +257,11 @@ def test_work_of_a_single_thread_is_reported(name):
     assert why in single_thread_reason(model) and divisible_rows(model)["most"] == 1
     run = fvsolve.run(model, threads=2)
     (said,) = [one for one in run.summary["warnings"] if one["kind"] == "threads"]
-    assert run.summary["threads"] == 1 and "threads = 2, but one thread is used" in said["text"] and why in said["text"]
+    assert (
+        run.summary["threads"] == 1
+        and "threads = 2, but one thread is used" in said["text"]
+        and why in said["text"]
+    )
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, None])
@@ -224,9 +271,14 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 
 def test_more_threads_than_rows_are_named():
-    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs at least one; expected at most 12"):
+    with pytest.raises(
+        FvsolveError,
+        match="pool has 12 rows, and each thread needs at least one; expected at most 12",
+    ):
         fvsolve.run(water(), threads=13)
-    text = "pool has 12 blocks of 256 cells, and each thread needs at least one; expected at most 12"
+    text = (
+        "pool has 12 blocks of 256 cells, and each thread needs at least one; expected at most 12"
+    )
     with pytest.raises(FvsolveError, match=text):
         fvsolve.run(water(basin=MESH), threads=13)
 

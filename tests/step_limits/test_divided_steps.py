@@ -15,10 +15,21 @@ def between_lines(node: dict, h: float, method: str, end: float = 2.0) -> dict:
     """Case of a node between two delay lines of 200 and 100 m; a valve at their end opens further at once."""
     nodes = {"lake": lake(80.0), "n": node, "gate": junction(), "out": lake(0.0)}
     opening = {"start": 0.5, "duration": 0.0, "value": [0.4, 0.7]}
-    links = {"p0": line("lake", "n", 200.0, 0.8), "p1": line("n", "gate", 100.0, 0.8),
-             "v": {"type": "valve", "from": "gate", "to": "out", "area": 0.04, "opening": opening}}  # fmt: skip
+    links = {
+        "p0": line("lake", "n", 200.0, 0.8),
+        "p1": line("n", "gate", 100.0, 0.8),
+        "v": {"type": "valve", "from": "gate", "to": "out", "area": 0.04, "opening": opening},
+    }
     numerics = {"pipe_model": "delay-line", "step": h, "method": method}
-    made = scene(nodes, links, end, numerics, ["n.head", "gate.head"], 0.01, fluid={**WATER, "vapor_pressure": 0.0})
+    made = scene(
+        nodes,
+        links,
+        end,
+        numerics,
+        ["n.head", "gate.head"],
+        0.01,
+        fluid={**WATER, "vapor_pressure": 0.0},
+    )
     return made | {"ambient_pressure": 5e7}
 
 
@@ -37,19 +48,29 @@ def test_a_vessel_between_delay_lines_does_not_grow(method, node):
     assert any("beside delay lines" in notice.text for notice in found.warnings)
     for probe in ("n.head", "gate.head"):
         one, exact = found.extremes[probe], truth.extremes[probe]
-        assert one.minimum == pytest.approx(exact.minimum, abs=share * (exact.maximum - exact.minimum))
-        assert one.maximum == pytest.approx(exact.maximum, abs=share * (exact.maximum - exact.minimum))
+        assert one.minimum == pytest.approx(
+            exact.minimum, abs=share * (exact.maximum - exact.minimum)
+        )
+        assert one.maximum == pytest.approx(
+            exact.maximum, abs=share * (exact.maximum - exact.minimum)
+        )
 
 
 def air_valve(h: float) -> dict:
     """Case of an air valve between two delay lines, behind a valve that shuts."""
     friction = {"model": "steady", "factor": 0.02}
-    nodes = {"src": lake(55.0, elevation=0.0), "a": junction(elevation=0.0), "end": lake(40.0, elevation=0.0),
-             "b": {"type": "air-valve", "inlet": 0.03, "outlet": 0.04, "elevation": 30.0}}  # fmt: skip
+    nodes = {
+        "src": lake(55.0, elevation=0.0),
+        "a": junction(elevation=0.0),
+        "end": lake(40.0, elevation=0.0),
+        "b": {"type": "air-valve", "inlet": 0.03, "outlet": 0.04, "elevation": 30.0},
+    }
     gate = {"type": "valve", "from": "src", "to": "a", "area": 0.05, "discharge_coefficient": 0.8}
-    links = {"gate": gate | {"opening": {"start": 0.5, "duration": 1.0, "value": [1.0, 0.0]}},
-             "p1": line("a", "b", 450.0, 0.4, friction=friction),
-             "p2": line("b", "end", 300.0, 0.4, friction=friction)}  # fmt: skip
+    links = {
+        "gate": gate | {"opening": {"start": 0.5, "duration": 1.0, "value": [1.0, 0.0]}},
+        "p1": line("a", "b", 450.0, 0.4, friction=friction),
+        "p2": line("b", "end", 300.0, 0.4, friction=friction),
+    }
     numerics = {"pipe_model": "delay-line", "step": h, "method": "rk4"}
     return scene(nodes, links, 12.0, numerics, ["b.pressure", "b.air_volume"], 0.02)
 

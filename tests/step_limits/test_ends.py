@@ -33,16 +33,23 @@ def spectrum(scheme: str, cells: int, end: dict) -> np.ndarray:
 
 def stepping(scheme: str, cells: int, end: dict, courant: float):
     """h J of a pipe at a Courant number, and its model."""
-    nodes, links = {"lake": lake(50.0), "end": end}, {"main": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)}
+    nodes, links = (
+        {"lake": lake(50.0), "end": end},
+        {"main": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)},
+    )
     numerics = {"scheme": scheme, "method": "ssp-rk3", "step": courant * LENGTH / cells / SPEED}
     model = fvsolve.build(fvsolve.load(scene(nodes, links, 10.0, numerics, ["lake.pressure"], 0.1)))
-    return numerics["step"] * np.array([model.rhs(0.0, unit) for unit in np.eye(model.y_size)]).T, model
+    return numerics["step"] * np.array(
+        [model.rhs(0.0, unit) for unit in np.eye(model.y_size)]
+    ).T, model
 
 
 def powered(z: np.ndarray) -> float:
     """Norm of the matrix of a thousand steps of ssp-rk3."""
     one = np.eye(len(z))
-    return np.linalg.norm(np.linalg.matrix_power(one + z @ (one + z / 2.0 @ (one + z / 3.0)), 1000), 2)
+    return np.linalg.norm(
+        np.linalg.matrix_power(one + z @ (one + z / 2.0 @ (one + z / 3.0)), 1000), 2
+    )
 
 
 def courant_limit(scheme: str, cells: int, method: str) -> float:
@@ -88,7 +95,9 @@ def test_a_limiter_tolerates_a_little_more_than_its_smooth_limit(limiter):
             nodes = {"lake": lake(50.0), "end": junction()}
             links = {"p": pipe("lake", "end", LENGTH, 0.3, SPEED, cells)}
             numerics = {"scheme": "muscl", "limiter": limiter, "method": "ssp-rk3", "step": h}
-            model = fvsolve.build(fvsolve.load(scene(nodes, links, 150 * h, numerics, ["lake.pressure"], 0.1)))
+            model = fvsolve.build(
+                fvsolve.load(scene(nodes, links, 150 * h, numerics, ["lake.pressure"], 0.1))
+            )
             state = fvsolve.initial_state(model)
             state.y[:] = rng.normal(size=len(state.y))
             after = fvsolve.advance(model, state, 150 * h)
@@ -104,12 +113,21 @@ def test_a_short_pipe_without_returning_waves_is_only_doubtful():
         links = {"main": pipe("b" if far else "a", "c" if far else "b", LENGTH, 0.3, SPEED, 4)}
         if far:
             nodes |= {"c": junction(), "d": junction()}
-            links |= {"one": pipe("a", "b", 1500.0, 0.3, SPEED, 45), "two": pipe("c", "d", 1500.0, 0.3, SPEED, 45)}
-        numerics = {"scheme": "linear-upwind", "method": "ssp-rk3", "step": 0.55 * LENGTH / 4 / SPEED}
+            links |= {
+                "one": pipe("a", "b", 1500.0, 0.3, SPEED, 45),
+                "two": pipe("c", "d", 1500.0, 0.3, SPEED, 45),
+            }
+        numerics = {
+            "scheme": "linear-upwind",
+            "method": "ssp-rk3",
+            "step": 0.55 * LENGTH / 4 / SPEED,
+        }
         case = scene(nodes, links, 20.0, numerics, ["main.flow"], 0.1)
         case["nodes"]["a"]["head"] = {"time": [0.0, 1.0], "value": [50.0, 40.0], "kind": "step"}
         result = fvsolve.run(case)
-        found.append((result.ok, [one.place for one in result.warnings if one.kind == "step-limit"]))
+        found.append(
+            (result.ok, [one.place for one in result.warnings if one.kind == "step-limit"])
+        )
     assert found == [(False, ["links.main"]), (True, ["links.main"])]
 
 
@@ -124,9 +142,20 @@ def test_a_proved_limit_of_few_cells_separates_growth(cells, turned):
     for courant in (1.0, 1.05):
         h = courant * LENGTH / cells / SPEED
         nodes = {"lake": lake(50.0), "end": {"type": "inflow", "flow": 0.0}}
-        links = {"main": pipe(*(("end", "lake") if turned else ("lake", "end")), LENGTH, 0.3, SPEED, cells)}
-        result = fvsolve.run(scene(nodes, links, 20 * h, {"scheme": "upwind", "method": "euler", "step": h}, [], h))
-        found.append((result.ok, [(one.place, one.limit) for one in result.warnings if one.kind == "step-limit"]))
+        links = {
+            "main": pipe(
+                *(("end", "lake") if turned else ("lake", "end")), LENGTH, 0.3, SPEED, cells
+            )
+        }
+        result = fvsolve.run(
+            scene(nodes, links, 20 * h, {"scheme": "upwind", "method": "euler", "step": h}, [], h)
+        )
+        found.append(
+            (
+                result.ok,
+                [(one.place, one.limit) for one in result.warnings if one.kind == "step-limit"],
+            )
+        )
     assert found == [(True, []), (False, [("links.main", pytest.approx(1.0))])]
 
 
@@ -145,10 +174,14 @@ def test_noise_in_short_pipes_does_not_grow_at_courant_nine_tenths(scheme, metho
         links = {
             "one": pipe("lake", "tee", 100.0, 0.3, 1000.0, cells, friction=NO_FRICTION),
             "two": pipe("tee", "blind", 80.0, 0.2, 900.0, cells, friction=NO_FRICTION),
-            "three": pipe("tee", "shut", 130.0, 0.4, 1200.0, max(1, cells - 1), friction=NO_FRICTION),
+            "three": pipe(
+                "tee", "shut", 130.0, 0.4, 1200.0, max(1, cells - 1), friction=NO_FRICTION
+            ),
         }
         numerics = {"scheme": scheme, "method": method, "courant": 0.9}
-        model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, numerics, ["tee.pressure"], 0.1)))
+        model = fvsolve.build(
+            fvsolve.load(scene(nodes, links, 1.0, numerics, ["tee.pressure"], 0.1))
+        )
         state = fvsolve.initial_state(model)
         state.y[:] = rng.normal(size=len(state.y))
         before = np.max(np.abs(state.y))

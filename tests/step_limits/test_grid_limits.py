@@ -28,7 +28,17 @@ from fvsolve.errors import FvsolveError
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 IMPLICIT = [name for name, one in METHODS.items() if name == one.name and not one.explicit]
-DISTINCT = ["euler", "ssp-rk2", "ssp-rk3", "rk4", "dormand-prince", "ssp-rk10-4", "tsitouras", "verner-7"]  # R(s)
+# R(s)
+DISTINCT = [
+    "euler",
+    "ssp-rk2",
+    "ssp-rk3",
+    "rk4",
+    "dormand-prince",
+    "ssp-rk10-4",
+    "tsitouras",
+    "verner-7",
+]
 RK3_REAL = 2.5127453266183286  # 1 + q - 1 / q, q^3 = 4 + sqrt(17)
 KNOWN = [
     ("upwind", "euler", 1.0),
@@ -39,7 +49,8 @@ KNOWN = [
     ("linear-upwind", "ssp-rk2", 0.5),
     ("linear-upwind", "rk4", 2.785293563405282 / 4),
     ("fromm", "ssp-rk2", 1.0),
-    ("upwind3", "ssp-rk2", (2 / 3) ** (1 / 3)),  # nu^3 = 8 alpha, Re z = -alpha theta^4 + ..., alpha = 1/12
+    # nu^3 = 8 alpha, Re z = -alpha theta^4 + ..., alpha = 1/12
+    ("upwind3", "ssp-rk2", (2 / 3) ** (1 / 3)),
     ("central", "ssp-rk3", math.sqrt(3)),
     ("central", "rk4", 2 * math.sqrt(2)),
 ]
@@ -77,7 +88,11 @@ def test_euler_steps_grow_at_any_size_but_with_upwind(scheme):
 def test_no_method_that_is_a_stable_has_a_limit(scheme):
     for method in IMPLICIT:
         found = advection_limit(scheme, method)
-        assert analyse(method).a_stable and found.limit == math.inf and found.stable == ((0.0, math.inf),)
+        assert (
+            analyse(method).a_stable
+            and found.limit == math.inf
+            and found.stable == ((0.0, math.inf),)
+        )
         assert found.wave is None and found.growth is None
 
 
@@ -95,7 +110,8 @@ def test_some_limits_are_set_by_the_longest_waves_and_no_short_run_shows_them():
     assert slow.theta == 0.0 and 0 < slow.growth < 1e-5 and slow.steps > 1e6
     hidden = found["central", "verner-7"]  # at Courant number 1/2
     assert hidden.limit == 0.0 and 0 < hidden.growth < 1e-8 and hidden.steps > 1e9
-    assert found["upwind5", "ssp-rk2"].limit == 0.0  # |R|^2 - 1 is of order theta^4, the damping of order theta^6
+    # |R|^2 - 1 is of order theta^4, the damping of order theta^6
+    assert found["upwind5", "ssp-rk2"].limit == 0.0
 
 
 def phase(u: Fraction) -> tuple[Fraction, Fraction]:
@@ -132,20 +148,30 @@ def stepped(weights, method, courant: Fraction, u: Fraction) -> Fraction:
 @pytest.mark.in_turn
 @pytest.mark.parametrize("method", DISTINCT)
 @pytest.mark.parametrize("scheme", WEIGHTS)
-def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_a_wave_does_above(scheme, method):
+def test_exact_steps_of_exact_waves_do_not_grow_below_the_limit_and_a_wave_does_above(
+    scheme, method
+):
     found, weights = advection_limit(scheme, method), weights_of(scheme)
     slack = Fraction(1, 10**35) if found.digits else 0  # for rounded published digits
     near = Fraction(math.tan(min(found.theta, 3.1) / 2)).limit_denominator(4096)
     waves = {Fraction(k, 16) for k in range(1, 33)} | {Fraction(1, 2**k) for k in range(5, 22)}
-    waves |= {near * Fraction(100 + k, 100) for k in range(-10, 11)} | {Fraction(k) for k in (3, 5, 10, 100, 10**4)}
+    waves |= {near * Fraction(100 + k, 100) for k in range(-10, 11)} | {
+        Fraction(k) for k in (3, 5, 10, 100, 10**4)
+    }
     if found.limit:
         below = Fraction(found.limit) * (1 - Fraction(1, 10**6))
         for courant in (below, below / 2, below / 16):
             assert all(stepped(weights, method, courant, u) <= 1 + slack for u in waves if u > 0)
-    close = Fraction(math.tan(min(found.theta, math.pi - 1e-7) / 2)) if found.limit and found.theta else near
+    close = (
+        Fraction(math.tan(min(found.theta, math.pi - 1e-7) / 2))
+        if found.limit and found.theta
+        else near
+    )
     above = Fraction(found.limit) * (1 + Fraction(1, 10**6)) or Fraction(1, 1000)
     least = 1 + slack
-    assert any(stepped(weights, method, above, u) > least for u in {close} | {u for u in waves if u > 0})
+    assert any(
+        stepped(weights, method, above, u) > least for u in {close} | {u for u in waves if u > 0}
+    )
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
@@ -165,7 +191,11 @@ def test_the_symbol_is_that_of_the_compiled_weights(scheme):
 def test_downwind_differences_with_implicit_euler_are_stable_from_1_on():
     """|1 - nu z|^2 - 1 = 2 nu (nu - 1)(1 - cos theta), so implicit Euler is stable from nu = 1 on."""
     found = limit_of(down, "downwind", "implicit-euler")
-    assert found.limit == 0.0 and found.stable == ((pytest.approx(1.0, rel=1e-11), math.inf),) and found.proved
+    assert (
+        found.limit == 0.0
+        and found.stable == ((pytest.approx(1.0, rel=1e-11), math.inf),)
+        and found.proved
+    )
 
 
 @pytest.mark.parametrize("method", ["trapezoid", "gauss-4", "radau-iia-5", "rk4", "alexander-2"])
@@ -195,7 +225,8 @@ def brute(weights, method, courant: float) -> float:
         np.longdouble(w.numerator) / w.denominator * wave ** (k - 2) for k, w in enumerate(weights)
     )
     up, down = (
-        [np.longdouble(x.numerator) / x.denominator for x in p.coefficients] for p in (r.numerator, r.denominator)
+        [np.longdouble(x.numerator) / x.denominator for x in p.coefficients]
+        for p in (r.numerator, r.denominator)
     )
     s = np.longdouble(courant) * z
     over, under = (sum(x * s**k for k, x in enumerate(one)) for one in (up, down))
@@ -203,7 +234,15 @@ def brute(weights, method, courant: float) -> float:
 
 
 numbers = st.integers(-12, 12).map(lambda n: Fraction(n, 12))
-METHODS_FOR_ANY = ["euler", "ssp-rk2", "rk4", "dormand-prince", "implicit-euler", "radau-iia-3", "lobatto-iiic-2"]
+METHODS_FOR_ANY = [
+    "euler",
+    "ssp-rk2",
+    "rk4",
+    "dormand-prince",
+    "implicit-euler",
+    "radau-iia-3",
+    "lobatto-iiic-2",
+]
 
 
 @examples(40, phases=[Phase.generate])
@@ -218,7 +257,9 @@ def test_ranges_of_any_weights_are_those_that_sampling_shows(four, method):
         top = high if math.isfinite(high) else 10 * low + 10
         for part in (0.001, 0.3, 0.7, 0.999):
             assert brute(weights, method, low + part * (top - low)) <= 1e-15
-    outside = [0.01, 0.1, 0.5, 1.3, 2.7, 6.1, 20.0] + [x * f for x in edges if 0 < x < math.inf for f in (0.97, 1.03)]
+    outside = [0.01, 0.1, 0.5, 1.3, 2.7, 6.1, 20.0] + [
+        x * f for x in edges if 0 < x < math.inf for f in (0.97, 1.03)
+    ]
     for courant in outside:
         if not any(low <= courant <= high for low, high in found.stable):
             assert brute(weights, method, courant) > 0
@@ -228,12 +269,19 @@ def test_ranges_of_any_weights_are_those_that_sampling_shows(four, method):
 
 
 def test_a_square_that_touches_zero_at_a_corner_is_not_negative():
-    assert negative_point([[0, 0, 1], [0, -2, 0], [1, 0, 0]], Fraction(0), Fraction(1)) in (None, "open")  # (x - y)^2
+    # (x - y)^2
+    assert negative_point([[0, 0, 1], [0, -2, 0], [1, 0, 0]], Fraction(0), Fraction(1)) in (
+        None,
+        "open",
+    )
     assert negative_point([[0, 1], [1, 0]], Fraction(0), Fraction(3)) is None  # x + y
 
 
 @examples(60)
-@given(st.lists(st.lists(st.integers(-5, 5), min_size=4, max_size=4), min_size=3, max_size=4), st.integers(0, 40))
+@given(
+    st.lists(st.lists(st.integers(-5, 5), min_size=4, max_size=4), min_size=3, max_size=4),
+    st.integers(0, 40),
+)
 def test_a_located_point_is_negative_and_where_none_is_located_none_exists(g, lift):
     g = [list(row) for row in g]
     g[0][0] += lift
@@ -281,14 +329,23 @@ def test_json_equals_the_result_of_python(command_in_folder):
     found = json.loads(out)
     assert code == 0 and found.keys() == {"limits", "measured", "limited"}
     assert found["limits"] == json.loads(
-        json.dumps([one.plain() for one in advection_limits(["upwind3", "central"], ["ssp-rk3", "gauss-4"])])
+        json.dumps(
+            [
+                one.plain()
+                for one in advection_limits(["upwind3", "central"], ["ssp-rk3", "gauss-4"])
+            ]
+        )
     )
     assert [one["limit"] for one in found["limits"]][2:] == [None, None]
 
 
 def test_a_single_pair_is_explained(command_in_folder):
     _, out, _ = command_in_folder("stability", "--scheme", "upwind3", "--method", "ssp-rk2")
-    assert "0.8735804647" in out and "longest waves" in out and "thousandfold in 1.137e+06 steps" in out
+    assert (
+        "0.8735804647" in out
+        and "longest waves" in out
+        and "thousandfold in 1.137e+06 steps" in out
+    )
     _, out, _ = command_in_folder("stability", "--scheme", "upwind3", "--method", "gauss-4")
     assert "stable at every Courant number" in out
     _, out, _ = command_in_folder("stability", "--scheme", "central", "--method", "euler")
@@ -320,12 +377,16 @@ def test_a_scheme_without_fixed_weights_has_no_exact_limit():
 def test_growth_is_quoted_on_request(courant, command_in_folder):
     """The growth at a given Courant number is stated; Euler with central differences has |R(iy)|^2 = 1 + nu^2."""
     one = advection_limit("central", "euler", courant)
-    assert one.courant == courant and one.growth == pytest.approx(math.hypot(1, courant) - 1, rel=1e-12)
+    assert one.courant == courant and one.growth == pytest.approx(
+        math.hypot(1, courant) - 1, rel=1e-12
+    )
     assert one.steps == pytest.approx(math.log(1e3) / math.log(math.hypot(1, courant)), rel=1e-9)
     for scheme, method in (("central", "rk4"), ("upwind5", "gauss-4")):
         still = advection_limit(scheme, method, courant)
         assert still.growth == 0.0 and still.steps is None
-    _, out, _ = command_in_folder("stability", "--scheme", "upwind5", "--method", "gauss-4", "--courant", str(courant))
+    _, out, _ = command_in_folder(
+        "stability", "--scheme", "upwind5", "--method", "gauss-4", "--courant", str(courant)
+    )
     assert f"at Courant number {courant:g} no wave grows" in out
 
 
@@ -345,21 +406,28 @@ def test_growth_below_rounding_is_seen(courant):
 
 def test_growth_a_step_is_the_greatest_amplification():
     growth, theta = growth_of(weights_of("central"), "euler", 0.5)
-    assert growth == pytest.approx(math.sqrt(1.25) - 1, rel=1e-12) and theta == pytest.approx(math.pi / 2, abs=1e-6)
+    assert growth == pytest.approx(math.sqrt(1.25) - 1, rel=1e-12) and theta == pytest.approx(
+        math.pi / 2, abs=1e-6
+    )
 
 
 def test_the_page_shows_computed_values():
     """The first table of docs/stability-grid.md contains the computed limits, and the letters of their waves."""
     page = folders.page("stability-grid")
     rows = [
-        line.strip("| ").split(" | ") for line in page.split("## Runs on")[0].splitlines() if line.startswith("| `")
+        line.strip("| ").split(" | ")
+        for line in page.split("## Runs on")[0].splitlines()
+        if line.startswith("| `")
     ]
     shown = {name.strip("` "): row[1:] for row in rows for name in row[0].split(",")}
     assert sorted(shown) == sorted(EXPLICIT)
     for name, cells in shown.items():
         for scheme, cell in zip(WEIGHTS, cells, strict=True):
             one = advection_limit(scheme, name)
-            assert cell == (f"{one.limit:.7f} {one.wave[0]}" if one.limit else "none"), (scheme, name)
+            assert cell == (f"{one.limit:.7f} {one.wave[0]}" if one.limit else "none"), (
+                scheme,
+                name,
+            )
 
 
 def test_all_keys_of_a_limit_are_on_the_page():

@@ -10,7 +10,19 @@ from importlib import import_module
 import numpy as np
 import pytest
 from reference.bodies import pendulum
-from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
+from reference.scenes import (
+    AMBIENT,
+    WATER,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    ramp,
+    reservoir,
+    scene,
+    step,
+    tank,
+)
 from scipy.optimize import brentq
 
 import fvsolve
@@ -33,7 +45,10 @@ def notices_of(notices, kind: str) -> list:
 
 def swinging(mass: float, stiffness: float, damping: float, end: float, **numerics) -> dict:
     """Case of a displaced mass on a spring with a damper."""
-    nodes = {"wall": {"type": "frame"}, "load": {"type": "mass", "mass": mass, "initial_position": 0.01}}
+    nodes = {
+        "wall": {"type": "frame"},
+        "load": {"type": "mass", "mass": mass, "initial_position": 0.01},
+    }
     links = {
         "spring": {"type": "spring", "from": "wall", "to": "load", "stiffness": stiffness},
         "damper": {"type": "damper", "from": "wall", "to": "load", "damping": damping},
@@ -59,15 +74,24 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
         t, w = result.t, s.imag
         right = 0.01 * np.exp(-60.0 * t) * (np.cos(w * t) + 60.0 / w * np.sin(w * t))
         wrong = np.mean(np.abs(result["load.position"] - right)) / 0.01
-        assert result.ok is bool(wrong < 0.05 and not grows)  # Euler is wrong: nearly no decay at its limit
-        assert grows or np.abs(result["load.position"]).max() == 0.01 and not notices_of(result.warnings, "step-limit")
+        # Euler is wrong: nearly no decay at its limit
+        assert result.ok is bool(wrong < 0.05 and not grows)
+        assert (
+            grows
+            or np.abs(result["load.position"]).max() == 0.01
+            and not notices_of(result.warnings, "step-limit")
+        )
         if grows and result.reason == "finished":
             assert np.abs(result["load.position"]).max() > 100.0
         if grows:
-            assert before[0].limit == pytest.approx(limit, rel=2e-2) and before[0].place.startswith("load.")
+            assert before[0].limit == pytest.approx(limit, rel=2e-2) and before[0].place.startswith(
+                "load."
+            )
 
 
-@pytest.mark.parametrize("given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)])
+@pytest.mark.parametrize(
+    "given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)]
+)
 def test_diffusion_in_a_pipe_has_the_limit_of_the_real_axis(given, rate):
     """The limit of rk4 for decay at 400 1/s is 2.7853 / 400 s = 6.963 ms.
 
@@ -77,13 +101,22 @@ def test_diffusion_in_a_pipe_has_the_limit_of_the_real_axis(given, rate):
     links, limit = {"main": pipe("lake", "gate", 100.0, 0.1, 1000.0, 10)}, 2.785293563 / rate
     for factor, grows in ((0.99, False), (1.06, True)):
         case = scene(
-            nodes, links, 4.0, {"scheme": "upwind", "method": "rk4", "step": factor * limit}, ["main.dye@0.5"], 0.1
+            nodes,
+            links,
+            4.0,
+            {"scheme": "upwind", "method": "rk4", "step": factor * limit},
+            ["main.dye@0.5"],
+            0.1,
         )
         case["scalars"] = {"dye": given}
         before = step_limits(model_of(case))
-        assert [one.ok for one in before] == ([False] if grows else []) and fvsolve.run(case).ok is not grows
+        assert [one.ok for one in before] == ([False] if grows else []) and fvsolve.run(
+            case
+        ).ok is not grows
         if grows:
-            assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "main.dye"
+            assert (
+                before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "main.dye"
+            )
 
 
 def capillary(courant: float, scheme: str) -> dict:
@@ -96,7 +129,13 @@ def capillary(courant: float, scheme: str) -> dict:
     links = {"line": pipe("a", "b", 10.0, 1e-3, 1000.0, 10, friction=rough)}
     numerics = {"scheme": scheme, "method": "rk4", "courant": courant}
     return scene(
-        nodes, links, 2.0, numerics, ["line.flow"], 0.02, fluid={**WATER, "viscosity": 0.3, "vapor_pressure": 0.0}
+        nodes,
+        links,
+        2.0,
+        numerics,
+        ["line.flow"],
+        0.02,
+        fluid={**WATER, "viscosity": 0.3, "vapor_pressure": 0.0},
     )
 
 
@@ -104,10 +143,17 @@ def capillary(courant: float, scheme: str) -> dict:
 def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme):
     """Friction with a rate above that of waves gives a notice with its own limit, within 10 % of growth in the run."""
     (one,) = step_limits(model_of(capillary(0.9, scheme)))
-    assert not one.ok and one.key == "courant" and one.place == "line" and one.limit < 2.785293563 / 9600.0
+    assert (
+        not one.ok
+        and one.key == "courant"
+        and one.place == "line"
+        and one.limit < 2.785293563 / 9600.0
+    )
     bears = 0.9 * one.limit / one.value
     for factor, grows in ((0.98, False), (1.1, True)):
-        assert [x.ok for x in step_limits(model_of(capillary(factor * bears, scheme)))] == ([False] if grows else [])
+        assert [x.ok for x in step_limits(model_of(capillary(factor * bears, scheme)))] == (
+            [False] if grows else []
+        )
         result = fvsolve.run(capillary(factor * bears, scheme))
         grown = bool(notices_of(result.warnings, "growth")) or "not finite" in result.reason
         assert result.ok is not grows and grown is grows
@@ -116,15 +162,29 @@ def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme
 def test_friction_that_remembers_has_a_limit_of_its_own():
     """Relaxation terms of unsteady friction have a limit of their own, between 3.9 and 4.1 ms."""
     nodes, links = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}, {}
-    links["line"] = pipe("a", "b", 100.0, 0.01, 1000.0, 10, friction={"model": "unsteady", "roughness": 0.0})
+    links["line"] = pipe(
+        "a", "b", 100.0, 0.01, 1000.0, 10, friction={"model": "unsteady", "roughness": 0.0}
+    )
     fluid = {**WATER, "viscosity": 0.03, "vapor_pressure": 0.0}
     found = []
     for h in (9e-3, 3.9e-3, 4.1e-3):
         case = scene(
-            nodes, links, 6.0, {"scheme": "upwind", "method": "rk4", "step": h}, ["line.flow"], 0.1, fluid=fluid
+            nodes,
+            links,
+            6.0,
+            {"scheme": "upwind", "method": "rk4", "step": h},
+            ["line.flow"],
+            0.1,
+            fluid=fluid,
         )
         before, result = step_limits(model_of(case)), fvsolve.run(case)
-        found.append(([(x.place, x.ok) for x in before], result.ok, bool(notices_of(result.warnings, "growth"))))
+        found.append(
+            (
+                [(x.place, x.ok) for x in before],
+                result.ok,
+                bool(notices_of(result.warnings, "growth")),
+            )
+        )
     beyond = ([("line.memory", False)], False, True)
     assert found == [beyond, ([], True, False), beyond]
 
@@ -133,7 +193,13 @@ def test_diffusion_in_a_basin_has_the_limit_of_its_shortest_wave():
     """Diffusion in 8 x 8 cells of 1/8 m between walls has the greatest rate 4 D cos^2(pi / 16) (64 + 64) 1/s."""
     spreads, limit = 0.01, 2.785293563 / (4 * 0.01 * 128 * math.cos(math.pi / 16) ** 2)
     dye = "exp(-100*((x-0.3)^2+(y-0.5)^2))"
-    pool = {"type": "basin", "physics": "transport", "size": [1.0, 1.0], "cells": [8, 8], "scalars": {"dye": dye}}
+    pool = {
+        "type": "basin",
+        "physics": "transport",
+        "size": [1.0, 1.0],
+        "cells": [8, 8],
+        "scalars": {"dye": dye},
+    }
     pool["velocity"] = {"u": "0*x", "v": "0*y"}
     for factor, grows in ((0.99, False), (1.06, True)):
         h = factor * limit
@@ -144,7 +210,9 @@ def test_diffusion_in_a_basin_has_the_limit_of_its_shortest_wave():
         assert [one.ok for one in before] == ([False] if grows else []) and result.ok is not grows
         assert bool(notices_of(result.warnings, "growth")) is grows
         if grows:
-            assert before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "pool.dye"
+            assert (
+                before[0].limit == pytest.approx(limit, rel=1e-2) and before[0].place == "pool.dye"
+            )
 
 
 def vessel(end: float, first=1.0, second=1.0, pressure=None, volume=0.01, **numerics) -> dict:
@@ -190,7 +258,11 @@ def test_a_vessel_that_swings_between_wrong_pressures_is_not_ok(how, method):
 @pytest.mark.parametrize("how", ["narrowed slowly", "opened at once"])
 def test_at_a_stable_step_the_same_vessel_is_right_without_a_notice(how):
     result = fvsolve.run(SWINGS[how](method="rk4", step=2e-5))
-    assert result.ok and not notices_of(result.warnings, "step-error") and not notices_of(result.warnings, "step-limit")
+    assert (
+        result.ok
+        and not notices_of(result.warnings, "step-error")
+        and not notices_of(result.warnings, "step-limit")
+    )
     right = fvsolve.run(SWINGS[how](**{k: v for k, v in EXACT.items() if k != "scheme"}))
     at = np.searchsorted(result.t, right.t[-1])
     assert result["c.pressure"][at] == pytest.approx(right["c.pressure"][-1], rel=1e-6)
@@ -201,7 +273,11 @@ def draining(method: str, parts: float) -> tuple:
     end = math.sqrt(3.0) * 2.0 / (0.61 * math.pi / 4 * 0.05**2 * math.sqrt(9.80665 / 2.0))
     nodes = {"tank": tank(2.0, 3.0), "below": reservoir(AMBIENT)}
     numerics = {"method": method, "step": end / parts}
-    result = fvsolve.run(scene(nodes, {"hole": hole("tank", "below", 0.05)}, end, numerics, ["tank.level"], end / 100))
+    result = fvsolve.run(
+        scene(
+            nodes, {"hole": hole("tank", "below", 0.05)}, end, numerics, ["tank.level"], end / 100
+        )
+    )
     return result, float(np.mean(np.abs(result["tank.level"] / 3.0 - (1.0 - result.t / end) ** 2)))
 
 
@@ -209,8 +285,15 @@ def draining(method: str, parts: float) -> tuple:
 def test_implicit_steps_that_are_too_long_are_reported_though_nothing_grows(parts, verdict):
     """Steps of implicit Euler that are too long for a draining tank give a notice and fail the run."""
     result, wrong = draining("implicit-euler", parts)
-    assert result.reason == "finished" and [one.ok for one in notices_of(result.warnings, "step-error")] == verdict
-    assert result.ok is (False not in verdict) and (wrong > 0.1 or result.ok) and (wrong < 0.05 or not result.ok)
+    assert (
+        result.reason == "finished"
+        and [one.ok for one in notices_of(result.warnings, "step-error")] == verdict
+    )
+    assert (
+        result.ok is (False not in verdict)
+        and (wrong > 0.1 or result.ok)
+        and (wrong < 0.05 or not result.ok)
+    )
 
 
 @pytest.mark.parametrize("method", ["trapezoid", "radau-iia-3"])
@@ -252,32 +335,68 @@ def test_waves_of_a_hundred_times_joukowskys_pressure_below_the_threshold_of_gro
     The linearised scheme grows until its weights change.
     """
     nodes = {"lake": lake(100.0), "end": junction(step(0.1, 0.05, 0.0))}
-    links = {"main": pipe("lake", "end", 1000.0, 0.3, 1000.0, 50, friction={"model": "quasi-steady", "factor": 0.02})}
+    links = {
+        "main": pipe(
+            "lake",
+            "end",
+            1000.0,
+            0.3,
+            1000.0,
+            50,
+            friction={"model": "quasi-steady", "factor": 0.02},
+        )
+    }
     numerics = {"scheme": "weno5", "method": "rodas-4", "step": 0.6}
     result = fvsolve.run(scene(nodes, links, 8.1, numerics, ["end.pressure"], 0.05))
     (notice,) = notices_of(result.warnings, "step-error")
-    assert np.ptp(result["end.pressure"]) > 1e7 and not result.ok and not notice.ok and notice.value > 1.0
+    assert (
+        np.ptp(result["end.pressure"]) > 1e7
+        and not result.ok
+        and not notice.ok
+        and notice.value > 1.0
+    )
 
 
 def test_a_constant_state_is_ok_with_a_notice_of_the_limit():
     result = fvsolve.run(vessel(1.0, method="euler", step=0.01))
     (one,) = notices_of(result.warnings, "step-limit")
-    assert result.ok and one.ok and "this run shows no growth" in one.text and np.ptp(result["c.pressure"]) < 1.0
+    assert (
+        result.ok
+        and one.ok
+        and "this run shows no growth" in one.text
+        and np.ptp(result["c.pressure"]) < 1.0
+    )
 
 
 def test_chatter_about_a_drop_of_zero_that_is_too_small_to_matter_is_left_in_peace():
     """Two levels that become equal in finite time and then alternate by 1e-7 m under Euler steps give no notice."""
     nodes = {"one": tank(1.0, 3.0), "two": tank(1.0, 2.0)}
     result = fvsolve.run(
-        scene(nodes, {"way": hole("one", "two", 0.03)}, 4000.0, {"method": "euler", "step": 1.0}, ["one.level"], 40.0)
+        scene(
+            nodes,
+            {"way": hole("one", "two", 0.03)},
+            4000.0,
+            {"method": "euler", "step": 1.0},
+            ["one.level"],
+            40.0,
+        )
     )
-    assert result.ok and not notices_of(result.warnings, "step-error") and not notices_of(result.warnings, "step-limit")
+    assert (
+        result.ok
+        and not notices_of(result.warnings, "step-error")
+        and not notices_of(result.warnings, "step-limit")
+    )
     assert result["one.level"][-1] == pytest.approx(2.5, abs=1e-5)
 
 
 def test_two_bladders_and_a_column_are_reported_by_check_as_unstable_with_euler():
     nodes = {
-        name: {"type": "accumulator", "volume": volume, "precharge": 4.877e5, "initial_pressure": pressure}
+        name: {
+            "type": "accumulator",
+            "volume": volume,
+            "precharge": 4.877e5,
+            "initial_pressure": pressure,
+        }
         for name, volume, pressure in (("a", 0.00499, 1.2e6), ("b", 0.9755, 2.57e5))
     }
     way = {"type": "rigid-column", "from": "a", "to": "b", "length": 31.86, "diameter": 0.02}
@@ -293,7 +412,11 @@ def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
     assert not lumped_modes(model_of(case), "euler", 1e-4) and fvsolve.run(case).ok
     case["numerics"]["end"] = 1e6 * 1e-4
     (mode,) = lumped_modes(model_of(case), "euler", 1e-4)
-    assert math.log(mode.growth) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.outside_cells and mode.resolved
+    assert (
+        math.log(mode.growth) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2)
+        and mode.outside_cells
+        and mode.resolved
+    )
 
 
 @pytest.mark.in_turn
@@ -305,13 +428,21 @@ def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds, implicit):
         rng = np.random.default_rng(seed)
         case, spread = drawn(rng)
         if implicit:
-            case["numerics"]["method"] = str(rng.choice(["implicit-euler", "trapezoid", "rodas-4", "tr-bdf2"]))
+            case["numerics"]["method"] = str(
+                rng.choice(["implicit-euler", "trapezoid", "rodas-4", "tr-bdf2"])
+            )
             case["numerics"]["step"] *= float(np.exp(rng.uniform(0.0, 4.0)))
-        result, right = fvsolve.run(case), fvsolve.run(case | {"numerics": {"end": case["numerics"]["end"], **EXACT}})
+        result, right = (
+            fvsolve.run(case),
+            fvsolve.run(case | {"numerics": {"end": case["numerics"]["end"], **EXACT}}),
+        )
         wrong = 0.0
         for name, range_ in spread.items():
             found = np.interp(right.t, result.t, result[name])
-            wrong = max(wrong, float(np.mean(np.abs(found - right[name]))) / max(range_, np.ptp(right[name])))
+            wrong = max(
+                wrong,
+                float(np.mean(np.abs(found - right[name]))) / max(range_, np.ptp(right[name])),
+            )
         assert result.ok or wrong > 0.01, (seed, wrong, result.warnings)
         assert not result.ok or wrong < 0.1, (seed, wrong)
 
@@ -323,7 +454,10 @@ def drawn(rng) -> tuple[dict, dict[str, float]]:
     numerics = {"method": str(rng.choice(["euler", "improved-euler", "ssp-rk3", "rk4"]))}
     if rng.random() < 0.3:
         h *= 1e4
-        nodes = {"a": tank(float(rng.uniform(0.01, 0.3)), 4.0), "b": tank(float(rng.uniform(0.01, 0.3)), 2.0)}
+        nodes = {
+            "a": tank(float(rng.uniform(0.01, 0.3)), 4.0),
+            "b": tank(float(rng.uniform(0.01, 0.3)), 2.0),
+        }
         links, spread = {"way": hole("a", "b", 0.05)}, {"a.level": 2.0, "b.level": 2.0}
     else:
         names = ["a", "b", "c"][: rng.integers(1, 4)]
@@ -354,18 +488,29 @@ def test_a_resumed_run_retains_its_observations(tmp_path, monkeypatch):
     assert notices_of(resumed.warnings, "step-error")
 
 
-MASS, STIFF, END = 2.0, 32.0, 200.0  # mass [kg] and stiffness [N/m] of an oscillator with 4 rad/s; end [s]
+# mass [kg] and stiffness [N/m] of an oscillator with 4 rad/s; end [s]
+MASS, STIFF, END = 2.0, 32.0, 200.0
 
 
 def with_pond(nodes, links, probes, method="ssp-rk2", **numerics):
     """Case of oscillating parts and a basin at rest, whose waves determine the step."""
     pond = {"type": "basin", "size": [4.0, 1.0], "cells": [16, 1], "level": 1.0}
     more = numerics or {"courant": 0.8}
-    return scene({**nodes, "pond": pond}, links, END, {"scheme": "muscl", "method": method, **more}, probes, 0.1)
+    return scene(
+        {**nodes, "pond": pond},
+        links,
+        END,
+        {"scheme": "muscl", "method": method, **more},
+        probes,
+        0.1,
+    )
 
 
 def sprung(damping=0.0, **more):
-    nodes = {"m": {"type": "mass", "mass": MASS, "initial_velocity": 0.1}, "ground": {"type": "frame"}}
+    nodes = {
+        "m": {"type": "mass", "mass": MASS, "initial_velocity": 0.1},
+        "ground": {"type": "frame"},
+    }
     links = {"s": {"type": "spring", "from": "ground", "to": "m", "stiffness": STIFF}}
     if damping:
         links["d"] = {"type": "damper", "from": "ground", "to": "m", "damping": damping}
@@ -374,7 +519,10 @@ def sprung(damping=0.0, **more):
 
 def grown(result) -> float:
     """Amplitude at the end over that at the start."""
-    return math.hypot(result["m.velocity"][-1], math.sqrt(STIFF / MASS) * result["m.position"][-1]) / 0.1
+    return (
+        math.hypot(result["m.velocity"][-1], math.sqrt(STIFF / MASS) * result["m.position"][-1])
+        / 0.1
+    )
 
 
 def swings_and_result(case):
@@ -389,7 +537,9 @@ def test_an_oscillation_amplified_by_ssp_rk2_is_reported_with_its_growth():
     h = END / result.summary["steps"]
     wanted = (1.0 + (math.sqrt(STIFF / MASS) * h) ** 4 / 4.0) ** (0.5 * END / h)
     assert 1.05 < wanted < 1.2
-    assert grown(result) == pytest.approx(wanted, rel=1e-4) and one.value == pytest.approx(wanted, rel=1e-3)
+    assert grown(result) == pytest.approx(wanted, rel=1e-4) and one.value == pytest.approx(
+        wanted, rel=1e-3
+    )
     assert (
         one.place in ("m.position", "m.velocity")
         and one.ok
@@ -403,7 +553,10 @@ def test_the_recommended_step_helps():
     courant = float(one.text.partition("numerics.courant = ")[2].partition(",")[0])
     _, result = swings_and_result(sprung(courant=courant))
     assert grown(result) == pytest.approx(1.01, abs=1e-4)
-    assert not swings_and_result(sprung(method="ssp-rk3"))[0] and not swings_and_result(sprung(method="rk4"))[0]
+    assert (
+        not swings_and_result(sprung(method="ssp-rk3"))[0]
+        and not swings_and_result(sprung(method="rk4"))[0]
+    )
 
 
 def test_damped_and_far_too_wrong_runs():

@@ -24,7 +24,9 @@ def test_a_negative_scale_is_a_fixed_size():
 def test_the_spectral_radius_weighs_states_by_the_sizes_of_their_errors():
     rates, states = np.array([4.0, 20.0]), np.array([1.0, 0.5])
     expected = np.linalg.norm(rates / SIZES) / np.linalg.norm(states / SIZES)
-    assert erk.quotient(rates, np.zeros(2), Y + states, Y, SCALE) == pytest.approx(expected, rel=1e-14)
+    assert erk.quotient(rates, np.zeros(2), Y + states, Y, SCALE) == pytest.approx(
+        expected, rel=1e-14
+    )
 
 
 def test_the_smoothed_error_weighs_states_by_the_sizes_of_their_errors(monkeypatch):
@@ -33,10 +35,21 @@ def test_the_smoothed_error_weighs_states_by_the_sizes_of_their_errors(monkeypat
     monkeypatch.setattr(run_handle, "call_factor", lambda *_: 0)
     monkeypatch.setattr(run_handle, "call_solve", lambda *_: None)
     run = SimpleNamespace(
-        k=np.array([[3.0, -1.0]]), increment=np.zeros(2), rate=np.zeros(2), y=np.array([Y, Y]), scale=SCALE,
-        control=np.zeros(1, loop_records.CONTROL), state=np.zeros(1, loop_records.STATE),
-        newton=np.zeros(1, loop_records.NEWTON), calls=np.zeros(20), structure=None, jacobian=None, factors=None,
-    )  # fmt: skip
+        k=np.array([[3.0, -1.0]]),
+        increment=np.zeros(2),
+        rate=np.zeros(2),
+        y=np.array([Y, Y]),
+        scale=SCALE,
+        control=np.zeros(1, loop_records.CONTROL),
+        state=np.zeros(1, loop_records.STATE),
+        newton=np.zeros(1, loop_records.NEWTON),
+        calls=np.zeros(20),
+        structure=None,
+        jacobian=None,
+        factors=None,
+    )
     run.control["size"] = 1e-3
     found = python(newton.smoothed_error)(None, run, 0.0, 0.1, 0, 1, np.array([1.0]), 1.0)
-    assert found == pytest.approx(np.linalg.norm(0.1 * run.k[0] / SIZES) / 1e-3 / np.sqrt(2.0), rel=1e-14)
+    assert found == pytest.approx(
+        np.linalg.norm(0.1 * run.k[0] / SIZES) / 1e-3 / np.sqrt(2.0), rel=1e-14
+    )

@@ -7,29 +7,52 @@ from reference.scenes import WATER
 
 import fvsolve
 
-ADAPTIVE = [("tr-bdf2", 1e-6), ("dormand-prince", 1e-8), ("bogacki-shampine", 1e-5), ("verner-7", 1e-6),
-            ("esdirk-4", 1e-4), ("radau-iia-5", 1e-6), ("rodas-4", 1e-6), ("auto", 1e-4)]  # fmt: skip
-METHODS = [*({"method": name, "rtol": rtol} for name, rtol in ADAPTIVE),
-           {"method": "rk4", "step": 40.0}, {"method": "gauss-4", "step": 60.0}]  # fmt: skip
+ADAPTIVE = [
+    ("tr-bdf2", 1e-6),
+    ("dormand-prince", 1e-8),
+    ("bogacki-shampine", 1e-5),
+    ("verner-7", 1e-6),
+    ("esdirk-4", 1e-4),
+    ("radau-iia-5", 1e-6),
+    ("rodas-4", 1e-6),
+    ("auto", 1e-4),
+]
+METHODS = [
+    *({"method": name, "rtol": rtol} for name, rtol in ADAPTIVE),
+    {"method": "rk4", "step": 40.0},
+    {"method": "gauss-4", "step": 60.0},
+]
 
 
 def filled(numerics, links=None, flow="0.064*(1 - t/50)", end=90.0, **tank):
     """Case of a tank of 1 m2 whose level is 4 m + 0.064 (t - t^2 / 100) m, with its peak of 5.6 m at 50 s."""
     return {
-        "schema": 1, "fluid": WATER,
-        "nodes": {"src": {"type": "inflow", "flow": flow}, "pot": {"type": "tank", "area": 1.0, "level": 4.0, **tank},
-                  "out": {"type": "reservoir", "head": 0.0}},
-        "links": {"fill": {"type": "valve", "from": "src", "to": "pot", "area": 0.1},
-                  "drain": {"type": "valve", "from": "pot", "to": "out", "area": 1e-3, "opening": 0.0}} | (links or {}),
-        "numerics": {"end": end, **numerics}, "output": {"every": end, "probes": ["pot.level"]},
-    }  # fmt: skip
+        "schema": 1,
+        "fluid": WATER,
+        "nodes": {
+            "src": {"type": "inflow", "flow": flow},
+            "pot": {"type": "tank", "area": 1.0, "level": 4.0, **tank},
+            "out": {"type": "reservoir", "head": 0.0},
+        },
+        "links": {
+            "fill": {"type": "valve", "from": "src", "to": "pot", "area": 0.1},
+            "drain": {"type": "valve", "from": "pot", "to": "out", "area": 1e-3, "opening": 0.0},
+        }
+        | (links or {}),
+        "numerics": {"end": end, **numerics},
+        "output": {"every": end, "probes": ["pot.level"]},
+    }
 
 
 def with_relay(numerics, on):
     """Case of the tank with a relay that opens its drain at the level `on`."""
     case = filled(numerics)
     case["links"]["drain"]["opening"] = {"control": "r"}
-    return case | {"controls": {"r": {"type": "relay", "input": "pot.level", "on": on, "off": 3.0, "initial": 0}}}
+    return case | {
+        "controls": {
+            "r": {"type": "relay", "input": "pot.level", "on": on, "off": 3.0, "initial": 0}
+        }
+    }
 
 
 @pytest.mark.parametrize("margin", [1e-3, 0.3])
@@ -54,8 +77,15 @@ def test_the_search_costs_nothing_where_nothing_is_near():
 def test_a_disc_bursts_at_the_first_of_two_peaks(method):
     """The level is 4 m + 0.5 m sin(2 pi t / 100 s); the disc bursts 1 mm below both peaks."""
     w = 2.0 * math.pi / 100.0
-    disc = {"type": "rupture-disc", "from": "pot", "area": 1e-4, "burst_pressure": 998.2 * 9.80665 * 4.499}
-    case = filled({"method": method, "rtol": 1e-5}, {"disc": disc}, f"{0.5 * w!r}*cos({w!r}*t)", 180.0)
+    disc = {
+        "type": "rupture-disc",
+        "from": "pot",
+        "area": 1e-4,
+        "burst_pressure": 998.2 * 9.80665 * 4.499,
+    }
+    case = filled(
+        {"method": method, "rtol": 1e-5}, {"disc": disc}, f"{0.5 * w!r}*cos({w!r}*t)", 180.0
+    )
     case["fluid"] = WATER | {"density": 998.2}
     (event,) = fvsolve.run(case).summary["events"]
     assert event["time"] == pytest.approx(math.asin(0.499 / 0.5) / w, rel=1e-3)
@@ -76,13 +106,25 @@ STIFFNESS, MASS, STOP, SPEED, WEIGHT = 1e6, 2.0, 0.48, 3.1315570887372, 9.80665
 def thrown(numerics):
     """Case of a mass thrown to 0.5 m, against a stop without damping at 0.48 m."""
     return {
-        "schema": 1, "fluid": WATER,
-        "nodes": {"ground": {"type": "frame"}, "m": {"type": "mass", "mass": MASS, "initial_velocity": SPEED}},
-        "links": {"weight": {"type": "force", "to": "m", "force": -MASS * WEIGHT},
-                  "stop": {"type": "end-stop", "from": "ground", "to": "m", "stiffness": STIFFNESS, "maximum": STOP}},
+        "schema": 1,
+        "fluid": WATER,
+        "nodes": {
+            "ground": {"type": "frame"},
+            "m": {"type": "mass", "mass": MASS, "initial_velocity": SPEED},
+        },
+        "links": {
+            "weight": {"type": "force", "to": "m", "force": -MASS * WEIGHT},
+            "stop": {
+                "type": "end-stop",
+                "from": "ground",
+                "to": "m",
+                "stiffness": STIFFNESS,
+                "maximum": STOP,
+            },
+        },
         "numerics": {"end": 0.6, **numerics},
         "output": {"every": 0.6, "probes": ["m.position", "m.velocity", "stop.force"]},
-    }  # fmt: skip
+    }
 
 
 def after_the_stop(t):

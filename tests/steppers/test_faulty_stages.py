@@ -15,7 +15,8 @@ from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.core.steppers.run_handle import RHS
 from fvsolve.core.steppers.tableau import method_named
 
-FAULT_AT, FAULT, PLACE = 0.1, 2.0, 5.0  # time at which rates are not valid, their status and its place
+# time at which rates are not valid, their status and its place
+FAULT_AT, FAULT, PLACE = 0.1, 2.0, 5.0
 EXPLICIT = ["bogacki-shampine", "dormand-prince", "tsitouras", "verner-7"]
 IMPLICIT = ["esdirk-4", "tr-bdf2", "radau-iia-5", "rodas-4", "rodas-5p"]
 
@@ -29,7 +30,11 @@ def decay(t, y, dydt, out, handle):
 
 @pytest.fixture(scope="module")
 def functions():
-    observers = ode.observers() if ode.COMPILING else (ode._no_fused_step, ode._row, ode._nothing, ode._no_events)
+    observers = (
+        ode.observers()
+        if ode.COMPILING
+        else (ode._no_fused_step, ode._row, ode._nothing, ode._no_events)
+    )
     return *observers, ode._compile(numba.njit(decay), RHS) if ode.COMPILING else decay
 
 
@@ -41,7 +46,9 @@ def test_error_control_rejects_a_step_with_a_faulty_stage(name, functions):
     first = FAULT_AT / inner[0]
     stepper.y[0], stepper.state["step"] = 1.0, first
     stepper.times, stepper.rows = np.empty(0), np.zeros((1, 2))
-    stepper.set_control(mode=rec.TOLERANCE, size=1e-4, step_max=1e300, stop_at=1e300, budget=1.0, end=1.0)
+    stepper.set_control(
+        mode=rec.TOLERANCE, size=1e-4, step_max=1e300, stop_at=1e300, budget=1.0, end=1.0
+    )
     assert stepper.call(*functions, np.array([0]), ode.WHERE, stepper.no_floats) == rec.BUDGET_SPENT
     counts = stepper.counts()
     assert counts["rejections"] + counts["newton_failures"] == 1
@@ -62,7 +69,9 @@ def pulse(method: str) -> dict:
     return scene(nodes, links, 1.0, {"method": method, "step": 0.01}, ["X.head", "T.level"], 0.1)
 
 
-@pytest.mark.parametrize("method", ["rk4", "ssp-rk3", "dormand-prince", "rodas-5p", "alexander-3", "gauss-4"])
+@pytest.mark.parametrize(
+    "method", ["rk4", "ssp-rk3", "dormand-prince", "rodas-5p", "alexander-3", "gauss-4"]
+)
 def test_given_steps_end_at_a_faulty_stage_as_at_a_faulty_state(method):
     """Without the test of stages the run finished, and only its ledger showed the volume 5e-5 m3 that was not there."""
     result = fvsolve.run(pulse(method))
@@ -90,14 +99,18 @@ def functions_with_gap(functions):
 
 @pytest.mark.parametrize("silent", [False, True], ids=["status", "nan"])
 @pytest.mark.parametrize("name", EXPLICIT + IMPLICIT)
-def test_error_control_rejects_a_step_with_invalid_rates_at_its_end(name, silent, functions_with_gap):
+def test_error_control_rejects_a_step_with_invalid_rates_at_its_end(
+    name, silent, functions_with_gap
+):
     """The gap is at the end of the first step; the stages of Rosenbrock methods are not there."""
 
     def run(at: float, budget: float):
         stepper = Integrator(method_named(name), 3, 0, lambda: ode._full(3), np.ones(3))
         stepper.y[0], stepper.state["step"] = (1.0, at, float(silent)), 0.1
         stepper.times, stepper.rows = np.empty(0), np.zeros((1, 4))
-        stepper.set_control(mode=rec.TOLERANCE, size=1e-3, step_max=1e300, stop_at=1e300, budget=budget, end=1.0)
+        stepper.set_control(
+            mode=rec.TOLERANCE, size=1e-3, step_max=1e300, stop_at=1e300, budget=budget, end=1.0
+        )
         code = stepper.call(*functions_with_gap, np.array([0]), ode.WHERE, stepper.no_floats)
         return code, stepper.y[stepper.progress[0]["now"], 0], stepper
 

@@ -22,7 +22,15 @@ def closing(**numerics) -> dict:
         "low": reservoir(283e3, elevation=0.0),
         "n0": junction(elevation=2.631),
     }
-    return scene(nodes, {"p0": main, "out": out}, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=TABLE)
+    return scene(
+        nodes,
+        {"p0": main, "out": out},
+        1.0,
+        numerics,
+        ["n0.pressure", "out.flow"],
+        0.05,
+        fluid=TABLE,
+    )
 
 
 def fork(**numerics) -> dict:
@@ -31,10 +39,12 @@ def fork(**numerics) -> dict:
     Newton iterations from the end of the last step fail; along a growing step the stage is found.
     """
     nodes = {
-        "high": lake(34.6, elevation=0.0), "low": reservoir(262.4e3, elevation=0.0), "n0": junction(elevation=3.888),
+        "high": lake(34.6, elevation=0.0),
+        "low": reservoir(262.4e3, elevation=0.0),
+        "n0": junction(elevation=3.888),
         "n1": {"type": "accumulator", "volume": 0.8331, "gas_volume": 0.05, "elevation": -4.406},
         "n2": tank(1.194, 15.8, elevation=-1.168),
-    }  # fmt: skip
+    }
     smooth = {"model": "hazen-williams", "coefficient": 110.0}
     links = {
         "p0": pipe("high", "n0", 177.7, 0.1062, 1286.0, 6, friction=ROUGH, minor_loss=1.5),
@@ -42,7 +52,14 @@ def fork(**numerics) -> dict:
         "p2": pipe("n0", "n2", 300.0, 0.4, 1023.0, 8, friction=STEADY, minor_loss=1.5),
         "out": valve("n0", "low", 0.002601639, step(0.4286, 1.0, 0.5678)),
         "x0": pipe("n0", "n2", 62.06, 0.3502, 1210.0, 4, friction=smooth, minor_loss=1.5),
-        "x1": {"type": "rigid-column", "from": "n0", "to": "low", "length": 68.0, "diameter": 0.1, "friction": STEADY},
+        "x1": {
+            "type": "rigid-column",
+            "from": "n0",
+            "to": "low",
+            "length": 68.0,
+            "diameter": 0.1,
+            "friction": STEADY,
+        },
         "hole": {"type": "leak", "from": "n0", "coefficient": 1.929e-6},
     }
     return scene(nodes, links, 1.0, numerics, ["n0.pressure", "out.flow"], 0.05, fluid=MIXTURE)
@@ -50,10 +67,20 @@ def fork(**numerics) -> dict:
 
 def to_and_fro(**numerics) -> dict:
     """Case of a main before two valves and a relief valve, where stages solved in turn oscillate under weno5."""
-    nodes = {"high": lake(53.26, elevation=0.0), "low": reservoir(215.7e3, elevation=0.0),
-             "n0": junction(elevation=0.05578)}  # fmt: skip
-    relief = {"type": "relief-valve", "from": "high", "to": "n0", "area": 0.0005761, "set_pressure": 392.6e3,
-              "overpressure": 2e4, "time_constant": 0.2726}  # fmt: skip
+    nodes = {
+        "high": lake(53.26, elevation=0.0),
+        "low": reservoir(215.7e3, elevation=0.0),
+        "n0": junction(elevation=0.05578),
+    }
+    relief = {
+        "type": "relief-valve",
+        "from": "high",
+        "to": "n0",
+        "area": 0.0005761,
+        "set_pressure": 392.6e3,
+        "overpressure": 2e4,
+        "time_constant": 0.2726,
+    }
     links = {
         "p0": pipe("high", "n0", 129.9, 0.1003, 1118.0, 8, friction=STEADY, minor_loss=1.5),
         "out": valve("n0", "low", 0.006473770491803279, step(0.5423, 1.0, 0.5)),
@@ -66,11 +93,16 @@ def to_and_fro(**numerics) -> dict:
 def slowly(**numerics) -> dict:
     """Case of three pipes, whose last long step gains at most a fifth per turn of stages that are solved in turn."""
     nodes = {
-        "high": lake(48.17, elevation=0.0), "low": reservoir(150e3, elevation=0.0), "n0": junction(elevation=4.0),
+        "high": lake(48.17, elevation=0.0),
+        "low": reservoir(150e3, elevation=0.0),
+        "n0": junction(elevation=4.0),
         "n1": junction(0.002195, elevation=-0.4073),
         "n2": {"type": "inflow", "flow": 0.002244, "elevation": 4.195},
-    }  # fmt: skip
-    smooth, rough = {"model": "hazen-williams", "coefficient": 110.0}, {"model": "chezy-manning", "coefficient": 0.012}
+    }
+    smooth, rough = (
+        {"model": "hazen-williams", "coefficient": 110.0},
+        {"model": "chezy-manning", "coefficient": 0.012},
+    )
     links = {
         "p0": pipe("high", "n0", 224.2, 0.3333, 823.6, 8, friction=smooth, minor_loss=1.5),
         "p1": pipe("high", "n1", 75.24, 0.1909, 858.5, 7, friction=rough),
@@ -82,7 +114,10 @@ def slowly(**numerics) -> dict:
 
 
 SCENES = [
-    (closing, {"method": "implicit-euler", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
+    (
+        closing,
+        {"method": "implicit-euler", "scheme": "muscl", "limiter": "minmod", "courant": 3.471},
+    ),
     (closing, {"method": "trapezoid", "scheme": "muscl", "limiter": "minmod", "courant": 3.471}),
     (closing, {"method": "radau-iia-3", "scheme": "weno5", "courant": 0.8596}),
     (fork, {"method": "implicit-euler", "scheme": "weno5", "courant": 1.044}),
@@ -95,11 +130,17 @@ def settings_text(given) -> str:
     return given.__name__ if callable(given) else " ".join(str(one) for one in given.values())
 
 
-@pytest.mark.parametrize("at", range(len(SCENES)), ids=["-".join(map(settings_text, one)) for one in SCENES])
+@pytest.mark.parametrize(
+    "at", range(len(SCENES)), ids=["-".join(map(settings_text, one)) for one in SCENES]
+)
 def test_newton_finds_every_stage_and_parts_listed_the_other_way_round_take_the_same_steps(at):
     build, numerics = SCENES[at]
     case = build(**numerics)
-    turned = {**case, "nodes": dict(reversed(case["nodes"].items())), "links": dict(reversed(case["links"].items()))}
+    turned = {
+        **case,
+        "nodes": dict(reversed(case["nodes"].items())),
+        "links": dict(reversed(case["links"].items())),
+    }
     one, other = fvsolve.run(case), fvsolve.run(turned)
     assert one.reason == "finished"
     assert one.summary["newton_failures"] == 0
@@ -121,7 +162,9 @@ def test_a_step_without_a_solution_is_taken_in_parts_that_end_on_its_grid():
     0.225 s have solutions.
     """
     counts: dict = {}
-    found = integrate(flares, [1.0], [0.0, 0.3, 0.6, 1.2], "implicit-euler", step=0.3, counts=counts)
+    found = integrate(
+        flares, [1.0], [0.0, 0.3, 0.6, 1.2], "implicit-euler", step=0.3, counts=counts
+    )
 
     def end(y, h):
         return (1.0 - np.sqrt(1.0 - 4.0 * h * y)) / (2.0 * h)

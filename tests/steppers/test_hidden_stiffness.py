@@ -21,9 +21,13 @@ def windows_in(rates, start, lengths, size=1e-6, scale=1.0):
     """Ends of windows at which steps of Dormand and Prince have returned; rates : function (t, y) -> float64[n]"""
     y, t, found = np.array(start, dtype=float), 0.0, []
     run = SimpleNamespace(
-        returns=np.zeros((2, y.size)), state=np.zeros(1, loop_records.STATE), control=np.zeros(1, loop_records.CONTROL),
-        scale=np.full(y.size, scale), k=np.zeros((7, y.size)), y=np.zeros((2, y.size)),
-    )  # fmt: skip
+        returns=np.zeros((2, y.size)),
+        state=np.zeros(1, loop_records.STATE),
+        control=np.zeros(1, loop_records.CONTROL),
+        scale=np.full(y.size, scale),
+        k=np.zeros((7, y.size)),
+        y=np.zeros((2, y.size)),
+    )
     run.control["size"] = size
     nodes = A.sum(axis=1)
     for h in lengths:

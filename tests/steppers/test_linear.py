@@ -24,7 +24,9 @@ def values_on(structure: Structure, seed: int = 0) -> tuple[np.ndarray, np.ndarr
     """Random values by columns, and the dense matrix of n + m rows with these values."""
     values = np.random.default_rng(seed).normal(size=structure.nnz)
     pattern = structure.pattern
-    return values, csc_array((values, pattern.indices, pattern.indptr), shape=pattern.shape).toarray()
+    return values, csc_array(
+        (values, pattern.indices, pattern.indptr), shape=pattern.shape
+    ).toarray()
 
 
 def solved(structure: Structure, values: np.ndarray, shift, b: np.ndarray) -> np.ndarray:
@@ -56,13 +58,16 @@ def test_two_by_two_is_solved_by_the_inverse_of_the_course(kind):
     j, right = np.array([[1.0, 2.0], [-3.0, 4.0]]), np.array([1.0, -2.0])
     (a, b), (c, d) = 7.0 * np.eye(2) - j
     inverse = np.array([[d, -b], [-c, a]]) / (a * d - b * c)
-    assert solved(structure, j.T.ravel().copy(), 7.0, right) == pytest.approx(inverse @ right, rel=1e-14)
+    assert solved(structure, j.T.ravel().copy(), 7.0, right) == pytest.approx(
+        inverse @ right, rel=1e-14
+    )
 
 
 @pytest.mark.parametrize("kind", ["dense", "banded"])
 def test_rows_are_exchanged_where_a_pivot_is_zero(kind):
     structure = Structure(np.ones((3, 3), dtype=bool), kind)
-    j = np.array([[1.0, 2.0, 3.0], [4.0, 1.0, 6.0], [7.0, 8.0, 0.0]])  # shift 1 makes two pivots zero
+    # shift 1 makes two pivots zero
+    j = np.array([[1.0, 2.0, 3.0], [4.0, 1.0, 6.0], [7.0, 8.0, 0.0]])
     b = np.array([1.0, -2.0, 0.5])
     x = solved(structure, j.T.ravel().copy(), 1.0, b)
     assert (np.eye(3) - j) @ x == pytest.approx(b, rel=1e-13)
@@ -86,7 +91,15 @@ def test_rows_are_exchanged_all_along_a_band(width):
 def test_sparse_refuses_matrices_that_need_an_exchange_of_rows():
     structure = Structure(np.ones((3, 3), dtype=bool), "sparse")
     factor, _ = structure.functions()
-    assert factor(structure.shape, np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]), 1.0, np.zeros(structure.store_size)) > 0
+    assert (
+        factor(
+            structure.shape,
+            np.array([1.0, 0, 0, 0, 1, 0, 0, 0, 1]),
+            1.0,
+            np.zeros(structure.store_size),
+        )
+        > 0
+    )
 
 
 # pattern of the two waves of a pipe: each cell depends on its neighbours and, by friction, on its opposite wave
@@ -173,11 +186,14 @@ def test_a_singular_matrix_is_reported(kind):
     assert factor(structure.shape, np.array([1.0, 2.0, 4.0, 3.0]), 5.0, store) == 0
     whole = Structure.full(3)
     rank_one = np.ones(9)
-    assert whole.functions()[0](whole.shape, rank_one, 3.0, np.zeros(whole.store_size)) > 0  # shift is an eigenvalue
+    # shift is an eigenvalue
+    assert whole.functions()[0](whole.shape, rank_one, 3.0, np.zeros(whole.store_size)) > 0
 
 
 def test_a_kind_that_does_not_exist_is_refused():
-    with pytest.raises(FvsolveError, match='unknown kind of structure "bandad"; did you mean "banded"'):
+    with pytest.raises(
+        FvsolveError, match='unknown kind of structure "bandad"; did you mean "banded"'
+    ):
         Structure(np.eye(2, dtype=bool), "bandad")
     with pytest.raises(FvsolveError, match="fewer rows than states"):
         Structure(np.ones((1, 2), dtype=bool))
@@ -215,9 +231,13 @@ def test_differences_agree_with_the_slopes(n, m, density):
     y = np.random.default_rng(2).normal(size=n)
     f, f_work, jacobian = np.zeros(n), np.zeros(n), np.full(structure.nnz, np.nan)
     run = SimpleNamespace(
-        structure=structure.shape, scale=np.ones(n), moved=np.zeros(n), out=np.zeros(where + m), jacobian=jacobian,
+        structure=structure.shape,
+        scale=np.ones(n),
+        moved=np.zeros(n),
+        out=np.zeros(where + m),
+        jacobian=jacobian,
         control=[{"ledger_offset": where}],
-    )  # fmt: skip
+    )
     evaluate(None, run, 0.3, y, f)
     supply = run.out[where:].copy()
     python = getattr(differences, "py_func", differences)

@@ -76,7 +76,9 @@ def test_an_explicit_method_does_none_of_it(name):
     counts: dict = {}
     integrate(linear, [1.0, 1.0, 1.0], [0.0, 2.0], name, step=0.05, counts=counts)
     assert counts["rhs"] > 0
-    assert not any(counts[what] for what in ("jacobians", "factorisations", "newton", "newton_failures"))
+    assert not any(
+        counts[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")
+    )
 
 
 @njit
@@ -105,7 +107,9 @@ def jumps(t, y):
 JUMPED = 0.5 - 100.0 * (2.5 - 0.5)  # at 2.5 s, from 1
 
 
-@pytest.mark.parametrize("name", ["tr-bdf2", "esdirk-3", "esdirk-4", "esdirk-5", "rodas-4", "rodas-5p", "radau-iia-5"])
+@pytest.mark.parametrize(
+    "name", ["tr-bdf2", "esdirk-3", "esdirk-4", "esdirk-5", "rodas-4", "rodas-5p", "radau-iia-5"]
+)
 def test_error_control_passes_a_jump_of_the_rates(name):
     counts: dict = {}
     found = integrate(jumps, [1.0, 1.0], [0.0, 2.5], name, rtol=1e-6, counts=counts)[-1]
@@ -127,7 +131,9 @@ def ends(t, y):
 
 @pytest.mark.parametrize("name, settings", [row for row in SETTINGS if row[0] in ITERATED])
 def test_where_no_step_is_short_enough_the_error_states_the_time_and_the_variable(name, settings):
-    with pytest.raises(FvsolveError, match=rf"{name} stopped at t = 0\.5: Newton did not converge, worst in y\[1\]"):
+    with pytest.raises(
+        FvsolveError, match=rf"{name} stopped at t = 0\.5: Newton did not converge, worst in y\[1\]"
+    ):
         integrate(ends, [1.0, 1.0, 0.0], [0.0, 1.0], name, **settings)
 
 
@@ -155,7 +161,15 @@ def sucked_dry(**numerics) -> dict:
     """Case of 1 l of water under the law `log` with an outflow of 10 l/s, which is empty at 0.1 s."""
     nodes = {"pot": chamber(1e-3, 5e6), "drain": {"type": "inflow", "flow": -0.01}}
     fluid = {**WATER, "law": "log"}
-    return scene(nodes, {"neck": valve("pot", "drain", 1e-3)}, 0.2, numerics, ["pot.pressure"], 0.005, fluid=fluid)
+    return scene(
+        nodes,
+        {"neck": valve("pot", "drain", 1e-3)},
+        0.2,
+        numerics,
+        ["pot.pressure"],
+        0.005,
+        fluid=fluid,
+    )
 
 
 @pytest.mark.parametrize(
@@ -163,11 +177,15 @@ def sucked_dry(**numerics) -> dict:
     [{"method": "radau-iia-5"}, {"method": "esdirk-4"}, {"method": "trapezoid", "step": 1e-3}],
     ids=lambda numerics: numerics["method"],
 )
-def test_a_run_states_time_and_variable_of_a_failure_of_newton_and_retains_everything_up_to_there(numerics, tmp_path):
+def test_a_run_states_time_and_variable_of_a_failure_of_newton_and_retains_everything_up_to_there(
+    numerics, tmp_path
+):
     case = sucked_dry(**numerics)
     result = fvsolve.run(case, out=tmp_path / "run")
     assert not result.ok
-    assert result.reason.startswith("stopped: Newton did not converge at t = 0.100223 s, however short the step")
+    assert result.reason.startswith(
+        "stopped: Newton did not converge at t = 0.100223 s, however short the step"
+    )
     assert "worst in pot.mass; check the parts there for jumps" in result.reason
     assert result.summary["newton_failures"] > 10
     stored = fvsolve.open_run(tmp_path / "run")
@@ -182,7 +200,9 @@ def cylinder_rates(t, y):
     return rates
 
 
-@pytest.mark.parametrize(("name", "ratio", "error"), [("radau-iia-5", 1.0, 2e-3), ("radau-iia-9", 1.6, 1e-2)])
+@pytest.mark.parametrize(
+    ("name", "ratio", "error"), [("radau-iia-5", 1.0, 2e-3), ("radau-iia-9", 1.6, 1e-2)]
+)
 def test_loose_tolerances_of_radau_do_not_cost_more_calls_than_tight_ones(name, ratio, error):
     t, calls, found = np.linspace(0.0, cylinder.END, 21), {}, {}
     for rtol in (1e-3, 1e-4, 1e-5, 1e-7):
@@ -195,20 +215,28 @@ def test_loose_tolerances_of_radau_do_not_cost_more_calls_than_tight_ones(name, 
 
 
 def test_a_summary_counts_the_work_of_newton():
-    case = sucked_dry(method="radau-iia-5", rtol=1e-6) | {"numerics": {"end": 0.05, "method": "radau-iia-5"}}
+    case = sucked_dry(method="radau-iia-5", rtol=1e-6) | {
+        "numerics": {"end": 0.05, "method": "radau-iia-5"}
+    }
     said = fvsolve.run(case).summary
-    assert said["methods"] == [{"time": 0.0, "method": "radau-iia-5", "why": "given by numerics.method"}]
+    assert said["methods"] == [
+        {"time": 0.0, "method": "radau-iia-5", "why": "given by numerics.method"}
+    ]
     assert said["steps"] > 0 and said["jacobians"] > 0 and said["newton"] >= said["steps"]
     assert said["factorisations"] >= 2 * said["jacobians"]  # real and complex factors
     assert said["rhs"] >= said["steps"] + 3 * said["newton"] + said["jacobians"]
     explicit = fvsolve.run({**case, "numerics": {"end": 0.05, "method": "dormand-prince"}}).summary
-    assert [explicit[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")] == [0, 0, 0, 0]
+    assert [
+        explicit[what] for what in ("jacobians", "factorisations", "newton", "newton_failures")
+    ] == [0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("name", ["radau-iia-5", "esdirk-4"])
 def test_a_state_remembered_twice_has_no_factors_either(name):
     """A resumed state that is stored again before a step gives the same steps as the original state."""
-    model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
+    model = fvsolve.build(
+        fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name})
+    )
     loop = RunLoop(model)
     loop.begin(0.01, 1e308)
     assert loop.run(30) == loop_records.BUDGET_SPENT
@@ -219,7 +247,8 @@ def test_a_state_remembered_twice_has_no_factors_either(name):
             view[...] = memory[name]
         again.stepper.after_restore()
         memory = restart_copies(again)
-    assert again.stepper.newton["shift"] == -loop.stepper.newton["shift"] < 0.0  # negative shift: factors are missing
+    # negative shift: factors are missing
+    assert again.stepper.newton["shift"] == -loop.stepper.newton["shift"] < 0.0
     again.now[:], again.armed[:] = loop.now, loop.armed
     for one in (loop, again):
         one.resume(0.01, 1e308)

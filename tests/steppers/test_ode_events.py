@@ -22,7 +22,9 @@ def turn(t, y):
 def peak(level):
     """(event function, times up to 20 s) of sin t above a level."""
     begin = np.arcsin(level)
-    times = np.sort(np.concatenate([begin + 2 * np.pi * np.arange(4), np.pi - begin + 2 * np.pi * np.arange(4)]))
+    times = np.sort(
+        np.concatenate([begin + 2 * np.pi * np.arange(4), np.pi - begin + 2 * np.pi * np.arange(4)])
+    )
     return (lambda t, y: y[0] - level), times[times < 20.0]
 
 
@@ -41,7 +43,9 @@ def test_events_of_a_circle_are_located_at_their_times(method, level):
 @pytest.mark.parametrize("method", ["euler", "rk4", "gauss-4", "trapezoid"])
 def test_events_of_given_steps_lie_on_the_rows(method):
     """The state at an event is the row that a call with this time gives."""
-    found = integrate(turn, [0.0, 1.0], [0.0, 8.0], method, step=0.1, events=lambda t, y: y[1] + 0.3 * y[0])
+    found = integrate(
+        turn, [0.0, 1.0], [0.0, 8.0], method, step=0.1, events=lambda t, y: y[1] + 0.3 * y[0]
+    )
     again = integrate(turn, [0.0, 1.0], [0.0, *found.t_events[0], 8.0], method, step=0.1)[1:-1]
     assert len(again) in (2, 3)
     assert found.y_events[0] == pytest.approx(again, abs=1e-12)
@@ -53,10 +57,16 @@ def test_terminal_and_directed_events_are_those_of_scipy():
     def ball(t, y):
         return [y[1], -9.81 - 0.05 * y[1] * abs(y[1])]
 
-    events = [event(lambda t, y: y[1]), event(lambda t, y: y[0], True, -1), event(lambda t, y: y[0] - 3, False, 1)]
+    events = [
+        event(lambda t, y: y[1]),
+        event(lambda t, y: y[0], True, -1),
+        event(lambda t, y: y[0] - 3, False, 1),
+    ]
     t = np.linspace(0.0, 10.0, 101)
     found = integrate(ball, [0.0, 20.0], t, rtol=1e-11, events=events)
-    truth = solve_ivp(ball, (0.0, 10.0), [0.0, 20.0], "DOP853", t_eval=t, rtol=1e-12, atol=1e-12, events=events)
+    truth = solve_ivp(
+        ball, (0.0, 10.0), [0.0, 20.0], "DOP853", t_eval=t, rtol=1e-12, atol=1e-12, events=events
+    )
     assert found.status == truth.status == 1
     assert found.t == pytest.approx(truth.t) and found.y == pytest.approx(truth.y.T, abs=1e-8)
     for k in range(3):
@@ -64,7 +74,9 @@ def test_terminal_and_directed_events_are_those_of_scipy():
         assert found.y_events[k] == pytest.approx(truth.y_events[k], abs=1e-7)
     third = event(lambda t, y: y[0] - np.cos(t), 3)
     ended = integrate(turn, [0.0, 1.0], [0.0, 50.0], events=third)
-    assert ended.status == 1 and ended.t_events[0] == pytest.approx(np.pi / 4 + np.pi * np.arange(3), abs=1e-5)
+    assert ended.status == 1 and ended.t_events[0] == pytest.approx(
+        np.pi / 4 + np.pi * np.arange(3), abs=1e-5
+    )
     assert ended.t.tolist() == [0.0]
 
 
@@ -73,9 +85,18 @@ def test_events_of_a_stiff_problem_lie_on_the_slow_solution(method):
     """Steps of more than 1 s are right at their ends only; the state at an event is right to the tolerance."""
     rate = 1e6
     found = integrate(
-        lambda t, y: -rate * (y - np.cos(t)), [1.0], [0.0, 20.0], method, rtol=1e-6, events=lambda t, y: y[0] - 0.5
+        lambda t, y: -rate * (y - np.cos(t)),
+        [1.0],
+        [0.0, 20.0],
+        method,
+        rtol=1e-6,
+        events=lambda t, y: y[0] - 0.5,
     )
-    times = np.sort(np.concatenate([np.pi / 3 + 2 * np.pi * np.arange(4), -np.pi / 3 + 2 * np.pi * np.arange(1, 4)]))
+    times = np.sort(
+        np.concatenate(
+            [np.pi / 3 + 2 * np.pi * np.arange(4), -np.pi / 3 + 2 * np.pi * np.arange(1, 4)]
+        )
+    )
     assert found.t_events[0] == pytest.approx(times[times < 20], abs=1e-5)
 
 

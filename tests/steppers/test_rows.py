@@ -37,7 +37,9 @@ def tables(f, begin, method, control, size):
     stepper = Integrator(METHODS[method], 3, 0, lambda: ode._full(3), np.ones(3))
     state, progress = stepper.state[0], stepper.progress[0]
     stepper.y[0] = begin
-    stepper.set_control(mode=control, size=size, step_max=1e308, stop_at=1e308, end=END, every=EVERY)
+    stepper.set_control(
+        mode=control, size=size, step_max=1e308, stop_at=1e308, end=END, every=EVERY
+    )
     stepper.rows = np.zeros((round(END / EVERY) + 2, 4))
     functions = ode._prepare(f, 0.0, stepper.y[0])[0]
     ends, code, state["next_output"] = [], loop_records.BUDGET_SPENT, 1.0
@@ -89,7 +91,9 @@ def test_a_chamber_is_not_filled_beyond_its_supply(method, size):
     """The greatest pressure of a chamber that fills within 1 ms is at most 1 % above its supply."""
     nodes = {"supply": reservoir(8e6), "store": chamber(1e-3, 1e5), "tank": reservoir(1e5)}
     links = {"in": valve("supply", "store", 1e-5), "out": valve("store", "tank", 1e-6)}
-    run = fvsolve.run(scene(nodes, links, 5.0, {"method": method, "step": size}, ["store.pressure"], every=0.13))
+    run = fvsolve.run(
+        scene(nodes, links, 5.0, {"method": method, "step": size}, ["store.pressure"], every=0.13)
+    )
     assert run.ok and run.si("store.pressure")[-1] == pytest.approx(1e5 + 7.9e6 / 1.01, rel=1e-9)
     assert run.extremes["store.pressure"].maximum <= 1.01 * 8e6
 
@@ -97,10 +101,18 @@ def test_a_chamber_is_not_filled_beyond_its_supply(method, size):
 def test_rows_of_a_run_are_as_good_as_its_steps():
     """Rows of a column that oscillates between two tanks follow cos(omega t) to 1e-11 m under rtol 1e-11."""
     nodes = {"a": tank(2.0, 3.1), "b": tank(1.0, 3.0)}
-    column = {"type": "rigid-column", "from": "a", "to": "b", "length": 40.0, "diameter": 0.5,
-              "friction": {"model": "none"}}  # fmt: skip
+    column = {
+        "type": "rigid-column",
+        "from": "a",
+        "to": "b",
+        "length": 40.0,
+        "diameter": 0.5,
+        "friction": {"model": "none"},
+    }
     numerics = {"method": "verner-7", "rtol": 1e-11}
-    run = fvsolve.run(scene(nodes, {"c": column}, 40.0, numerics, ["a.level", "b.level"], every=0.37))
+    run = fvsolve.run(
+        scene(nodes, {"c": column}, 40.0, numerics, ["a.level", "b.level"], every=0.37)
+    )
     drop = run.si("a.level") - run.si("b.level")
     omega = math.sqrt(GRAVITY * area(0.5) / 40.0 * (1 / 2.0 + 1 / 1.0))
     assert drop == pytest.approx(0.1 * np.cos(omega * run.seconds), abs=1e-11)
@@ -157,9 +169,19 @@ def test_rows_of_a_stiff_circuit_have_the_accuracy_of_its_steps(method):
     links = {
         "source": {"type": "voltage-source", "from": "earth", "to": "plus", "voltage": source},
         "r": {"type": "resistor", "from": "plus", "to": "c", "resistance": 1.0},
-        "store": {"type": "capacitor", "from": "c", "to": "earth", "capacitance": 1e-6, "initial_voltage": 0.0},
+        "store": {
+            "type": "capacitor",
+            "from": "c",
+            "to": "earth",
+            "capacitance": 1e-6,
+            "initial_voltage": 0.0,
+        },
     }
-    run = fvsolve.run(scene(nodes, links, 10.0, {"method": method, "rtol": 1e-6}, ["c.voltage"], every=0.013))
+    run = fvsolve.run(
+        scene(nodes, links, 10.0, {"method": method, "rtol": 1e-6}, ["c.voltage"], every=0.013)
+    )
     omega, t = 2 * np.pi / 5.0, run.seconds
     lag = omega * 1e-6  # of the slow solution; the transient has the size of the lag
-    assert run.si("c.voltage") == pytest.approx(np.sin(omega * t) - lag * np.cos(omega * t), abs=6e-6)
+    assert run.si("c.voltage") == pytest.approx(
+        np.sin(omega * t) - lag * np.cos(omega * t), abs=6e-6
+    )

@@ -21,7 +21,9 @@ def begun(method: str = "rk4") -> Integrator:
     """Integrator of y' = -y from y = (1, 2), by steps of 0.1 s up to 1 s."""
     stepper = Integrator(METHODS[method], 2, 0, lambda: ode._full(2), np.ones(2))
     stepper.y[0] = 1.0, 2.0
-    stepper.set_control(mode=loop_records.FIXED_STEP, size=0.1, step_max=1e308, stop_at=1e308, end=1.0)
+    stepper.set_control(
+        mode=loop_records.FIXED_STEP, size=0.1, step_max=1e308, stop_at=1e308, end=1.0
+    )
     return stepper
 
 
@@ -35,13 +37,17 @@ def stepped(stepper: Integrator, steps: int) -> np.ndarray:
     return stepper.y[stepper.progress[0]["now"]]
 
 
-@pytest.mark.parametrize("wrong", [np.ones(2, dtype=np.float32), np.ones(4)[::2], np.ones((2, 1)), np.arange(2)])
+@pytest.mark.parametrize(
+    "wrong", [np.ones(2, dtype=np.float32), np.ones(4)[::2], np.ones((2, 1)), np.arange(2)]
+)
 def test_an_array_of_another_type_is_refused_by_name(wrong):
     if not COMPILING:
         pytest.skip("JIT is off")
     stepper = begun()
     stepper.scale = wrong
-    with pytest.raises(TypeError, match="^scale is not a writable C-contiguous array of float64 with 1 dimension"):
+    with pytest.raises(
+        TypeError, match="^scale is not a writable C-contiguous array of float64 with 1 dimension"
+    ):
         stepper.handle(True)
 
 
@@ -64,14 +70,31 @@ def test_restart_arrays_by_name_continue_to_the_same_bits(method):
         view[...] = stepper.restart_arrays()[name]
     again.after_restore()
     assert np.array_equal(stepped(again, 3), stepped(whole, 6))
-    assert again.counts() | {"rhs": 0} == whole.counts() | {"rhs": 0}  # the rates of the first state are computed again
+    # the rates of the first state are computed again
+    assert again.counts() | {"rhs": 0} == whole.counts() | {"rhs": 0}
 
 
-VALVES = ("air-valve", "check-valve-slam", "pressure-reducing", "relief-on-closed-main", "surge-tank", "two-tanks")
+VALVES = (
+    "air-valve",
+    "check-valve-slam",
+    "pressure-reducing",
+    "relief-on-closed-main",
+    "surge-tank",
+    "two-tanks",
+)
 
 
 @pytest.mark.parametrize(
-    "name", [*VALVES, "cylinder-servo", "anti-roll-tank", "four-bar", "hydropower", "pump-trip", "tumbling-body"]
+    "name",
+    [
+        *VALVES,
+        "cylinder-servo",
+        "anti-roll-tank",
+        "four-bar",
+        "hydropower",
+        "pump-trip",
+        "tumbling-body",
+    ],
 )
 def test_a_stage_without_the_rate_limit_has_the_same_rates(name):
     """The limit of the step is left out at all stages of a step but the first; nothing else depends on it."""
@@ -83,5 +106,7 @@ def test_a_stage_without_the_rate_limit_has_the_same_rates(name):
         others[loop_records.RATE] = RATE_UNWANTED
         model.functions.rhs(t, y, dydt, others, run_data.handle)
     assert np.array_equal(dydt, whole, equal_nan=True)
-    assert np.array_equal(np.delete(others, loop_records.RATE), np.delete(out, loop_records.RATE), equal_nan=True)
+    assert np.array_equal(
+        np.delete(others, loop_records.RATE), np.delete(out, loop_records.RATE), equal_nan=True
+    )
     assert others[loop_records.RATE] <= out[loop_records.RATE]

@@ -11,7 +11,11 @@ from fvsolve.core.steppers.implicit import Rosenbrock
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]
-IMPLICIT = [name for name in NAMES if not METHODS[name].explicit and not isinstance(METHODS[name], Rosenbrock)]
+IMPLICIT = [
+    name
+    for name in NAMES
+    if not METHODS[name].explicit and not isinstance(METHODS[name], Rosenbrock)
+]
 START, H = np.array([1.0, 0.2]), 0.3
 
 
@@ -43,7 +47,9 @@ def test_an_implicit_step_is_23(name):
     assert found == pytest.approx(START + H * (m.b @ k), abs=1e-9)  # tolerance of Newton's method
 
 
-@pytest.mark.parametrize("name", [name for name in EXPLICIT if not METHODS[name].digits and METHODS[name].order < 5])
+@pytest.mark.parametrize(
+    "name", [name for name in EXPLICIT if not METHODS[name].digits and METHODS[name].order < 5]
+)
 def test_a_step_has_the_terms_of_8_up_to_its_order_and_not_the_next(name):
     """A step has the Taylor terms (8) of y' = y^2 + t y + 1 up to its order, and a different next term.
 
@@ -105,8 +111,13 @@ def test_a_modulus_of_1_is_enough_for_13_only_with_all_eigenvectors():
         return np.array([-2.0 * y[0] + y[1], -2.0 * y[1]])
 
     assert abs(analyse("euler").stability_function(-2.0)) == 1.0
-    ends = {f: integrate(f, [0.0, 1.0], np.arange(101.0), "euler", step=1.0)[-1] for f in (apart, together)}
-    assert ends[apart] == pytest.approx([0.0, 1.0]) and ends[together] == pytest.approx([-100.0, 1.0])
+    ends = {
+        f: integrate(f, [0.0, 1.0], np.arange(101.0), "euler", step=1.0)[-1]
+        for f in (apart, together)
+    }
+    assert ends[apart] == pytest.approx([0.0, 1.0]) and ends[together] == pytest.approx(
+        [-100.0, 1.0]
+    )
 
 
 def test_implicit_euler_is_stable_outside_the_circle_about_1_27():
@@ -114,5 +125,7 @@ def test_implicit_euler_is_stable_outside_the_circle_about_1_27():
     r = analyse("implicit-euler").stability_function
     s = np.add.outer(np.linspace(-4, 4, 81), 1j * np.linspace(-4, 4, 81))
     off = np.abs(s - 1.0)
-    assert np.array_equal(np.abs(r(s[off > 1 + 1e-9])) < 1.0, np.ones(np.sum(off > 1 + 1e-9), dtype=bool))
+    assert np.array_equal(
+        np.abs(r(s[off > 1 + 1e-9])) < 1.0, np.ones(np.sum(off > 1 + 1e-9), dtype=bool)
+    )
     assert (np.abs(r(s[(off < 1 - 1e-9) & (off > 0)])) > 1.0).all()

@@ -10,21 +10,55 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis_profiles import examples
 
-from fvsolve.core.steppers import METHODS, analyse, global_error, local_error, pade, seen_frequency, stability_function
+from fvsolve.core.steppers import (
+    METHODS,
+    analyse,
+    global_error,
+    local_error,
+    pade,
+    seen_frequency,
+    stability_function,
+)
 from fvsolve.core.steppers.analysis.stability_function import by_determinants, by_resolvent
-from fvsolve.core.steppers.numbers.polynomial import Polynomial, count_roots, first_sign_change, odd_part, roots_right
+from fvsolve.core.steppers.numbers.polynomial import (
+    Polynomial,
+    count_roots,
+    first_sign_change,
+    odd_part,
+    roots_right,
+)
 from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import FvsolveError
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 L_STABLE = {
-    "implicit-euler", "lobatto-iiic-2", "lobatto-iiic-4", "radau-ia-3", "radau-ia-5", "radau-iia-3", "radau-iia-5",
-    "radau-iia-9", "alexander-2", "alexander-3", "tr-bdf2", "esdirk-3", "esdirk-4", "esdirk-5", "rodas-4", "rodas-5p",
-}  # fmt: skip
+    "implicit-euler",
+    "lobatto-iiic-2",
+    "lobatto-iiic-4",
+    "radau-ia-3",
+    "radau-ia-5",
+    "radau-iia-3",
+    "radau-iia-5",
+    "radau-iia-9",
+    "alexander-2",
+    "alexander-3",
+    "tr-bdf2",
+    "esdirk-3",
+    "esdirk-4",
+    "esdirk-5",
+    "rodas-4",
+    "rodas-5p",
+}
 A_STABLE = L_STABLE | {
-    "implicit-midpoint", "gauss-4", "gauss-6", "trapezoid", "lobatto-iiia-4", "lobatto-iiia-6", "crouzeix-3",
+    "implicit-midpoint",
+    "gauss-4",
+    "gauss-6",
+    "trapezoid",
+    "lobatto-iiia-4",
+    "lobatto-iiia-6",
+    "crouzeix-3",
     "crouzeix-4",
-}  # fmt: skip
+}
 SIXTH = (4.0 + math.sqrt(17.0)) ** (1 / 3)
 REAL = {  # greatest stable |h lambda| on the negative real axis
     "euler": 2.0,
@@ -40,7 +74,9 @@ REAL = {  # greatest stable |h lambda| on the negative real axis
     "three-eighths": 2.785293563405282,
 }
 IMAGINARY = {
-    **dict.fromkeys(["euler", "improved-euler", "modified-euler", "ralston", "ssp-rk2", "verner-7"], 0.0),
+    **dict.fromkeys(
+        ["euler", "improved-euler", "modified-euler", "ralston", "ssp-rk2", "verner-7"], 0.0
+    ),
     **dict.fromkeys(["heun", "kutta-3", "ssp-rk3", "bogacki-shampine"], math.sqrt(3.0)),
     **dict.fromkeys(["rk4", "three-eighths"], 2.0 * math.sqrt(2.0)),
 }
@@ -104,10 +140,15 @@ def test_intervals_end_where_the_modulus_crosses_1(name):
             continue
         assert np.min(np.abs(roots - end)) < 1e-6
         inside = np.abs(found.stability_function(direction * np.linspace(0.0, end, 400)))
-        assert np.all(inside <= 1.0 + 1e-14) and abs(found.stability_function(direction * end * 1.001)) > 1.0
+        assert (
+            np.all(inside <= 1.0 + 1e-14)
+            and abs(found.stability_function(direction * end * 1.001)) > 1.0
+        )
 
 
-@pytest.mark.parametrize("name, real", [("dormand-prince", 3.3066), ("tsitouras", 3.5068), ("ssp-rk10-4", 13.917)])
+@pytest.mark.parametrize(
+    "name, real", [("dormand-prince", 3.3066), ("tsitouras", 3.5068), ("ssp-rk10-4", 13.917)]
+)
 def test_intervals_of_larger_methods_are_those_published(name, real):
     assert analyse(name).real_interval == pytest.approx(real, abs=1e-4)
 
@@ -148,7 +189,11 @@ def test_the_other_roots_of_alexanders_polynomial_vanish_at_infinity_but_are_not
 
 
 def test_the_sdirk_of_order_three_is_a_stable_for_a_single_sign_of_the_root():
-    small = METHODS["crouzeix-3"].text.replace("(3+sqrt(3))/6", "y").replace("(3-sqrt(3))/6", "(3+sqrt(3))/6")
+    small = (
+        METHODS["crouzeix-3"]
+        .text.replace("(3+sqrt(3))/6", "y")
+        .replace("(3-sqrt(3))/6", "(3+sqrt(3))/6")
+    )
     found = analyse(user(small.replace("y", "(3-sqrt(3))/6").replace("-sqrt(3)/3", "sqrt(3)/3")))
     assert found.order == 3 and not found.a_stable and found.angle is None
 
@@ -167,11 +212,18 @@ def test_a_pole_on_the_left_is_no_a_stability_even_where_the_imaginary_axis_is_s
 
 
 def test_a_rounded_tableau_is_decided_as_its_source_means_it():
-    gauss = "0.21132486540518711775 | 0.25 -0.03867513459481288225\n0.78867513459481288225 | " \
-        "0.53867513459481288225 0.25\n-\n| 0.5 0.5"  # fmt: skip
+    gauss = (
+        "0.21132486540518711775 | 0.25 -0.03867513459481288225\n0.78867513459481288225 | "
+        "0.53867513459481288225 0.25\n-\n| 0.5 0.5"
+    )
     found = analyse(user(gauss))
     assert (found.order, found.stage_order, found.pade, found.digits) == (4, 2, (2, 2), 20)
-    assert found.a_stable and found.i_stable and not found.l_stable and math.isinf(found.imaginary_interval)
+    assert (
+        found.a_stable
+        and found.i_stable
+        and not found.l_stable
+        and math.isinf(found.imaginary_interval)
+    )
 
 
 def in_decimals(name: str, digits: int) -> Method:
@@ -191,7 +243,9 @@ def test_decimals_lead_to_the_same_decisions(name, digits):
     for fact in ("a_stable", "l_stable", "i_stable", "angle", "pade", "stiffly_accurate"):
         assert getattr(found, fact) == getattr(exact, fact), fact
     for fact in ("real_interval", "imaginary_interval", "ssp_radius"):
-        assert getattr(found, fact) == pytest.approx(getattr(exact, fact), rel=10.0 ** (5 - digits)), fact
+        assert getattr(found, fact) == pytest.approx(
+            getattr(exact, fact), rel=10.0 ** (5 - digits)
+        ), fact
     if digits == 16:
         assert (found.order, found.stage_order) == (exact.order, exact.stage_order)
 
@@ -199,7 +253,11 @@ def test_decimals_lead_to_the_same_decisions(name, digits):
 def test_json_has_none_for_infinity():
     plain = analyse("implicit-euler").plain()
     assert plain["real_interval"] is plain["imaginary_interval"] is plain["ssp_radius"] is None
-    assert plain["numerator"] == [1.0] and plain["denominator"] == [1.0, -1.0] and plain["pade"] == (0, 1)
+    assert (
+        plain["numerator"] == [1.0]
+        and plain["denominator"] == [1.0, -1.0]
+        and plain["pade"] == (0, 1)
+    )
 
 
 number = st.fractions(min_value=-1, max_value=2, max_denominator=6)
@@ -252,7 +310,9 @@ def test_routh_agrees_with_roots_of_numpy():
         for a, b, c in random.choice([-1, 1, 2, 3, 5, 8, 9], (3, 3), p=[0.1] + [0.15] * 6).tolist():
             p = p * Polynomial([a * a + b * b, -2 * a, 1]) * Polynomial([-abs(c), 1])
         found.append(roots_right(p))
-        assert found[-1] == bool(np.all(np.roots([float(x) for x in p.coefficients][::-1]).real > 0.0))
+        assert found[-1] == bool(
+            np.all(np.roots([float(x) for x in p.coefficients][::-1]).real > 0.0)
+        )
     assert 10 < sum(found) < 50
 
 
@@ -350,7 +410,9 @@ def test_the_test_system_sees_at_least_the_order(name):
         assert error == pytest.approx(found.error_constant * s ** (q + 1), rel=0.2)
 
 
-@pytest.mark.parametrize("name", ["euler", "heun", "rk4", "implicit-euler", "gauss-4", "radau-iia-3", "esdirk-3"])
+@pytest.mark.parametrize(
+    "name", ["euler", "heun", "rk4", "implicit-euler", "gauss-4", "radau-iia-3", "esdirk-3"]
+)
 def test_local_error_is_a_single_order_above_global_error(name):
     p, lam, end = analyse(name).order, -1.0 + 2.0j, 2.0
     steps = [80, 160, 320]
@@ -363,7 +425,9 @@ def test_local_error_is_a_single_order_above_global_error(name):
 def test_global_error_is_the_sum_of_local_errors_carried_on():
     name, lam, h, n = "rk4", -0.4 + 1.5j, 0.3, 12
     r = analyse(name).stability_function(h * lam)
-    carried = sum(r ** (n - 1 - k) * local_error(name, lam, h, cmath.exp(k * h * lam)) for k in range(n))
+    carried = sum(
+        r ** (n - 1 - k) * local_error(name, lam, h, cmath.exp(k * h * lam)) for k in range(n)
+    )
     assert global_error(name, lam, h, n) == pytest.approx(carried, abs=1e-15)
 
 
@@ -371,7 +435,9 @@ def test_global_error_is_the_sum_of_local_errors_carried_on():
 def test_an_a_stable_method_slows_modes_that_are_too_fast(omega):
     h = 0.1
     for name in ("implicit-midpoint", "trapezoid"):
-        assert seen_frequency(name, omega, h) == pytest.approx(2.0 / h * math.atan(omega * h / 2.0), rel=1e-12)
+        assert seen_frequency(name, omega, h) == pytest.approx(
+            2.0 / h * math.atan(omega * h / 2.0), rel=1e-12
+        )
     for name in ("gauss-4", "gauss-6", "radau-iia-5", "lobatto-iiic-4"):
         seen = seen_frequency(name, omega, h)
         assert seen <= math.pi / h * (1 + 1e-15)
@@ -389,7 +455,9 @@ wide_number = st.fractions(min_value=-2, max_value=2, max_denominator=12)
 @examples(60)
 @given(
     st.integers(1, 4).flatmap(
-        lambda s: st.lists(st.lists(wide_number, min_size=s, max_size=s), min_size=s + 1, max_size=s + 1)
+        lambda s: st.lists(
+            st.lists(wide_number, min_size=s, max_size=s), min_size=s + 1, max_size=s + 1
+        )
     )
 )
 def test_the_forms_agree_for_any_array(rows):
@@ -400,4 +468,6 @@ def test_the_forms_agree_for_any_array(rows):
     s = 0.31 - 0.47j
     if abs(down(s)) > 1e-3:
         k = np.linalg.solve(np.eye(len(b)) - s * exact[0], np.ones(len(b)))
-        assert complex(up(s)) / complex(down(s)) == pytest.approx(1.0 + s * (exact[1] @ k), rel=1e-9, abs=1e-9)
+        assert complex(up(s)) / complex(down(s)) == pytest.approx(
+            1.0 + s * (exact[1] @ k), rel=1e-9, abs=1e-9
+        )

@@ -16,7 +16,10 @@ ADAPTIVE = [name for name in NAMES if METHODS[name].adaptive]
 RANDOM = np.random.default_rng(59)
 RADIUS, TURN = 2.5 * np.sqrt(RANDOM.random(200)), 2.0 * np.pi * RANDOM.random(200)
 # Left half plane, without poles of R; on a grid, so that difference quotients of f are exact.
-LAMBDA = -np.ceil(np.abs(64 * RADIUS * np.cos(TURN))) / 64 + 1j * np.round(64 * RADIUS * np.sin(TURN)) / 64
+LAMBDA = (
+    -np.ceil(np.abs(64 * RADIUS * np.cos(TURN))) / 64
+    + 1j * np.round(64 * RADIUS * np.sin(TURN)) / 64
+)
 GROWTH, TURNING = LAMBDA.real.copy(), LAMBDA.imag.copy()
 
 
@@ -50,15 +53,29 @@ def test_a_single_step_of_the_test_system_is_the_stability_function(name):
 
 
 # Numbers of steps over four seconds, for which the leading error term dominates higher terms and rounding.
-STEPS = {1: (160, 320), 2: (40, 80), 3: (40, 80), 4: (40, 80), 5: (48, 96), 6: (16, 32), 7: (24, 40), 9: (8, 12)}
+STEPS = {
+    1: (160, 320),
+    2: (40, 80),
+    3: (40, 80),
+    4: (40, 80),
+    5: (48, 96),
+    6: (16, 32),
+    7: (24, 40),
+    9: (8, 12),
+}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_fixed_steps_show_the_order(name, truth):
     p = METHODS[name].order
     steps = 4.0 / np.array(STEPS[p])
-    errors = [np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, step=h)[-1] - truth) for h in steps]
-    assert math.log(errors[0] / errors[1]) / math.log(steps[0] / steps[1]) == pytest.approx(p, abs=0.1 * p)
+    errors = [
+        np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, step=h)[-1] - truth)
+        for h in steps
+    ]
+    assert math.log(errors[0] / errors[1]) / math.log(steps[0] / steps[1]) == pytest.approx(
+        p, abs=0.1 * p
+    )
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)
@@ -66,12 +83,16 @@ def test_error_control_stays_near_its_tolerance(name, truth):
     """The error of a step, of order h^(q+1), is rtol, so the total error is of order rtol^(q / (q + 1))."""
     q = METHODS[name].control_order - 1
     for rtol in (1e-4, 1e-8):
-        error = np.linalg.norm(integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, rtol=rtol)[-1] - truth)
+        error = np.linalg.norm(
+            integrate(pendulum, [1.0, 0.2], [0.0, 4.0], name, rtol=rtol)[-1] - truth
+        )
         assert 1e-4 * rtol < error < 3.0 * rtol ** (q / (q + 1))
 
 
 @pytest.mark.in_turn
-@pytest.mark.parametrize("name", ["rk4", "ssp-rk3", "implicit-midpoint", "trapezoid", "gauss-4", "lobatto-iiia-6"])
+@pytest.mark.parametrize(
+    "name", ["rk4", "ssp-rk3", "implicit-midpoint", "trapezoid", "gauss-4", "lobatto-iiia-6"]
+)
 @pytest.mark.parametrize("fast", [1.5, 40.0, 1000.0])
 def test_a_fast_oscillation_is_seen_at_the_predicted_frequency(name, fast):
     """A numerical oscillation has the predicted frequency for all omega h, also beyond the Nyquist frequency pi / h."""
@@ -100,7 +121,8 @@ def test_a_function_that_numba_refuses_gives_the_same_steps():
 
     times = [0.0, 0.5, 2.0]
     assert np.array_equal(
-        integrate(python_only, [1.0, 2.0], times, rtol=1e-8), integrate(compiled, [1.0, 2.0], times, rtol=1e-8)
+        integrate(python_only, [1.0, 2.0], times, rtol=1e-8),
+        integrate(compiled, [1.0, 2.0], times, rtol=1e-8),
     )
 
 
@@ -109,22 +131,31 @@ def test_a_constant_with_a_default_is_no_row_to_fill(python):
     """f(t, y, rate=2) has two arguments and a constant, unlike f(t, y, dydt)."""
 
     def decay(t, y, rate=2.0):
-        return np.array([-rate * one for one in (y.tolist() if python else y)])  # numba has no `tolist`
+        # numba has no `tolist`
+        return np.array([-rate * one for one in (y.tolist() if python else y)])
 
     end = integrate(decay, [1.0], [0.0, 1.0], "rk4", step=0.01)[-1, 0]
     assert end == pytest.approx(math.exp(-2.0), abs=1e-8)
 
 
 def test_a_users_array_is_a_method_everywhere():
-    fvsolve.tableau("ralston-test", text="""
+    fvsolve.tableau(
+        "ralston-test",
+        text="""
         0   |
         2/3 | 2/3
         ----+--------
             | 1/4  3/4
-    """)  # fmt: skip
+    """,
+    )
     try:
-        errors = [abs(integrate(lambda t, y: -y, [1.0], [0.0, 1.0], "ralston-test", step=h)[-1, 0] - math.exp(-1))
-                  for h in (0.1, 0.05)]  # fmt: skip
+        errors = [
+            abs(
+                integrate(lambda t, y: -y, [1.0], [0.0, 1.0], "ralston-test", step=h)[-1, 0]
+                - math.exp(-1)
+            )
+            for h in (0.1, 0.05)
+        ]
         assert math.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.1)
     finally:
         del METHODS["ralston-test"]

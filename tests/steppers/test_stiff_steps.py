@@ -51,7 +51,9 @@ def departures(name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-def test_a_fast_transient_ends_in_a_single_long_step_of_an_l_stable_method_and_rings_in_others(name):
+def test_a_fast_transient_ends_in_a_single_long_step_of_an_l_stable_method_and_rings_in_others(
+    name,
+):
     """After one long step of an L-stable method only the error of the slow solution remains, at most about h^2 / 6.
 
     The transient of a method that is not L-stable is R(-1e5)^n, of modulus near 1 except for Crouzeix's methods.
@@ -95,13 +97,18 @@ def stiff_order(name: str) -> int:
 def errors(name: str, f, counts: tuple[int, int]) -> list[float]:
     """Greatest errors for both numbers of steps at common times within six seconds, without the first three times."""
     t = np.linspace(0.0, 6.0, min(counts[0], 12) + 1)
-    return [np.max(np.abs(integrate(f, [0.0], t, name, step=6.0 / n)[3:, 0] - np.sin(t[3:]))) for n in counts]
+    return [
+        np.max(np.abs(integrate(f, [0.0], t, name, step=6.0 / n)[3:, 0] - np.sin(t[3:])))
+        for n in counts
+    ]
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_the_order_of_prothero_and_robinson_s_problem_falls_to_the_stage_order(name):
     order = stiff_order(name)
-    coarse, fine = errors(name, prothero_robinson, {5: (12, 24), 4: (24, 48), 1: (192, 384)}.get(order, (48, 96)))
+    coarse, fine = errors(
+        name, prothero_robinson, {5: (12, 24), 4: (24, 48), 1: (192, 384)}.get(order, (48, 96))
+    )
     assert math.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
 
@@ -123,7 +130,9 @@ def test_the_page_prints_the_output_of_its_example(capsys):
 def test_the_last_stage_as_the_end_of_the_step_is_worth_a_factor_of_lambda():
     """Radau IIA is stiffly accurate, and its error is smaller by lambda or more than that of Radau IA with equal R."""
     assert analyse("radau-ia-5").stability_function == analyse("radau-iia-5").stability_function
-    first, second = (errors(name, prothero_robinson, (48, 96))[0] for name in ("radau-ia-5", "radau-iia-5"))
+    first, second = (
+        errors(name, prothero_robinson, (48, 96))[0] for name in ("radau-ia-5", "radau-iia-5")
+    )
     assert first > FAST * second
 
 
@@ -138,24 +147,30 @@ def truth() -> np.ndarray:
 def order_between(name) -> int:
     """Power of the step in the error of rows between steps, from the degree of the dense output."""
     dense = coefficients(METHODS[name])[1]
-    return (dense.shape[1] if dense.size else 3) + (start_slope_correction(METHODS[name]).size > 0) + 1
+    return (
+        (dense.shape[1] if dense.size else 3) + (start_slope_correction(METHODS[name]).size > 0) + 1
+    )
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
 def test_between_given_steps_the_error_has_the_order_of_the_method(name, truth):
     """Output between given steps has the order of the method, by dense output or by separate steps."""
     coarse, fine = (
-        np.max(np.abs(integrate(pendulum, [1.0, 0.2], BETWEEN, name, step=4.0 / n) - truth)) for n in (40, 80)
+        np.max(np.abs(integrate(pendulum, [1.0, 0.2], BETWEEN, name, step=4.0 / n) - truth))
+        for n in (40, 80)
     )
     assert fine < 1e-12 or math.log2(coarse / fine) == pytest.approx(METHODS[name].order, abs=0.4)
 
 
 @pytest.mark.parametrize(
-    "name, settings", [*((name, {"step": 0.1}) for name in IMPLICIT), *((name, {"rtol": 1e-6}) for name in ADAPTIVE)]
+    "name, settings",
+    [*((name, {"step": 0.1}) for name in IMPLICIT), *((name, {"rtol": 1e-6}) for name in ADAPTIVE)],
 )
 def test_asking_for_more_times_does_not_move_the_end(name, settings):
     """More output times change the end by no bit, or within the tolerance if error control shortens steps to them."""
-    many, one = (integrate(pendulum, [1.0, 0.2], t, name, **settings)[-1] for t in (BETWEEN, [0.0, 4.0]))
+    many, one = (
+        integrate(pendulum, [1.0, 0.2], t, name, **settings)[-1] for t in (BETWEEN, [0.0, 4.0])
+    )
     if "rtol" in settings and METHODS[name].order > order_between(name):
         assert many == pytest.approx(one, abs=1e-5)
     else:
@@ -176,9 +191,13 @@ def test_values_read_by_a_plain_function_may_change_between_two_calls(monkeypatc
     def f(t, y):
         return -RATE * y
 
-    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-7)
+    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(
+        np.exp(-1.0), rel=1e-7
+    )
     monkeypatch.setitem(globals(), "RATE", 2.0)
-    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-2.0), rel=1e-7)
+    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(
+        np.exp(-2.0), rel=1e-7
+    )
 
 
 def decaying(rate):
@@ -195,11 +214,12 @@ def single_rate(t, y):
 
 
 FOLLOWED = {
-    "number": (lambda: 1.0, lambda rate: 2.0), "whole number": (lambda: 1, lambda rate: 2),
+    "number": (lambda: 1.0, lambda rate: 2.0),
+    "whole number": (lambda: 1, lambda rate: 2),
     "array": (lambda: np.array([1.0]), lambda rate: np.array([2.0])),
     "array in place": (lambda: np.array([1.0]), lambda rate: np.add(rate, 1.0, out=rate)),
     "number of numpy": (lambda: np.float64(1.0), lambda rate: np.float64(2.0)),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", FOLLOWED)
@@ -218,7 +238,8 @@ def test_a_plain_function_is_compiled_once_while_its_values_are_the_same(monkeyp
     assert ode._prepare(decaying(3.0), 0.0, y)[0] is ode._prepare(decaying(3.0), 0.0, y)[0]
     assert ode._prepare(decaying(3), 0.0, y)[0] is not ode._prepare(decaying(3.0), 0.0, y)[0]
     assert ode.frozen_values(lambda t, y: FOLLOWED["number"]) is None  # a dictionary may change
-    assert ode.frozen_values(lambda t, y: [v for v in y]) is None  # a function within, whose values are not read
+    # a function within, whose values are not read
+    assert ode.frozen_values(lambda t, y: [v for v in y]) is None
     before = ode._prepare(faster, 0.0, y)[0]
     monkeypatch.setitem(globals(), "RATE", 5.0)
     assert ode._prepare(faster, 0.0, y)[0] is not before
@@ -231,7 +252,9 @@ def test_compiled_functions_are_stored_up_to_a_number(monkeypatch):
     monkeypatch.setattr(ode, "_COMPILED", {})
     monkeypatch.setattr(ode, "MOST_COMPILED", 2)
     for rate in (1.0, 2.0, 3.0):
-        assert integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-rate), rel=1e-7)
+        assert integrate(decaying(rate), [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(
+            np.exp(-rate), rel=1e-7
+        )
     assert len(ode._COMPILED) == 2
 
 
@@ -240,6 +263,8 @@ def test_a_variable_without_a_value_in_a_branch_that_is_not_taken_is_no_fault():
         return -y if t < 10.0 else missing * y
 
     assert ode.frozen_values(f) is None
-    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-7)
+    assert integrate(f, [1.0], [0.0, 1.0], rtol=1e-9)[-1, 0] == pytest.approx(
+        np.exp(-1.0), rel=1e-7
+    )
     if f is None:
         missing = 1.0

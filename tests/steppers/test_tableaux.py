@@ -54,7 +54,11 @@ PUBLISHED = {
     "rodas-4": (6, 4, 3, 1),
     "rodas-5p": (8, 5, 4, 1),
 }
-ALIASES = {"gauss-2": "implicit-midpoint", "radau-iia-1": "implicit-euler", "lobatto-iiia-2": "trapezoid"}
+ALIASES = {
+    "gauss-2": "implicit-midpoint",
+    "radau-iia-1": "implicit-euler",
+    "lobatto-iiia-2": "trapezoid",
+}
 
 
 def test_rooted_trees_are_counted_as_in_the_books():
@@ -79,7 +83,9 @@ def test_derived_properties_are_the_published_ones(name):
 def test_every_condition_holds_up_to_the_order_and_a_condition_fails_beyond(name):
     m = METHODS[name]
     conditions = (
-        Conditions(m.forms[0], m.rounding, m.exact.a) if m.kind == "linear" else Conditions(m.exact.a, m.rounding)
+        Conditions(m.forms[0], m.rounding, m.exact.a)
+        if m.kind == "linear"
+        else Conditions(m.exact.a, m.rounding)
     )
     assert all(conditions.holds(n, m.exact.b) for n in range(1, m.order + 1))
     assert not conditions.holds(m.order + 1, m.exact.b)
@@ -98,7 +104,11 @@ def test_first_members_of_families_are_known_by_both_names(alias, name):
 
 
 def test_a_coefficient_that_is_off_by_its_last_digit_costs_the_order():
-    text = METHODS["esdirk-4"].text.replace("-654441/2922500", "-654442/2922500").replace("5012029/34652500", "x")
+    text = (
+        METHODS["esdirk-4"]
+        .text.replace("-654441/2922500", "-654442/2922500")
+        .replace("5012029/34652500", "x")
+    )
     a21 = Fraction(31, 50) - Fraction(1, 4) - Fraction(174375, 388108) + Fraction(654442, 2922500)
     assert tableau_order(text.replace("x", str(a21))) < 4
 
@@ -112,10 +122,14 @@ def test_algebraic_numbers_are_those_of_the_books():
     assert METHODS["radau-iia-5"].a[0, 1] == pytest.approx((296 - 169 * sqrt(6)) / 1800, abs=1e-16)
     assert METHODS["alexander-3"].a[0, 0] == pytest.approx(0.435866521508459, abs=1e-15)
     assert METHODS["crouzeix-4"].a[0, 0] == pytest.approx(0.5 + cos(pi / 18) / sqrt(3), abs=1e-15)
-    assert -METHODS["radau-iia-5"].start_error == pytest.approx((6 + 81 ** (1 / 3) - 9 ** (1 / 3)) / 30, abs=1e-15)
+    assert -METHODS["radau-iia-5"].start_error == pytest.approx(
+        (6 + 81 ** (1 / 3) - 9 ** (1 / 3)) / 30, abs=1e-15
+    )
 
 
-@pytest.mark.parametrize("name", ["dormand-prince", "tsitouras", "bogacki-shampine", "trapezoid", "esdirk-5"])
+@pytest.mark.parametrize(
+    "name", ["dormand-prince", "tsitouras", "bogacki-shampine", "trapezoid", "esdirk-5"]
+)
 def test_the_last_rate_is_the_first_of_the_next_step(name):
     assert METHODS[name].first_same_as_last and METHODS[name].stiffly_accurate
 
@@ -128,7 +142,9 @@ def test_stiffly_accurate_methods_need_not_start_with_the_last_rate(name):
 @pytest.mark.parametrize("name", [*PUBLISHED])
 def test_collocation_is_recognised_and_its_polynomial_passes_through_the_stages(name):
     m = METHODS[name]
-    family = name.startswith(("gauss", "radau-iia", "lobatto-iiia", "implicit", "trapezoid", "euler"))
+    family = name.startswith(
+        ("gauss", "radau-iia", "lobatto-iiia", "implicit", "trapezoid", "euler")
+    )
     assert (len(m.dense) > 0) == (family or name in ("dormand-prince", "tsitouras"))
     if family:
         powers = m.c[:, None] ** range(1, m.stages + 1)
@@ -138,7 +154,11 @@ def test_collocation_is_recognised_and_its_polynomial_passes_through_the_stages(
 
 
 def test_every_decimal_of_a_published_array_counts():
-    assert (METHODS["tsitouras"].digits, METHODS["esdirk-5"].digits, METHODS["rk4"].digits) == (40, 25, None)
+    assert (METHODS["tsitouras"].digits, METHODS["esdirk-5"].digits, METHODS["rk4"].digits) == (
+        40,
+        25,
+        None,
+    )
 
 
 @pytest.mark.parametrize(
@@ -222,7 +242,13 @@ ALL, LINEAR, TIME = "too small", "zero there", "y' = f(t), so the error estimate
         (dict(A=[[HALF, 0], [0, HALF]], b=[[HALF, HALF], [1, 0]]), ALL),
         (
             dict(
-                A=[[0] * 5, [HALF, 0, 0, 0, 0], [HALF, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 1, 0, 0]],
+                A=[
+                    [0] * 5,
+                    [HALF, 0, 0, 0, 0],
+                    [HALF, 0, 0, 0, 0],
+                    [0, 1, 0, 0, 0],
+                    [0, 0, 1, 0, 0],
+                ],
                 b=[[SIXTH, 4 * SIXTH, 0, SIXTH, 0], [SIXTH, 4 * SIXTH, 0, 0, SIXTH]],
             ),
             ALL,
@@ -249,7 +275,9 @@ ALL, LINEAR, TIME = "too small", "zero there", "y' = f(t), so the error estimate
 def test_an_error_estimate_that_is_zero_for_all_problems_of_a_kind_is_refused(arguments, wanted):
     with pytest.raises(FvsolveError) as caught:
         tableau("blind", **arguments)
-    assert wanted in str(caught.value) and "expected an embedded solution of another order" in str(caught.value)
+    assert wanted in str(caught.value) and "expected an embedded solution of another order" in str(
+        caught.value
+    )
     assert "blind" not in METHODS
 
 
@@ -278,7 +306,10 @@ def test_a_row_of_weights_of_fehlbergs_pair_is_a_method():
         (dict(A=HEUN_2, b=[math.nan, 0.5]), "b[0, 0] = nan is not a finite number"),
         (dict(A=HEUN_2, b=[0.5, 0.5], c=[0, -math.inf]), "c[1] = -inf is not a finite number"),
         (dict(A=np.array([[0, 0], [math.nan, 0]]), b=np.array([0.5, 0.5])), "A[1, 0] = nan"),
-        (dict(A=[["0", 0], [None, 1j]], b=[0.5, 0.5]), 'A[0, 0] = "0", A[1, 0] = None, A[1, 1] = 1j are not finite'),
+        (
+            dict(A=[["0", 0], [None, 1j]], b=[0.5, 0.5]),
+            'A[0, 0] = "0", A[1, 0] = None, A[1, 1] = 1j are not finite',
+        ),
         (dict(A=[[False, 0], [1, 0]], b=[0.5, 0.5]), "A[0, 0] = false is not a finite number"),
         (dict(A=[[0], [1, 0]], b=[0.5, 0.5]), "A has rows of different lengths"),
         (dict(A=[[[0, 0], [1, 0]], [1, 0]], b=[0.5, 0.5]), "A has rows of different lengths"),
@@ -290,20 +321,38 @@ def test_a_row_of_weights_of_fehlbergs_pair_is_a_method():
         (dict(text="1 | 1\n--\n | 1", digits=0), "digits = 0 is out of range; expected 1 to 75"),
         (dict(text="1 | 1\n--\n | 1", digits=10**9), "digits = 1000000000 is out of range"),
         (dict(text="1 | 1\n--\n | 1", start_weight="nan"), 'start_weight: "nan": unknown symbol'),
-        (dict(text="1 | 1\n--\n | 1", start_weight="1e400"), 'start_weight: "1e400" is beyond 1e+30'),
-        (dict(text="1/2 | 1/2 0\n1/2 | 0 1/2\n--\n | 1 0", start_weight="1/2"), "expected stages at different times"),
+        (
+            dict(text="1 | 1\n--\n | 1", start_weight="1e400"),
+            'start_weight: "1e400" is beyond 1e+30',
+        ),
+        (
+            dict(text="1/2 | 1/2 0\n1/2 | 0 1/2\n--\n | 1 0", start_weight="1/2"),
+            "expected stages at different times",
+        ),
         (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1]]), "dense: expected 2 rows"),
-        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, 0], [1]]), "with equal numbers of coefficients"),
+        (
+            dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, 0], [1]]),
+            "with equal numbers of coefficients",
+        ),
         (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[1, 2]), "dense: expected 2 rows"),
-        (dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, math.nan], [0, 0.5]]), 'dense, row 1: "nan"'),
+        (
+            dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, math.nan], [0, 0.5]]),
+            'dense, row 1: "nan"',
+        ),
         (
             dict(text="0 |\n1 | 1\n--\n | 1/2 1/2", dense=[[1, -1], [0, 0.5]]),
             "it adds up to 0; expected the weight 1/2",
         ),
-        (dict(text="g | g\n--\n | 1", numbers={"g": ("x^2-2", math.inf)}), "expected a name, with a polynomial"),
+        (
+            dict(text="g | g\n--\n | 1", numbers={"g": ("x^2-2", math.inf)}),
+            "expected a name, with a polynomial",
+        ),
         (dict(text="g | g\n--\n | 1", numbers={"g": 3}), 'numbers: "g" = 3; expected a name'),
         (dict(text="g | g\n--\n | 1", numbers={7: ("x^2-2", 1.4)}), "numbers: 7 ="),
-        (dict(text="g | g\n--\n | 1", numbers={"g": ("(x^64)^64-2", 1.0)}), "is too large for exact arithmetic"),
+        (
+            dict(text="g | g\n--\n | 1", numbers={"g": ("(x^64)^64-2", 1.0)}),
+            "is too large for exact arithmetic",
+        ),
         (dict(text="((((2^64)^64)^64)^64)^64 | 1\n--\n | 1"), "is too large for exact arithmetic"),
         (dict(text="(" * 900 + " | 1\n--\n | 1"), "has more than 20 brackets within each other"),
         (dict(text="1" * 5000 + " | 1\n--\n | 1"), "has 5000 characters; expected at most 1000"),
@@ -320,14 +369,20 @@ def test_entries_that_are_no_numbers_and_wrong_shapes_are_refused_by_name(argume
 
 
 def test_arrays_of_single_precision_count_with_their_own_digits():
-    assert tableau("single", np.array([[0, 0], [1 / 3, 0]], np.float32), np.array([-0.5, 1.5], np.float32)).order == 2
+    assert (
+        tableau(
+            "single", np.array([[0, 0], [1 / 3, 0]], np.float32), np.array([-0.5, 1.5], np.float32)
+        ).order
+        == 2
+    )
 
 
 def test_published_digits_hold_to_their_precision():
     text = "0 |\n0.66666666666667 | 0.66666666666667\n--+--\n | 1/4 3/4"
     assert tableau_order(text) == 2
     with pytest.warns(
-        RuntimeWarning, match="order 1; with exact numbers in place of decimals of 6 digits it has order 2"
+        RuntimeWarning,
+        match="order 1; with exact numbers in place of decimals of 6 digits it has order 2",
     ):
         assert tableau_order(text.replace("0.66666666666667", "0.666666")) == 1
 

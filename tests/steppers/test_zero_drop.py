@@ -32,9 +32,14 @@ def two_tanks(**numerics) -> dict:
 def test_a_given_step_is_taken_whole_and_ends_in_rest(name, build, step):
     result = fvsolve.run(build(method=name, step=step))
     assert result.ok, result.reason
-    assert result.summary["steps"] == round(result.t[-1] / step) and result.summary["newton_failures"] == 0
+    assert (
+        result.summary["steps"] == round(result.t[-1] / step)
+        and result.summary["newton_failures"] == 0
+    )
     probe = str(result.probes[0])
-    assert result[probe][-1] == pytest.approx(101325.0 + 9806.65 * 50.0 if build is dead_end else 5.0 / 3.0, rel=1e-6)
+    assert result[probe][-1] == pytest.approx(
+        101325.0 + 9806.65 * 50.0 if build is dead_end else 5.0 / 3.0, rel=1e-6
+    )
     assert abs(result.ledger["mass"]["relative"]) < 1e-13
 
 
@@ -83,7 +88,9 @@ def rooted(t, y):
     return -50.0 * np.sign(y) * np.sqrt(np.abs(y))
 
 
-@pytest.mark.parametrize("name, own, known", [("implicit-euler", 5.0, 0.0), ("trapezoid", 2.5, 2.5)])
+@pytest.mark.parametrize(
+    "name, own, known", [("implicit-euler", 5.0, 0.0), ("trapezoid", 2.5, 2.5)]
+)
 def test_a_long_step_over_a_bare_root_ends_by_its_quadratic(name, own, known):
     """A step solves y+ + own sign(y+) sqrt|y+| = 1 - known, a quadratic equation in sqrt|y+|."""
     right = 1.0 - known
@@ -94,9 +101,12 @@ def test_a_long_step_over_a_bare_root_ends_by_its_quadratic(name, own, known):
 
 @pytest.mark.parametrize("name", ["auto", "rodas-4", "rodas-5p", "radau-iia-5", "dormand-prince"])
 @pytest.mark.parametrize(
-    "volume, area, opening", [(0.01, 1e-4, 1.0), (0.1, 1e-3, 1.0), (1.0, 1e-5, 1.0), (0.1, 2e-3, 0.5)]
+    "volume, area, opening",
+    [(0.01, 1e-4, 1.0), (0.1, 1e-3, 1.0), (1.0, 1e-5, 1.0), (0.1, 2e-3, 0.5)],
 )
-def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(name, volume, area, opening):
+def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(
+    name, volume, area, opening
+):
     """A chamber fills along a parabola and is at rest after less than 200 steps.
 
     The root of the drop decreases by beta A sqrt(2 / rho) / (2 V) per second, with A the effective area. Earlier,
@@ -109,9 +119,12 @@ def test_a_chamber_that_fills_is_at_rest_after_few_steps_under_error_control(nam
     nodes = {"lake": reservoir(high), "pot": chamber(volume, low)}
     links = {"tap": {**valve("lake", "pot", area), "opening": opening}}
     numerics = {"method": name, "rtol": 1e-6}
-    result = fvsolve.run(scene(nodes, links, 100.0 * whole, numerics, ["pot.pressure"], 0.1 * whole))
+    result = fvsolve.run(
+        scene(nodes, links, 100.0 * whole, numerics, ["pot.pressure"], 0.1 * whole)
+    )
     truth = high - np.maximum(np.sqrt(high - low) - pace * result.t, 0.0) ** 2
-    assert result["pot.pressure"] == pytest.approx(truth, abs=2e-6 * high)  # sum of the errors of steps
+    # sum of the errors of steps
+    assert result["pot.pressure"] == pytest.approx(truth, abs=2e-6 * high)
     assert abs(result["pot.pressure"][-1] - high) < 1e-2
     if name != "dormand-prince":  # its steps are limited by stability
         assert result.summary["steps"] < 200
@@ -128,15 +141,29 @@ def test_a_node_filled_through_a_moving_valve_comes_to_rest_in_few_steps(name, k
     if kind == "valve":
         links = {"tap": {**ends, **area, "opening": slow}}
     elif kind == "relief-valve":
-        links = {"tap": {**ends, **area, "set_pressure": 1e4, "overpressure": 1e4, "time_constant": 0.1}}
+        links = {
+            "tap": {**ends, **area, "set_pressure": 1e4, "overpressure": 1e4, "time_constant": 0.1}
+        }
     elif kind == "check-valve":
-        links = {"tap": {**ends, **area, "cracking_pressure": 0.0, "overpressure": 1e3, "time_constant": 0.1}}
+        links = {
+            "tap": {
+                **ends,
+                **area,
+                "cracking_pressure": 0.0,
+                "overpressure": 1e3,
+                "time_constant": 0.1,
+            }
+        }
     else:
         nodes |= {"other": chamber(0.1, 1e5), "sump": reservoir(1e5)}
         ports = {"P": "lake", "T": "sump", "A": "pot", "B": "other"}
         links = {"tap": {"type": kind, "ports": ports, **area, "position": slow}}
-    result = fvsolve.run(scene(nodes, links, 4.0, {"method": name, "rtol": 1e-6}, ["pot.pressure"], 0.5))
-    assert result.ok and result["pot.pressure"][-1] == pytest.approx(5e5, abs=1e-2 if kind != "check-valve" else 10.0)
+    result = fvsolve.run(
+        scene(nodes, links, 4.0, {"method": name, "rtol": 1e-6}, ["pot.pressure"], 0.5)
+    )
+    assert result.ok and result["pot.pressure"][-1] == pytest.approx(
+        5e5, abs=1e-2 if kind != "check-valve" else 10.0
+    )
     assert result.summary["steps"] < 300
 
 

@@ -53,7 +53,14 @@ START, DURATION, END = 0.05, 0.4, 1.3
 def pot(end=30.0, **numerics) -> dict:
     """Case of a chamber that fills through an orifice; its drop is a parabola in time."""
     nodes = {"pump": reservoir(SUPPLY), "pot": chamber(VOLUME, P0)}
-    return scene(nodes, {"hole": valve("pump", "pot", HOLE)}, end, numerics, ["pot.pressure", "hole.flow"], end / 200)
+    return scene(
+        nodes,
+        {"hole": valve("pump", "pot", HOLE)},
+        end,
+        numerics,
+        ["pot.pressure", "hole.flow"],
+        end / 200,
+    )
 
 
 def pot_pressure(t):
@@ -65,15 +72,22 @@ def line(opening=None, cells=40, end=END, **numerics) -> dict:
     """Case of a reservoir, a frictionless pipe and a closing valve, whose opening is a smooth polynomial by default."""
     nodes = {"lake": reservoir(PRESSURE), "gate": junction(), "out": reservoir(AMBIENT)}
     opening = smooth_ramp(START, DURATION, 1.0, 0.0) if opening is None else opening
-    links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells), "tap": valve("gate", "out", OPEN, opening)}
-    return scene(nodes, links, end, numerics, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005)
+    links = {
+        "main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, cells),
+        "tap": valve("gate", "out", OPEN, opening),
+    }
+    return scene(
+        nodes, links, end, numerics, ["gate.pressure", "tap.flow", "main.pressure@0.5"], 0.005
+    )
 
 
 def line_rays(opening=lambda t: 1.0 - smooth_step(t, START, DURATION)) -> frictionless.Rays:
     flow = OPEN * math.sqrt(2 * (PRESSURE - AMBIENT) / RHO)
     main = frictionless.Pipe("lake", "gate", LENGTH, DIAMETER, SPEED, flow, PRESSURE)
     outlets = {"gate": (lambda t: OPEN * opening(t), AMBIENT)}
-    return frictionless.Rays(RHO, {"main": main}, {"lake": frictionless.held(PRESSURE)}, outlets=outlets)
+    return frictionless.Rays(
+        RHO, {"main": main}, {"lake": frictionless.held(PRESSURE)}, outlets=outlets
+    )
 
 
 def exact_rows(t) -> np.ndarray:
@@ -95,7 +109,9 @@ def mean_error(values, exact, t) -> float:
 
 
 def test_errors_of_a_filling_chamber_are_those_against_its_parabola():
-    found = chart(pot(), methods=["rk4", "dormand-prince"], rtol=[1e-2, 1e-4, 1e-6], step=[2.0, 0.5])
+    found = chart(
+        pot(), methods=["rk4", "dormand-prince"], rtol=[1e-2, 1e-4, 1e-6], step=[2.0, 0.5]
+    )
     checked = 0
     for point in found.points:
         run = fvsolve.run(pot(), {**point.setting.keys})
@@ -106,7 +122,8 @@ def test_errors_of_a_filling_chamber_are_those_against_its_parabola():
         laminar = 1e-5  # effect of the laminar law near zero drop, which the closed form lacks
         assert point.trajectory == pytest.approx(own, abs=laminar + 2 * found.floor["trajectory"])
         last = max(
-            abs(run["pot.pressure"][-1] - p[-1]) / np.ptp(p), abs(run["hole.flow"][-1] - flow[-1]) / np.ptp(flow)
+            abs(run["pot.pressure"][-1] - p[-1]) / np.ptp(p),
+            abs(run["hole.flow"][-1] - flow[-1]) / np.ptp(flow),
         )
         assert point.end == pytest.approx(last.max(), abs=10 * laminar)
         checked += own > 10 * laminar
@@ -123,7 +140,9 @@ def test_errors_of_a_closing_valve_are_those_against_exact_rays(closing):
     checked = 0
     for point in closing.points:
         run = fvsolve.run(line(), {**point.setting.keys})
-        values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+        values = np.column_stack(
+            [run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")]
+        )
         own = mean_error(values, exact_rows(run.t), run.t)
         assert point.trajectory == pytest.approx(own, abs=2 * closing.floor["trajectory"] + 1e-7)
         checked += own > 10 * closing.floor["trajectory"]
@@ -132,7 +151,9 @@ def test_errors_of_a_closing_valve_are_those_against_exact_rays(closing):
 
 def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     """Exact cell averages by Gauss points; pressure errors relative to the range of pressure in the pipe over time."""
-    point = next(p for p in closing.points if p.setting.name == "upwind rk4" and p.setting.cells == 20)
+    point = next(
+        p for p in closing.points if p.setting.name == "upwind rk4" and p.setting.cells == 20
+    )
     ended = outcome(line(), point.setting.keys)
     frame = ended.model.fields(ended.y, ended.model.evaluate(END, ended.y)[1])["main"]
     truth, nodes = line_rays(), np.polynomial.legendre.leggauss(4)
@@ -145,13 +166,16 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
     span = max(seen) - min(seen)
     p, q = frame["pressure"], frame["flow"]
     worst = max(
-        np.mean(np.abs(p - exact[0])) / span, np.mean(np.abs(q - exact[1])) / (span * area(DIAMETER) / (RHO * SPEED))
+        np.mean(np.abs(p - exact[0])) / span,
+        np.mean(np.abs(q - exact[1])) / (span * area(DIAMETER) / (RHO * SPEED)),
     )
     assert point.end >= 0.98 * worst - 2 * closing.floor["end"]
     rows = fvsolve.run(line(), point.setting.keys)
     last = exact_rows(np.array([END]))[0]
     ranges = np.ptp(exact_rows(times), axis=0)
-    at_end = np.array([rows[name][-1] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    at_end = np.array(
+        [rows[name][-1] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")]
+    )
     worst = max(worst, *(np.abs(at_end - last) / ranges))
     assert point.end == pytest.approx(worst, rel=0.02, abs=2 * closing.floor["end"])
 
@@ -176,7 +200,10 @@ def test_every_probe_is_measured_by_its_own_range_and_a_constant_probe_by_none()
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, 1e6 + 10.0 * t, 1e-3 * t, np.full(5, 7.0)])
     off = exact + np.array([0.0, 0.1, 2e-5, 3.0])
-    found = distance(finished_outcome(off, "a", "b", "c"), reference_of_run(finished_outcome(exact, "a", "b", "c")))
+    found = distance(
+        finished_outcome(off, "a", "b", "c"),
+        reference_of_run(finished_outcome(exact, "a", "b", "c")),
+    )
     assert found.worst == "b"
     assert found.trajectory == pytest.approx(0.02)
     assert found.overshoot == pytest.approx(0.02)
@@ -197,7 +224,9 @@ def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
         edges = np.linspace(0.0, 1.0, n + 1)
         return np.diff(np.sin(2 * edges) / 2) * n
 
-    assert cell_averages(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
+    assert cell_averages(cells(fine), coarse) == pytest.approx(
+        cells(coarse), abs=1e-12 if fine == 40 else 1e-5
+    )
 
 
 # floor ------------------------------------------------------------------------------------------------------------
@@ -223,10 +252,14 @@ def test_references_that_agree_by_chance_have_the_floor_of_their_own_error():
 @pytest.mark.parametrize("order", [1.0, 2.0, 5.0])
 def test_halved_steps_give_the_error_of_a_reference(order):
     t = np.linspace(0.0, 1.0, 11)
-    runs = [finished_outcome(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
+    runs = [
+        finished_outcome(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a")
+        for k in range(3)
+    ]
     exact = reference_of_run(finished_outcome(np.column_stack([t, t]), "a"))
     own = reference_of_refinements("", runs).uncertainty.trajectory
-    assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # safety factor 1.5
+    # safety factor 1.5
+    assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)
 
 
 def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
@@ -235,12 +268,16 @@ def test_the_floor_of_a_sudden_closure_covers_the_true_error_of_its_reference():
     case = line(step(jump, 1.0, 0.0))
     found = chart(case, schemes=["muscl"], methods=["ssp-rk3"], cells=[20, 40])
     truth = line_rays(frictionless.step(jump, 1.0, 0.0))
-    run = fvsolve.run(case, {"numerics.scheme": "muscl", "numerics.method": "ssp-rk3", "links.main.cells": 40})
+    run = fvsolve.run(
+        case, {"numerics.scheme": "muscl", "numerics.method": "ssp-rk3", "links.main.cells": 40}
+    )
     gate = np.array([truth.pressure("gate", t) for t in run.t])
     twice = np.flatnonzero(np.diff(run.t) == 0)
     gate[twice] = truth.pressure("gate", jump - 1e-9)
     own = mean_error(run["gate.pressure"][:, None], gate[:, None], run.t)
-    [point] = [one for one in found.points if (one.setting.scheme, one.setting.cells) == ("muscl", 40)]
+    [point] = [
+        one for one in found.points if (one.setting.scheme, one.setting.cells) == ("muscl", 40)
+    ]
     assert point.trajectory >= own - found.floor["trajectory"]
     assert found.floor["trajectory"] < 0.5 * own
 
@@ -278,11 +315,21 @@ def test_no_overshoot_is_claimed_below_the_error_of_the_references(tmp_path):
     points = [json.loads(text) for text in (tmp_path / "points.jsonl").read_text().splitlines()]
     raw = [one["found"]["overshoot"] for one in points if "overshoot" in one["found"]]
     floor, *blur = raw[:3]  # upwind with euler
-    assert "exact" not in found.reference and min(blur) > 1e-3 and found.floor["overshoot"] == floor > max(blur)
+    assert (
+        "exact" not in found.reference
+        and min(blur) > 1e-3
+        and found.floor["overshoot"] == floor > max(blur)
+    )
     assert [one.overshoot for one in found.curves()["upwind euler"]] == [0.0, 0.0]
     exact = chart(case | {"exact": {"name": "rays"}}, **given, out=tmp_path / "exact")
-    points = [json.loads(text) for text in (tmp_path / "exact" / "points.jsonl").read_text().splitlines()]
-    true = [one["found"]["overshoot"] for one in points if "upwind" == one["of"].get("keys", {}).get("numerics.scheme")]
+    points = [
+        json.loads(text) for text in (tmp_path / "exact" / "points.jsonl").read_text().splitlines()
+    ]
+    true = [
+        one["found"]["overshoot"]
+        for one in points
+        if "upwind" == one["of"].get("keys", {}).get("numerics.scheme")
+    ]
     assert len(true) == 4 and max(true) < 1e-6 and exact.reference == 'exact solution "rays"'
 
 
@@ -303,9 +350,13 @@ def stiff() -> dict:
 
 
 def test_failed_runs_are_in_list_table_and_picture(tmp_path):
-    found = chart(stiff(), methods=["rk4", "dormand-prince"], rtol=[1e-3, 1e-6], step=[2e-3, 1e-30, 1e-6])
+    found = chart(
+        stiff(), methods=["rk4", "dormand-prince"], rtol=[1e-3, 1e-6], step=[2e-3, 1e-30, 1e-6]
+    )
     by_step = {point.setting.size: point for point in found.points if point.setting.method == "rk4"}
-    assert not by_step[2e-3].ok and ("not finite" in by_step[2e-3].reason or "wrong" in by_step[2e-3].reason)
+    assert not by_step[2e-3].ok and (
+        "not finite" in by_step[2e-3].reason or "wrong" in by_step[2e-3].reason
+    )
     assert not by_step[1e-30].ok and by_step[1e-30].reason.startswith("refused: ")
     assert by_step[1e-6].ok
     assert [point.setting.size for point in found.failed] == [2e-3, 1e-30]
@@ -313,12 +364,18 @@ def test_failed_runs_are_in_list_table_and_picture(tmp_path):
     lines = list(csv.DictReader((tmp_path / "chart.csv").open()))
     assert len(lines) == len(found.points)
     assert [line["reason"].split(":")[0] for line in lines if line["ok"] == "0"][1:] == ["refused"]
-    drawn = [one for one in chart_picture(found).axes[0].lines if one.get_markerfacecolor() == "none"]
+    drawn = [
+        one for one in chart_picture(found).axes[0].lines if one.get_markerfacecolor() == "none"
+    ]
     assert sum(len(one.get_xdata()) for one in drawn) == 1  # the refused run has no cost
-    assert not any(row.name == "rk4" and row.target < 1e-2 for row in found.front if row.by_updates is None)
+    assert not any(
+        row.name == "rk4" and row.target < 1e-2 for row in found.front if row.by_updates is None
+    )
 
 
-def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_curve(monkeypatch, capsys):
+def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_curve(
+    monkeypatch, capsys
+):
     """A chamber of 1 microlitre needs millions of explicit steps in 10 s, at any tolerance."""
     monkeypatch.setattr(timing, "CPU_LIMIT", 0.3)
     case = stiff()
@@ -329,7 +386,10 @@ def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_
     first, *finer = found.curves()["dormand-prince"]
     assert not first.ok and first.reason.startswith("given up after 0.") and first.steps > 1000
     assert 0.3 < first.seconds < 2.0
-    assert all(not one.ok and "rtol 0.01 was already given up" in one.reason and one.steps == 0 for one in finer)
+    assert all(
+        not one.ok and "rtol 0.01 was already given up" in one.reason and one.steps == 0
+        for one in finer
+    )
     assert all(one.ok for one in found.curves()["rodas-5p"])
 
 
@@ -346,7 +406,8 @@ def test_the_front_names_the_cheapest_curve_by_updates_and_the_default(closing):
     assert "weno5 rk4" in closing.curves()
     row = next(row for row in closing.front if row.target == pytest.approx(1e-3))
     fine = {
-        name: [p for p in points if p.trajectory <= 1e-3] for name, points in curves_by_name(closing.points).items()
+        name: [p for p in points if p.trajectory <= 1e-3]
+        for name, points in curves_by_name(closing.points).items()
     }
     assert row.by_updates == "upwind5 rk4"
     assert row.updates <= min(point.updates for points in fine.values() for point in points)
@@ -367,7 +428,9 @@ def test_pasted_lines_reach_the_target(tmp_path):
     """Lines are pasted as text into the file, run, and compared with exact rays."""
     target = 3e-3
     case = line(cells=37)
-    found = chart(case, schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40], target=target)
+    found = chart(
+        case, schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40], target=target
+    )
     numerics, _, others = "\n".join(found.aim.toml_lines()).partition("\n\n")
     case["numerics"] = {"end": END}
     ((name, table),) = tomllib.loads(others)["links"].items()
@@ -375,10 +438,14 @@ def test_pasted_lines_reach_the_target(tmp_path):
     file = tmp_path / "pasted.toml"
     file.write_text(write(case).replace("[numerics]\n", f"[numerics]\n{numerics}\n"))
     run = fvsolve.run(file)
-    values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    values = np.column_stack(
+        [run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")]
+    )
     own = mean_error(values, exact_rows(run.t), run.t)
     assert own <= target
-    assert own == pytest.approx(found.aim.point.trajectory, abs=2 * found.floor["trajectory"] + 1e-7)
+    assert own == pytest.approx(
+        found.aim.point.trajectory, abs=2 * found.floor["trajectory"] + 1e-7
+    )
     assert own > target / 30  # not far more accurate than needed
 
 
@@ -389,7 +456,9 @@ def test_pipes_that_state_no_cells_are_given_a_cell_time(tmp_path):
     case["numerics"] = {"end": END, **tomllib.loads("\n".join(found.aim.toml_lines()))}
     run = fvsolve.run(case)
     assert run.case.links["main"].cells == found.aim.point.setting.cells
-    values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])
+    values = np.column_stack(
+        [run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")]
+    )
     assert mean_error(values, exact_rows(run.t), run.t) <= 1e-2
 
 
@@ -421,14 +490,19 @@ def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
     case = line(smooth_ramp(0.02, 0.2, 1.0, 0.5, 101), end=0.4)
     case["nodes"]["gate"] = chamber(1e-2)
     found = chart(case, schemes=["upwind5"], methods=["rodas-5p"], cells=[10, 20])
-    assert "rodas-5p" in found.reference + found.second and "radau-iia-5" in found.reference + found.second
+    assert (
+        "rodas-5p" in found.reference + found.second
+        and "radau-iia-5" in found.reference + found.second
+    )
     names = ("gate.pressure", "tap.flow", "main.pressure@0.5")
     fine = {"numerics.scheme": "upwind5", "numerics.method": "rk4", "links.main.cells": 80}
     explicit = fvsolve.run(case, fine)
     for point in found.points:
         run = fvsolve.run(case, point.setting.keys)
         off = mean_error(
-            np.column_stack([run[name] for name in names]), np.column_stack([explicit[name] for name in names]), run.t
+            np.column_stack([run[name] for name in names]),
+            np.column_stack([explicit[name] for name in names]),
+            run.t,
         )
         assert point.trajectory == pytest.approx(off, rel=0.1, abs=2 * found.floor["trajectory"])
 
@@ -468,7 +542,8 @@ def test_a_target_is_followed_down_to_settings_that_were_not_named(case, given):
     asked = [
         one.updates
         for one in found.points
-        if one.setting.cells in given.get("cells", ()) or one.setting.size in given.get("step", given.get("rtol", ()))
+        if one.setting.cells in given.get("cells", ())
+        or one.setting.size in given.get("step", given.get("rtol", ()))
     ]
     assert min(updates) < 0.5 * min(asked)
 
@@ -504,7 +579,9 @@ def test_a_crossing_on_a_power_law_is_exact(order, ratio):
     target = 8.0 / min(ratio, 2.0 ** (3.0 * order) * 0.999)
     where = find_crossing(errors, COSTS, target)
     assert where.cost == pytest.approx((8.0 / target) ** (2.0 / order), rel=1e-9)
-    assert COSTS[where.coarser] <= where.cost * (1 + 1e-12) and where.cost <= COSTS[where.finer] * (1 + 1e-12)
+    assert COSTS[where.coarser] <= where.cost * (1 + 1e-12) and where.cost <= COSTS[where.finer] * (
+        1 + 1e-12
+    )
 
 
 def test_a_crossing_counts_only_from_where_all_finer_points_hold():

@@ -19,7 +19,8 @@ from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import optimise, scenarios
 from fvsolve.studies.sizing import SizeRun, SizeSearch, parse_range, parse_ties, size, size_run
 
-FAST = STUDY.replace(STUDY[STUDY.index("[events.slow]") : STUDY.index("[protections.none]")], "")  # with one event
+# with one event
+FAST = STUDY.replace(STUDY[STUDY.index("[events.slow]") : STUDY.index("[protections.none]")], "")
 
 
 @pytest.fixture
@@ -32,9 +33,14 @@ def study(tmp_path):
 def test_every_event_with_every_protection_equals_a_run_of_its_own(study, tmp_path) -> None:
     found = scenarios.study(study, tmp_path / "out")
     assert [(row["event"], row["protection"]) for row in found.rows] == [
-        ("fast", "none"), ("fast", "vessel"), ("slow", "none"), ("slow", "vessel")]  # fmt: skip
+        ("fast", "none"),
+        ("fast", "vessel"),
+        ("slow", "none"),
+        ("slow", "vessel"),
+    ]
     alone = fvsolve.run(
-        tmp_path / "main.toml", {"links.tap.opening": {"start": 0.5, "duration": 0.1, "value": [1.0, 0.0]}}
+        tmp_path / "main.toml",
+        {"links.tap.opening": {"start": 0.5, "duration": 0.1, "value": [1.0, 0.0]}},
     )
     assert found.rows[0]["verdicts"][0]["value"] == alone.verdicts[0].value
     assert not found.rows[0]["verdicts"][0]["ok"] and found.rows[1]["verdicts"][0]["ok"]
@@ -73,17 +79,27 @@ def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
     banded = scenarios.study(study, tmp_path / "two", jobs=2)
     for row, beside in zip(one.rows, banded.rows, strict=True):
         assert row["extremes"] == beside["extremes"]
-        for verdict, other in zip(row["verdicts"], beside["verdicts"], strict=True):  # open places come first
-            assert other["value"] == verdict["value"] or (other["error"] is None and other["state"] == "open")
-        errors = [verdict["error"] for verdict in beside["verdicts"]]  # unknown beside a piece of one cell
+        # open places come first
+        for verdict, other in zip(row["verdicts"], beside["verdicts"], strict=True):
+            assert other["value"] == verdict["value"] or (
+                other["error"] is None and other["state"] == "open"
+            )
+        # unknown beside a piece of one cell
+        errors = [verdict["error"] for verdict in beside["verdicts"]]
         assert all(error is None or error > 0.0 for error in errors)
         assert any(errors) or row["protection"] == "vessel"
 
 
-def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(fvs, study, tmp_path) -> None:
+def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
+    fvs, study, tmp_path
+) -> None:
     study.write_text(FAST)
     status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "out"))
-    assert status == 0 and "all limits hold in all events with: vessel" in text and "fast with none" in text
+    assert (
+        status == 0
+        and "all limits hold in all events with: vessel" in text
+        and "fast with none" in text
+    )
     study.write_text(FAST[: FAST.index("[protections.vessel")])
     status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "other"))
     assert status == 1 and "no protection satisfies all limits in all events" in text
@@ -116,16 +132,27 @@ def test_faults_are_named(study, change, told: str) -> None:
 
 
 def test_all_that_is_wrong_of_a_study_comes_at_once_by_line(study) -> None:
-    text = STUDY.replace('title = "Two taps"', "title = 3").replace('duration = "3 s"', 'duration = "3 kg"')
-    text = text.replace("[protections.none]", "[protections.none]\nlinks.tap.aera = 2").replace('"main"', '"mian"')
-    study.write_text(text + "[events.cut]\nlinks.main.cells = 20\n[protections.fine]\nlinks.main.cells = 10\n")
+    text = STUDY.replace('title = "Two taps"', "title = 3").replace(
+        'duration = "3 s"', 'duration = "3 kg"'
+    )
+    text = text.replace("[protections.none]", "[protections.none]\nlinks.tap.aera = 2").replace(
+        '"main"', '"mian"'
+    )
+    study.write_text(
+        text + "[events.cut]\nlinks.main.cells = 20\n[protections.fine]\nlinks.main.cells = 10\n"
+    )
     with pytest.raises(CaseError) as error:
         scenarios.study(study, study.parent / "out")
-    assert [str(one).partition(": ")[0] for one in error.value.faults] == [f"line {n}" for n in (2, 9, 12, 18, 21)]
+    assert [str(one).partition(": ")[0] for one in error.value.faults] == [
+        f"line {n}" for n in (2, 9, 12, 18, 21)
+    ]
     assert [one.place for one in error.value.faults] == [
-        "title", "events.slow.links.tap.opening.duration", "protections.none.links.tap.aera",
-        "protections.vessel.nodes.vessel.on", "events.cut.links.main.cells",
-    ]  # fmt: skip
+        "title",
+        "events.slow.links.tap.opening.duration",
+        "protections.none.links.tap.aera",
+        "protections.vessel.nodes.vessel.on",
+        "events.cut.links.main.cells",
+    ]
 
 
 def test_a_study_without_limits_holds_none(fvs, study, tmp_path, monkeypatch) -> None:
@@ -133,9 +160,16 @@ def test_a_study_without_limits_holds_none(fvs, study, tmp_path, monkeypatch) ->
     study.write_text(FAST)
     (tmp_path / "main.toml").write_text(write(throttled() | {"limits": {}}))
     status, text, _ = fvs("study", "taps.toml", "--out", "out")
-    assert status == 0 and "no limits" in text and "hold in all events" not in text and "holds" not in text
+    assert (
+        status == 0
+        and "no limits" in text
+        and "hold in all events" not in text
+        and "holds" not in text
+    )
     said = json.loads((tmp_path / "out" / "study.json").read_text())
-    assert (said["holds"], said["ok"]) == ([], True) and all(row["verdicts"] == [] for row in said["runs"])
+    assert (said["holds"], said["ok"]) == ([], True) and all(
+        row["verdicts"] == [] for row in said["runs"]
+    )
     status, text, _ = fvs("report", "out")
     page = (tmp_path / "out" / "report.html").read_text()
     assert status == 0 and "No limits were stated" in page and "All limits hold" not in page
@@ -143,9 +177,16 @@ def test_a_study_without_limits_holds_none(fvs, study, tmp_path, monkeypatch) ->
 
 def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
     """Limits may come from one event only; a protection whose runs have no limits does not hold."""
-    rows = [{"event": event, "protection": protection, "ok": True,
-             "verdicts": [{"ok": True}] if protection == "vessel" and event == "fast" else []}
-            for event in ("fast", "slow") for protection in ("none", "vessel")]  # fmt: skip
+    rows = [
+        {
+            "event": event,
+            "protection": protection,
+            "ok": True,
+            "verdicts": [{"ok": True}] if protection == "vessel" and event == "fast" else [],
+        }
+        for event in ("fast", "slow")
+        for protection in ("none", "vessel")
+    ]
     found = scenarios.ScenarioResults(None, tmp_path, rows)
     assert found.limited and found.holds == ["vessel"] and found.ok
 
@@ -153,16 +194,26 @@ def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
 def test_the_commands_of_the_page_print_its_text(fvs, tmp_path, monkeypatch) -> None:
     """Each command of docs/designs.md prints the results on the page; the study is coarser and shorter here."""
     text = (DOCS / "designs.md").read_text(encoding="utf-8")
-    lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
+    lines = [
+        line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()
+    ]
     assert [line.split()[1] for line in lines] == ["study", "size", "optimise"]
     shutil.copytree(DOCS.parent / "cases", tmp_path / "cases")
-    copied = tmp_path / "cases" / "pumping-main.toml"  # of the study alone: the other commands use the shipped case
-    shorter = copied.read_text(encoding="utf-8").replace("cells = 120", "cells = 30").replace('"60 s"', '"30 s"')
+    # of the study alone: the other commands use the shipped case
+    copied = tmp_path / "cases" / "pumping-main.toml"
+    shorter = (
+        copied.read_text(encoding="utf-8")
+        .replace("cells = 120", "cells = 30")
+        .replace('"60 s"', '"30 s"')
+    )
     copied.write_text(shorter, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     said = [fvs(*shlex.split(line.replace("--jobs 2", "--jobs 1"))[1:]) for line in lines]
     assert [status for status, _, _ in said] == [0, 0, 0]
-    assert "all limits hold in all events with: vessel" in said[0][1] and said[0][1].count("FAILS") == 4
+    assert (
+        "all limits hold in all events with: vessel" in said[0][1]
+        and said[0][1].count("FAILS") == 4
+    )
     assert "minimum value that satisfies all limits: 25.1" in said[1][1]
     assert re.search(r"^opening = { time.*$", text, re.M)[0] in said[2][1]
 
@@ -174,7 +225,9 @@ def still(minimum: float | None = None, maximum: float | None = None) -> dict:
     """Case of a lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
     case = throttled()
     case["links"]["tap"]["opening"] = 0.0
-    bounds = {key: one for key, one in (("minimum", minimum), ("maximum", maximum)) if one is not None}
+    bounds = {
+        key: one for key, one in (("minimum", minimum), ("maximum", maximum)) if one is not None
+    }
     return case | {"limits": {"gate": {"on": "gate", "quantity": "gauge_pressure", **bounds}}}
 
 
@@ -221,13 +274,25 @@ def margins(rule):
 @pytest.mark.parametrize("goal", ["minimum", "maximum"])
 @pytest.mark.parametrize(
     "low, high",
-    [(3.8, 4.2), (3.99, 4.01), (11.7, 11.71), (17.0, 17.05), (0.6, 0.62), (19.3, 19.31), (5.0, 5.001)],
+    [
+        (3.8, 4.2),
+        (3.99, 4.01),
+        (11.7, 11.71),
+        (17.0, 17.05),
+        (0.6, 0.62),
+        (19.3, 19.31),
+        (5.0, 5.001),
+    ],
 )
 def test_a_narrow_window_with_known_margins_is_located(goal, low, high) -> None:
     """Windows of 0.005 % to 2 % of the range 0 to 20, with margins relative to the limits as those of a tank."""
-    found = margins(lambda x: min((x - low) / low, (high - x) / high)).search(0.0, 20.0, goal, 1e-3)[0]
+    found = margins(lambda x: min((x - low) / low, (high - x) / high)).search(
+        0.0, 20.0, goal, 1e-3
+    )[0]
     assert found is not None and low <= found <= high
-    bent = margins(lambda x: 1e-4 - abs(x - 0.5 * (low + high)) ** 1.5 / 20.0).search(0.0, 20.0, goal, 1e-3)[0]
+    bent = margins(lambda x: 1e-4 - abs(x - 0.5 * (low + high)) ** 1.5 / 20.0).search(
+        0.0, 20.0, goal, 1e-3
+    )[0]
     assert bent is not None and abs(bent - 0.5 * (low + high)) ** 1.5 <= 2e-3
 
 
@@ -247,18 +312,32 @@ def test_ties_follow_in_si(unit) -> None:
         rtol=0.01,
     )
     assert found.ties == ("links.main.length = 10 * x",)
-    assert found.unit == unit and found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
+    assert found.unit == unit and found.value * 0.3048 == pytest.approx(
+        10.0 + 3e5 / (RHO * GRAVITY), rel=0.02
+    )
 
 
 def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
     (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
-    status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20 m,80 m")
-    assert status == 0 and "minimum value that satisfies all limits" in text and text.count("holds") > 1
-    status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json")
+    status, text, _ = fvs(
+        "size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20 m,80 m"
+    )
+    assert (
+        status == 0
+        and "minimum value that satisfies all limits" in text
+        and text.count("holds") > 1
+    )
+    status, text, _ = fvs(
+        "size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json"
+    )
     said = json.loads(text)
     assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30")
-    assert status == 1 and "the nearest to the limits is 30" in text and "; try values above it" in text
+    assert (
+        status == 1
+        and "the nearest to the limits is 30" in text
+        and "; try values above it" in text
+    )
     assert {"value", "bracket", "runs"} <= set(said)
 
 
@@ -283,15 +362,41 @@ def test_parameters_that_cannot_be_sized_are_reported() -> None:
 def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
     (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
     case = str(tmp_path / "still.toml")
-    status, _, told = fvs("size", case, "--vary", "nodes.lake.head=80,20", "--goal", "minimim", "--rtol", "3",
-                          "--dependent", "links.main.length", "--set", "links.mian.cells=3")  # fmt: skip
-    assert status == 2 and "5 faults" in told and 'did you mean "minimum"' in told and 'did you mean "main"' in told
-    status, _, told = fvs("size", case, "--vary", "nodes.lake.haed=20,80", "--dependent", "links.main.lenght=x")
+    status, _, told = fvs(
+        "size",
+        case,
+        "--vary",
+        "nodes.lake.head=80,20",
+        "--goal",
+        "minimim",
+        "--rtol",
+        "3",
+        "--dependent",
+        "links.main.length",
+        "--set",
+        "links.mian.cells=3",
+    )
+    assert (
+        status == 2
+        and "5 faults" in told
+        and 'did you mean "minimum"' in told
+        and 'did you mean "main"' in told
+    )
+    status, _, told = fvs(
+        "size", case, "--vary", "nodes.lake.haed=20,80", "--dependent", "links.main.lenght=x"
+    )
     assert status == 2 and "2 faults" in told
     assert '--vary nodes.lake.haed: unknown key; did you mean "head"' in told
     assert "--dependent links.main.lenght" in told
     status, _, told = fvs(
-        "optimise", case, "--schedule", "links.tap.openning", "--minimise", "max(gaet.head)", "--knots", "0"
+        "optimise",
+        case,
+        "--schedule",
+        "links.tap.openning",
+        "--minimise",
+        "max(gaet.head)",
+        "--knots",
+        "0",
     )
     assert status == 2 and "3 faults" in told and 'did you mean "links.tap.opening"' in told
 
@@ -303,9 +408,18 @@ def test_an_open_limit_states_if_its_value_or_its_error_is_not_known(margin, wha
     rows = [row, row | {"margin": margin, "error": None}]
     blank = dict.fromkeys(LimitVerdict._fields)
     verdicts = [
-        LimitVerdict(**blank | {"name": name, "ok": ok, "state": state, "quantity": "head", "worst": [row]} | given)
+        LimitVerdict(
+            **blank
+            | {"name": name, "ok": ok, "state": state, "quantity": "head", "worst": [row]}
+            | given
+        )
         for name, ok, state, row, given in zip(
-            ("first", "second"), (True, False), (HOLDS, OPEN), rows, ({}, {"margin": margin}), strict=True
+            ("first", "second"),
+            (True, False),
+            (HOLDS, OPEN),
+            rows,
+            ({}, {"margin": margin}),
+            strict=True,
         )
     ]
     result = SimpleNamespace(verdicts=verdicts, marks=[], warnings=[], ok=True, reason="finished")
@@ -322,8 +436,16 @@ LENGTH, DIAMETER, TIME, SUPPLY = 100.0, 0.3, 4.0, 1.2e5
 def column() -> dict:
     """Case of a frictionless rigid column that a valve stops within TIME."""
     nodes = {"lake": reservoir(SUPPLY), "gate": junction(), "air": reservoir(AMBIENT)}
-    links = {"main": {"type": "rigid-column", "from": "lake", "to": "gate", "length": LENGTH, "diameter": DIAMETER},
-             "tap": valve("gate", "air", 0.5 * area(DIAMETER), ramp(0.5, TIME, 1.0, 0.0))}  # fmt: skip
+    links = {
+        "main": {
+            "type": "rigid-column",
+            "from": "lake",
+            "to": "gate",
+            "length": LENGTH,
+            "diameter": DIAMETER,
+        },
+        "tap": valve("gate", "air", 0.5 * area(DIAMETER), ramp(0.5, TIME, 1.0, 0.0)),
+    }
     return scene(nodes, links, 5.0, {"method": "rk4", "step": 0.01}, ["gate.pressure", "main.flow"])
 
 
@@ -337,17 +459,33 @@ def test_it_comes_near_the_least_that_can_be() -> None:
     assert least < rise < 0.85 * linear and rise < 1.6 * least
     assert found.best.value[0] == 1.0 and found.best.value[-1] == 0.0
     assert all(a >= b for a, b in zip(found.best.value, found.best.value[1:], strict=False))
-    again = fvsolve.run(column(), set={"links.tap.opening": {"time": found.best.time, "value": found.best.value}})
+    again = fvsolve.run(
+        column(), set={"links.tap.opening": {"time": found.best.time, "value": found.best.value}}
+    )
     assert again.extremes["gate.pressure"].maximum == pytest.approx(found.best.peak, rel=1e-9)
     assert found.runs <= 124
 
 
 def test_the_command_prints_the_law_for_the_case(fvs, tmp_path) -> None:
     (tmp_path / "column.toml").write_text(write(column()))
-    ask = ("optimise", str(tmp_path / "column.toml"), "--schedule", "links.tap.opening", "--minimise",
-           "max(gate.pressure)", "--knots", "1", "--runs", "12")  # fmt: skip
+    ask = (
+        "optimise",
+        str(tmp_path / "column.toml"),
+        "--schedule",
+        "links.tap.opening",
+        "--minimise",
+        "max(gate.pressure)",
+        "--knots",
+        "1",
+        "--runs",
+        "12",
+    )
     status, text, _ = fvs(*ask)
-    assert status == 0 and "opening = { time = [0.5, 2.5, 4.5], value = [1.0," in text and "linear" in text
+    assert (
+        status == 0
+        and "opening = { time = [0.5, 2.5, 4.5], value = [1.0," in text
+        and "linear" in text
+    )
     said = json.loads(fvs(*ask, "--json")[1])
     assert said["best"]["peak"] <= said["linear"]["peak"] and len(said["laws"]) == said["runs"]
 
@@ -373,6 +511,9 @@ def test_objectives_that_cannot_be_minimised_are_named() -> None:
 
 
 def test_a_shipped_study_is_located_by_its_name():
-    assert scenarios.read_scenarios("pumping-main-design").path == CASES / "studies" / "pumping-main-design.toml"
+    assert (
+        scenarios.read_scenarios("pumping-main-design").path
+        == CASES / "studies" / "pumping-main-design.toml"
+    )
     with pytest.raises(CaseError, match="no-such-study"):
         scenarios.read_scenarios("no-such-study")

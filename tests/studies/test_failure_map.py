@@ -68,7 +68,8 @@ def test_a_small_error_and_no_swing_is_stable():
 def test_an_error_that_a_shorter_step_reduces_is_coarse_and_a_constant_error_is_wrong():
     assert verdict(measures_of(0.1), shorter(0.05), TOLERANCE) == "coarse"
     assert verdict(measures_of(0.1), shorter(0.09, 0.03), TOLERANCE) == "coarse"
-    assert verdict(measures_of(0.021), shorter(0.0199), TOLERANCE) == "coarse"  # an error within the tolerance suffices
+    # an error within the tolerance suffices
+    assert verdict(measures_of(0.021), shorter(0.0199), TOLERANCE) == "coarse"
     assert verdict(measures_of(0.1), shorter(0.099, 0.099), TOLERANCE) == "wrong"
     assert verdict(measures_of(0.1), shorter(math.nan, math.nan), TOLERANCE) == "wrong"
 
@@ -81,8 +82,14 @@ def test_values_that_are_not_finite_or_far_away_have_blown_up():
 
 
 def test_a_refused_case_and_a_run_stopped_by_name_are_refused():
-    assert verdict(Measures("refused: no such thing", False, refused=True), never, TOLERANCE) == "refused"
-    assert verdict(Measures("stopped: Newton did not converge at ...", False), never, TOLERANCE) == "refused"
+    assert (
+        verdict(Measures("refused: no such thing", False, refused=True), never, TOLERANCE)
+        == "refused"
+    )
+    assert (
+        verdict(Measures("stopped: Newton did not converge at ...", False), never, TOLERANCE)
+        == "refused"
+    )
 
 
 def test_swings_are_ringing_whatever_the_error():
@@ -102,7 +109,9 @@ def test_the_amplitude_of_ringing_is_that_after_eight_changes(factor):
 def test_a_growing_oscillation_also_on_a_slope_rings_and_waves_noise_free_steps_and_short_oscillations_do_not():
     n = np.arange(60.0)
     assert ringing_amplitude([(-1.05) ** n[:, None]], np.ones(1)) > 1.0
-    assert ringing_amplitude([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(0.09)
+    assert ringing_amplitude([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(
+        0.09
+    )
     for smooth in (np.sin(0.8 * n), np.minimum(n, 30.0), (n > 30).astype(float), np.sin(2.0 * n)):
         assert ringing_amplitude([smooth[:, None]], np.ones(1)) == 0.0
     assert ringing_amplitude([np.where(n < 7, (-1.0) ** n, 0.0)[:, None]], np.ones(1)) == 0.0
@@ -113,11 +122,14 @@ def test_excess_counts_oscillation_beyond_the_reference_and_nothing_else():
     t = np.linspace(0, 1, 101)[:, None]
     square = np.floor(4 * t) % 2
     assert excess_variation(square, square, np.ones(1)) == 0.0
-    assert excess_variation(0.5 * square, square, np.ones(1)) == 0.0  # smaller variation is no ringing
+    # smaller variation is no ringing
+    assert excess_variation(0.5 * square, square, np.ones(1)) == 0.0
     assert (
         excess_variation(square + 5.0 * (np.arange(101) == 40)[:, None], square, np.ones(1)) == 0.0
     )  # a single row is no ringing
-    assert excess_variation(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
+    assert (
+        excess_variation(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
+    )
 
 
 def test_a_probe_that_stands_still_is_not_judged():
@@ -146,7 +158,9 @@ def verdicts(case: dict, **asked) -> dict[str, list[str]]:
 
 
 def test_a_map_of_upwind_shows_the_exact_square_the_smeared_ones_and_the_limit():
-    said = verdicts(closing(), schemes=["upwind"], methods=["euler"], courants=[0.25, 0.5, 1.0, 1.1, 2.0])
+    said = verdicts(
+        closing(), schemes=["upwind"], methods=["euler"], courants=[0.25, 0.5, 1.0, 1.1, 2.0]
+    )
     assert said["euler"] == ["wrong", "wrong", "stable", "blown up", "blown up"]
 
 
@@ -154,8 +168,13 @@ def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far
     case = closing()
     case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # all finer runs smear this front alike
     asked = {"schemes": ["upwind5"], "methods": ["rk4"], "courants": [0.5], "tolerance": 0.1}
-    measured, exact = (failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
-    assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in measured.reference
+    measured, exact = (
+        failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}})
+    )
+    assert (
+        exact.reference.startswith('exact solution "rays", checked by ')
+        and "exact" not in measured.reference
+    )
     apart = abs(measured.squares[0].measures.error - exact.squares[0].measures.error)
     assert 0.0 < apart <= measured.doubt
 
@@ -172,7 +191,9 @@ def test_a_linear_fifth_order_scheme_is_stable_to_its_limit_and_implicit_euler_i
 
 
 def test_central_differences_swing_behind_a_front():
-    assert verdicts(closing(), schemes=["central"], methods=["rk4"], courants=[0.5])["rk4"] == ["ringing"]
+    assert verdicts(closing(), schemes=["central"], methods=["rk4"], courants=[0.5])["rk4"] == [
+        "ringing"
+    ]
 
 
 def stiff() -> dict:
@@ -199,7 +220,12 @@ def test_the_trapezoidal_rule_rings_after_a_stiff_step_and_an_l_stable_method_do
 def test_a_key_of_the_case_may_be_the_columns_and_predicts_where_the_step_is_too_long():
     volumes = [1e-6, 1e-4, 1e-2]
     made = failure_map(
-        load(stiff()), ["upwind"], ["euler"], steps=[1e-3], key=("nodes.body.volume", volumes), tolerance=0.2
+        load(stiff()),
+        ["upwind"],
+        ["euler"],
+        steps=[1e-3],
+        key=("nodes.body.volume", volumes),
+        tolerance=0.2,
     )
     blown = [one.verdict == "blown up" for one in made.squares]
     assert blown == [one.step > one.limit for one in made.squares] and any(blown) and not all(blown)
@@ -209,7 +235,10 @@ def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
     case = closing()
     case["numerics"] = {"end": 3.0, "scheme": "upwind5", "method": "dormand-prince", "rtol": 1e-4}
     made = failure_map(load(case), ["upwind5"], ["euler"], key=("links.main.diameter", [0.3]))
-    assert made.squares[0].verdict == "refused" and "estimates no error" in made.squares[0].measures.reason
+    assert (
+        made.squares[0].verdict == "refused"
+        and "estimates no error" in made.squares[0].measures.reason
+    )
 
 
 def test_finished_squares_are_stored_and_reused(tmp_path):
@@ -223,7 +252,10 @@ def test_finished_squares_are_stored_and_reused(tmp_path):
 def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
     """Sources of studies count too, although they compile nothing."""
     source_hash()  # hash of the tested sources
-    made, package = [], shutil.copytree(PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc"))
+    made, package = (
+        [],
+        shutil.copytree(PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc")),
+    )
     study = package / "studies" / "stability" / "stability.py"
     for words in ("", "", "# another"):
         study.write_text(study.read_text(encoding="utf-8") + words, encoding="utf-8")
@@ -270,18 +302,36 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, fvs):
     code, out, _ = fvs("failure-map", path, *asked, "--out", tmp_path / "out", "--json")
     assert code == 0
     said = json.loads(out)
-    assert said["values"] == [0.008, 0.02] and [one["method"] for one in said["squares"]] == ["euler"] * 2 + ["rk4"] * 2
+    assert (
+        said["values"] == [0.008, 0.02]
+        and [one["method"] for one in said["squares"]] == ["euler"] * 2 + ["rk4"] * 2
+    )
     assert all(one["courant"] == pytest.approx(120 * one["step"]) for one in said["squares"])
     with open(tmp_path / "out" / "map.csv") as file:
-        assert [row["verdict"] for row in csv.DictReader(file)] == [one["verdict"] for one in said["squares"]]
-    assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (tmp_path / "out" / "map.svg").is_file()
+        assert [row["verdict"] for row in csv.DictReader(file)] == [
+            one["verdict"] for one in said["squares"]
+        ]
+    assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (
+        tmp_path / "out" / "map.svg"
+    ).is_file()
 
 
 def test_no_old_picture_stays_with_a_new_table(tmp_path, fvs, monkeypatch):
     """Pictures of an earlier map are deleted, even if the new picture cannot be drawn."""
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(write(closing()))
-    asked = ("failure-map", str(path), "--scheme", "upwind", "--method", "euler", "--step", "8 ms", "--out", str(out))
+    asked = (
+        "failure-map",
+        str(path),
+        "--scheme",
+        "upwind",
+        "--method",
+        "euler",
+        "--step",
+        "8 ms",
+        "--out",
+        str(out),
+    )
     assert fvs(*asked)[0] == 0 and (out / "map.png").is_file() and (out / "map.svg").is_file()
     monkeypatch.setitem(sys.modules, "matplotlib.patches", None)
     assert fvs(*asked)[0] != 0
@@ -298,12 +348,18 @@ def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
     long = 2 * math.log(grown) / (omega**2 * end)
     case = scene(nodes, {"c": column}, end, {"method": "rk4", "step": long}, ["a.level"], end / 200)
     (euler,) = failure_map(case, methods=["euler"], steps=[long]).squares
-    assert euler.measures.error > TOLERANCE and euler.verdict == "coarse" and euler.measures.variation == 0.0
+    assert (
+        euler.measures.error > TOLERANCE
+        and euler.verdict == "coarse"
+        and euler.measures.variation == 0.0
+    )
 
 
 def test_the_pace_of_swings_is_the_rows_of_half_a_period():
     n = np.arange(400.0)
     assert turn_interval(np.sin(2 * np.pi * n / 40), 0.02) == 20.0
-    assert turn_interval(np.exp(-n / 60) * np.sin(2 * np.pi * n / 40), 1e-3) == pytest.approx(20.0, abs=1.0)
+    assert turn_interval(np.exp(-n / 60) * np.sin(2 * np.pi * n / 40), 1e-3) == pytest.approx(
+        20.0, abs=1.0
+    )
     assert turn_interval(n / 400, 1e-3) == turn_interval(np.minimum(n, 100.0), 1e-3) == math.inf
     assert turn_interval(n / 400 + 1e-4 * (-1.0) ** n, 1e-3) == math.inf

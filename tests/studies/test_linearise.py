@@ -21,7 +21,7 @@ from reference.scenes import (
     step,
     tank,
     valve,
-)  # fmt: skip
+)
 from scipy.linalg import expm, matrix_balance
 
 import fvsolve
@@ -31,7 +31,13 @@ from fvsolve.core.solve.advance import advance
 from fvsolve.core.solve.held_inputs import hold
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies import operating_point, work_limit
-from fvsolve.studies.linearise import eigenvalues_near, find_eigenvalues, linearise, linearise_at, poles_of
+from fvsolve.studies.linearise import (
+    eigenvalues_near,
+    find_eigenvalues,
+    linearise,
+    linearise_at,
+    poles_of,
+)
 from fvsolve.studies.ports.response import response
 from fvsolve.studies.stability import real_runs
 from fvsolve.studies.stability.stability import stability
@@ -45,7 +51,12 @@ def filling(opening=0.5, **more):
     """Case of a chamber of 2 l at 1 MPa that a reservoir at 3 MPa fills through a valve of 10 mm2."""
     nodes = {"pump": reservoir(3e6), "bottle": chamber(2e-3, 1e6)}
     return scene(
-        nodes, {"v": valve("pump", "bottle", 1e-5, opening)}, 1.0, TIGHT, ["bottle.pressure", "v.flow"], **more
+        nodes,
+        {"v": valve("pump", "bottle", 1e-5, opening)},
+        1.0,
+        TIGHT,
+        ["bottle.pressure", "v.flow"],
+        **more,
     )
 
 
@@ -57,7 +68,9 @@ def test_a_chamber_behind_an_orifice_equals_the_closed_form():
     assert found.a == pytest.approx(np.array([[-slope * stiffness]]), rel=1e-7)
     assert found.b == pytest.approx(np.array([[slope, mass_flow / 0.5]]), rel=1e-7)
     assert found.c == pytest.approx(np.array([[stiffness], [-slope * stiffness / RHO]]), rel=1e-7)
-    assert found.d == pytest.approx(np.array([[0.0, 0.0], [slope / RHO, mass_flow / 0.5 / RHO]]), rel=1e-7)
+    assert found.d == pytest.approx(
+        np.array([[0.0, 0.0], [slope / RHO, mass_flow / 0.5 / RHO]]), rel=1e-7
+    )
     assert found.input_values == pytest.approx((3e6, 0.5))
     assert found.output_values == pytest.approx((1e6, mass_flow / RHO))
     assert (found.input_units, found.output_units) == (("Pa", "-"), ("Pa", "m3/s"))
@@ -73,9 +86,9 @@ def test_poles_are_eigenvalues_of_a_with_their_vectors(case):
     for pole in values:
         m = pole * np.eye(len(a)) - a
         _, sizes, vectors = np.linalg.svd(m)
-        assert sizes[-1] < 1e-9 * np.linalg.norm(a) and np.linalg.norm(m @ vectors[-1].conj()) < 1e-9 * np.linalg.norm(
-            a
-        )
+        assert sizes[-1] < 1e-9 * np.linalg.norm(a) and np.linalg.norm(
+            m @ vectors[-1].conj()
+        ) < 1e-9 * np.linalg.norm(a)
 
 
 @pytest.mark.parametrize("opening", [0.0, 1.0])
@@ -87,7 +100,8 @@ def test_an_opening_at_the_end_of_its_range_is_moved_to_the_inner_side(opening):
 def test_two_tanks_lose_their_difference_at_the_rate_of_the_closed_form():
     nodes = {"high": tank(3.0, 4.0), "low": tank(1.5, 1.0)}
     found = linearise(scene(nodes, {"hole": valve("high", "low", 0.003)}, 1.0, TIGHT))
-    slope = RHO * 0.003 * math.sqrt(2 * GRAVITY * 3.0) / (2 * 3.0)  # d mass flow / d difference of levels
+    # d mass flow / d difference of levels
+    slope = RHO * 0.003 * math.sqrt(2 * GRAVITY * 3.0) / (2 * 3.0)
     per = np.array([1 / (RHO * 3.0), -1 / (RHO * 1.5)])
     assert found.a == pytest.approx(slope * np.array([-per, per]), rel=1e-7)
     poles = np.sort(np.linalg.eigvals(found.a).real)
@@ -96,8 +110,14 @@ def test_two_tanks_lose_their_difference_at_the_rate_of_the_closed_form():
 
 def test_a_rigid_column_swings_between_two_tanks_at_its_frequency():
     nodes = {"a": tank(2.0, 3.0), "b": tank(1.0, 3.0)}
-    column = {"type": "rigid-column", "from": "a", "to": "b", "length": 40.0, "diameter": 0.5,
-              "friction": {"model": "none"}}  # fmt: skip
+    column = {
+        "type": "rigid-column",
+        "from": "a",
+        "to": "b",
+        "length": 40.0,
+        "diameter": 0.5,
+        "friction": {"model": "none"},
+    }
     found = linearise(scene(nodes, {"c": column}, 1.0, TIGHT))
     omega = math.sqrt(GRAVITY * area(0.5) / 40.0 * (1 / 2.0 + 1 / 1.0))
     poles = find_eigenvalues(found.a).poles()
@@ -106,15 +126,31 @@ def test_a_rigid_column_swings_between_two_tanks_at_its_frequency():
 
 
 def servo(**more):
-    nodes = {"pump": reservoir(14e6), "sump": reservoir(2e5), "ground": {"type": "frame"},
-             "load": {"type": "mass", "mass": 300.0, "initial_position": 0.1}}  # fmt: skip
+    nodes = {
+        "pump": reservoir(14e6),
+        "sump": reservoir(2e5),
+        "ground": {"type": "frame"},
+        "load": {"type": "mass", "mass": 300.0, "initial_position": 0.1},
+    }
     links = {
-        "spool": {"type": "spool-valve", "ports": {"P": "pump", "T": "sump", "A": "cyl.A", "B": "cyl.B"},
-                  "area": 2e-5, "position": 0.0},
-        "cyl": {"type": "cylinder", "ports": {"rod": "load", "case": "ground"}, "stroke": 0.3, "area_A": 2e-3,
-                "area_B": 1e-3, "dead_volume_A": 1e-5, "dead_volume_B": 1e-5, "initial_pressure_A": 3e6,
-                "initial_pressure_B": 6e6 - AMBIENT},
-    }  # fmt: skip
+        "spool": {
+            "type": "spool-valve",
+            "ports": {"P": "pump", "T": "sump", "A": "cyl.A", "B": "cyl.B"},
+            "area": 2e-5,
+            "position": 0.0,
+        },
+        "cyl": {
+            "type": "cylinder",
+            "ports": {"rod": "load", "case": "ground"},
+            "stroke": 0.3,
+            "area_A": 2e-3,
+            "area_B": 1e-3,
+            "dead_volume_A": 1e-5,
+            "dead_volume_B": 1e-5,
+            "initial_pressure_A": 3e6,
+            "initial_pressure_B": 6e6 - AMBIENT,
+        },
+    }
     return scene(nodes, links, 0.1, TIGHT, ["load.position", "load.velocity"], **more)
 
 
@@ -122,11 +158,15 @@ def test_a_shut_servo_has_the_natural_frequency_of_its_oil():
     found = linearise(servo())
     stiffness = K * (2e-3**2 / (1e-5 + 2e-3 * 0.1) + 1e-3**2 / (1e-5 + 1e-3 * 0.2))
     fastest = find_eigenvalues(found.a).poles()[-1]
-    assert 2 * math.pi * fastest["frequency"] == pytest.approx(math.sqrt(stiffness / 300.0), rel=2e-3)
+    assert 2 * math.pi * fastest["frequency"] == pytest.approx(
+        math.sqrt(stiffness / 300.0), rel=2e-3
+    )
 
 
 def test_a_spool_at_its_middle_is_no_place_to_linearise_an_input_and_next_to_it_is():
-    with pytest.raises(FvsolveError, match="spool.position = 0 cannot be linearised.*a rise and a fall"):
+    with pytest.raises(
+        FvsolveError, match="spool.position = 0 cannot be linearised.*a rise and a fall"
+    ):
         linearise(servo(), ["spool.position"])
     found = linearise(servo(), ["spool.position"], set={"links.spool.position": 0.1})
     gain = 0.61 * 2e-5 * math.sqrt(2 * RHO * (14e6 - 3e6))
@@ -140,13 +180,23 @@ HOSE = 9e-3  # diameter of its orifice [m]
 def behind_hoses(**spool):
     """Case of a spool valve with hoses at zero drop behind its chambers; their laminar slope is 1e6 that of the oil."""
     nodes = {
-        "P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4, 5e6), "B": chamber(4e-4, 4e6),
-        "a": chamber(2e-4, 5e6), "b": chamber(2e-4, 4e6),
-    }  # fmt: skip
+        "P": reservoir(2e7),
+        "T": reservoir(3e5),
+        "A": chamber(4e-4, 5e6),
+        "B": chamber(4e-4, 4e6),
+        "a": chamber(2e-4, 5e6),
+        "b": chamber(2e-4, 4e6),
+    }
     links = {
-        "spool": {"type": "spool-valve", "ports": {port: port for port in "PTAB"}, "area": 2e-5, "position": 0.0},
-        "hoseA": valve("A", "a", area(HOSE)), "hoseB": valve("B", "b", area(HOSE)),
-    }  # fmt: skip
+        "spool": {
+            "type": "spool-valve",
+            "ports": {port: port for port in "PTAB"},
+            "area": 2e-5,
+            "position": 0.0,
+        },
+        "hoseA": valve("A", "a", area(HOSE)),
+        "hoseB": valve("B", "b", area(HOSE)),
+    }
     links["spool"] |= spool
     return scene(nodes, links, 1.0, TIGHT, fluid=OIL)
 
@@ -159,7 +209,9 @@ def gain(drop):
 @pytest.mark.parametrize("outputs", [[], ["spool.flow_P"]])
 def test_a_shut_spool_is_refused_whatever_stands_behind_its_chambers(outputs):
     """Chamber B drains with slope gain(37 bar) in one direction and fills with slope gain(160 bar) in the opposite."""
-    with pytest.raises(FvsolveError, match="spool.position = 0 cannot be linearised.*a rise and a fall"):
+    with pytest.raises(
+        FvsolveError, match="spool.position = 0 cannot be linearised.*a rise and a fall"
+    ):
         linearise(behind_hoses(), ["spool.position"], outputs)
 
 
@@ -167,7 +219,9 @@ def test_a_shut_spool_is_refused_whatever_stands_behind_its_chambers(outputs):
 def test_a_spool_next_to_its_middle_has_the_slope_of_that_side(position, flows):
     found = linearise(behind_hoses(position=position), ["spool.position"])
     rows = [found.states.index(f"{port}.mass") for port in "AB"]
-    assert found.b[rows, 0] == pytest.approx([math.copysign(gain(abs(x)), x) for x in flows], rel=1e-6)
+    assert found.b[rows, 0] == pytest.approx(
+        [math.copysign(gain(abs(x)), x) for x in flows], rel=1e-6
+    )
     assert found.error["BD"] < 1e-6
 
 
@@ -183,11 +237,23 @@ def test_a_shut_valve_has_the_slope_of_its_opening_whatever_stands_behind_it():
 @pytest.mark.parametrize("hose", [False, True])
 def test_a_relief_valve_at_its_set_pressure_is_refused_with_any_neighbours(hose):
     """The valve opens in one direction only; the laminar slope of a hose in its row once hid this."""
-    nodes = {"T": reservoir(3e5), "A": chamber(4e-4, 5e6)} | ({"a": chamber(4e-4, 5e6)} if hose else {})
-    links = {"relief": {"type": "relief-valve", "from": "A", "to": "T", "diameter": 8e-3,
-                        "set_pressure": 5e6, "overpressure": 1.5e6}}  # fmt: skip
+    nodes = {"T": reservoir(3e5), "A": chamber(4e-4, 5e6)} | (
+        {"a": chamber(4e-4, 5e6)} if hose else {}
+    )
+    links = {
+        "relief": {
+            "type": "relief-valve",
+            "from": "A",
+            "to": "T",
+            "diameter": 8e-3,
+            "set_pressure": 5e6,
+            "overpressure": 1.5e6,
+        }
+    }
     links |= {"hose": valve("A", "a", area(HOSE))} if hose else {}
-    with pytest.raises(FvsolveError, match="A.mass: the slopes for a rise and a fall of this state differ"):
+    with pytest.raises(
+        FvsolveError, match="A.mass: the slopes for a rise and a fall of this state differ"
+    ):
         linearise(scene(nodes, links, 1.0, TIGHT, fluid=OIL))
 
 
@@ -202,7 +268,9 @@ def line(cells, probes=(), friction=NO_FRICTION, demand=0.0, scheme="upwind5"):
     """Case of a pipe of 600 m and 1200 m/s between a lake and a dead end."""
     made = pipe("top", "end", 600.0, 0.5, 1200.0, cells, friction=friction)
     numerics = {**LINES, "scheme": scheme}
-    return scene({"top": lake(50.0), "end": junction(demand)}, {"main": made}, 1.0, numerics, probes)
+    return scene(
+        {"top": lake(50.0), "end": junction(demand)}, {"main": made}, 1.0, numerics, probes
+    )
 
 
 def test_an_open_shut_pipe_has_the_frequencies_of_odd_quarters_as_cells_grow():
@@ -226,20 +294,32 @@ def test_steady_friction_damps_waves_at_half_its_rate():
 
 def test_inputs_have_the_values_of_the_case():
     found = linearise(line(4, demand=0.2), ["end.demand", "top.head"])
-    assert found.input_units == ("m3/s", "m") and found.input_values == pytest.approx((0.2, 50.0), rel=1e-12)
+    assert found.input_units == ("m3/s", "m") and found.input_values == pytest.approx(
+        (0.2, 50.0), rel=1e-12
+    )
 
 
 def network():
-    nodes = {"pump": reservoir(3e6), "gate": junction(), "bottle": chamber(0.05), "air": reservoir(AMBIENT)}
+    nodes = {
+        "pump": reservoir(3e6),
+        "gate": junction(),
+        "bottle": chamber(0.05),
+        "air": reservoir(AMBIENT),
+    }
     links = {
         "main": pipe("pump", "gate", 20.0, 0.05, 1000.0, 6),
-        "v": valve("gate", "bottle", 2e-4, 0.6), "out": valve("bottle", "air", 1e-4),
-    }  # fmt: skip
+        "v": valve("gate", "bottle", 2e-4, 0.6),
+        "out": valve("bottle", "air", 1e-4),
+    }
     numerics = {"scheme": "upwind5", "method": "rk4", "step": 1e-4}
-    return scene(nodes, links, 1.0, numerics, ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"])
+    return scene(
+        nodes, links, 1.0, numerics, ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"]
+    )
 
 
-@pytest.mark.parametrize("name, change", [("v.opening", 1e-5), ("pump.pressure", 10.0), ("gate.demand", 1e-7)])
+@pytest.mark.parametrize(
+    "name, change", [("v.opening", 1e-5), ("pump.pressure", 10.0), ("gate.demand", 1e-7)]
+)
 def test_a_small_step_of_an_input_moves_a_run_as_a_b_c_d_predict(name, change):
     outputs = ["gate.pressure", "main.flow@0.4", "v.flow", "bottle.pressure"]
     found = linearise(network(), [name], outputs)
@@ -272,14 +352,18 @@ def test_a_matches_the_models_own_jacobian_and_large_ones_are_sparse():
 def test_an_incomplete_spectrum_states_the_poles_it_contains():
     found = linearise(line(900))
     values = poles_of(found.a, energy_form(found.at.model))
-    assert not values.complete and "of 1800" in values.description and "ARPACK" in values.description
+    assert (
+        not values.complete and "of 1800" in values.description and "ARPACK" in values.description
+    )
     exact = (2 * np.arange(1, 4) - 1) * 0.5
     assert [p["frequency"] for p in values.poles()[:3]] == pytest.approx(exact, rel=1e-6)
 
 
 def test_the_state_at_a_jump_is_taken_just_after_it_or_just_before():
     case = filling(step(0.003, 0.5, 0.25))
-    before, after = (linearise(case, ["v.opening"], at=0.003, before=side) for side in (True, False))
+    before, after = (
+        linearise(case, ["v.opening"], at=0.003, before=side) for side in (True, False)
+    )
     assert (before.input_values, after.input_values) == ((0.5,), (0.25,))
     assert before.a[0, 0] == pytest.approx(2 * after.a[0, 0], rel=1e-6)
     assert "just before a jump" in before.at.when and "just after a jump" in after.at.when
@@ -293,7 +377,9 @@ def test_a_state_on_the_way_is_that_of_the_run():
     state = advance(model, initial_state(model), 0.002)
     assert found.at.y == pytest.approx(state.y, rel=1e-6)
     drop = 3e6 - found.output_values[0]
-    assert found.a[0, 0] == pytest.approx(-0.5e-5 * math.sqrt(RHO / (2 * drop)) * K / (RHO * 2e-3), rel=1e-6)
+    assert found.a[0, 0] == pytest.approx(
+        -0.5e-5 * math.sqrt(RHO / (2 * drop)) * K / (RHO * 2e-3), rel=1e-6
+    )
 
 
 def test_a_limited_scheme_is_refused_and_the_way_out_is_named():
@@ -307,11 +393,15 @@ def test_a_case_without_a_scheme_is_linearised_with_the_smooth_scheme():
     case = line(10)
     del case["numerics"]["scheme"]
     found = linearise(case)
-    assert found.plain()["scheme"] == "upwind5" and np.array_equal(found.a, linearise(line(10, scheme="upwind5")).a)
+    assert found.plain()["scheme"] == "upwind5" and np.array_equal(
+        found.a, linearise(line(10, scheme="upwind5")).a
+    )
 
 
 def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_bare():
-    case = scene({"a": reservoir(1e6), "b": chamber(1e-3, 1e6)}, {"v": valve("a", "b", 1e-5)}, 1.0, TIGHT)
+    case = scene(
+        {"a": reservoir(1e6), "b": chamber(1e-3, 1e6)}, {"v": valve("a", "b", 1e-5)}, 1.0, TIGHT
+    )
     found = linearise(case)
     model = found.at.model
     bare, row = model.tables.valves.copy(), model.tables.valves[0]
@@ -319,8 +409,12 @@ def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_ba
     laminar = 45 / 32 * row["conductance"] / row["transition"]  # slope of the law at zero drop
     assert found.a[0, 0] == pytest.approx(-laminar * K / (RHO * 1e-3), rel=1e-4)
     bare["transition"] = 0.0
-    with pytest.raises(FvsolveError, match="b.mass: the slopes there do not converge.*drop of zero"):
-        linearise_at(replace(found.at, model=replace(model, tables=model.tables._replace(valves=bare))))
+    with pytest.raises(
+        FvsolveError, match="b.mass: the slopes there do not converge.*drop of zero"
+    ):
+        linearise_at(
+            replace(found.at, model=replace(model, tables=model.tables._replace(valves=bare)))
+        )
 
 
 @pytest.mark.parametrize(
@@ -338,17 +432,27 @@ def test_invalid_requests_are_reported(more, error, said):
 
 
 def test_a_case_without_a_state_is_refused():
-    case = scene({"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, TIGHT)
+    case = scene(
+        {"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, TIGHT
+    )
     with pytest.raises(FvsolveError, match="has no state"):
         linearise(case)
 
 
-def test_the_command_writes_matrices_with_names_and_a_single_json_object(tmp_path, monkeypatch, fvs):
+def test_the_command_writes_matrices_with_names_and_a_single_json_object(
+    tmp_path, monkeypatch, fvs
+):
     monkeypatch.chdir(tmp_path)
-    code, out, _ = fvs("linearise", "chamber-and-orifice", "--inputs", "hole.opening", "--at", "1 s", "--json")
+    code, out, _ = fvs(
+        "linearise", "chamber-and-orifice", "--inputs", "hole.opening", "--at", "1 s", "--json"
+    )
     assert code == 0
     found = json.loads(out)
-    assert found["at"] == 1.0 and found["inputs"] == ["hole.opening"] and found["poles"][0]["real"] < 0.0
+    assert (
+        found["at"] == 1.0
+        and found["inputs"] == ["hole.opening"]
+        and found["poles"][0]["real"] < 0.0
+    )
     kept = np.load(tmp_path / "runs" / "chamber-and-orifice.linearise" / "linear.npz")
     assert kept["A"].tolist() == found["A"] and kept["states"].tolist() == found["states"]
     table = (tmp_path / "runs" / "chamber-and-orifice.linearise" / "B.csv").read_text().splitlines()
@@ -399,19 +503,28 @@ def test_an_eigenvalue_that_is_too_late_is_left_out_with_a_notice():
 
 def test_a_too_long_prediction_is_refused_with_the_alternative(monkeypatch):
     monkeypatch.setattr(work_limit, "TIME_LIMIT", -1.0)
-    with pytest.raises(FvsolveError, match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps"):
+    with pytest.raises(
+        FvsolveError,
+        match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps",
+    ):
         stability(line(300), steps=100)
 
 
 def test_a_too_long_measurement_is_left_out_with_a_notice(monkeypatch):
     monkeypatch.setattr(real_runs, "TIME_LIMIT", -1.0)
     (row,) = stability(line(8), steps=100).rows
-    assert np.isfinite(row.predicted) and np.isnan(row.measured) and "take longer" in row.left_out["measured"]
+    assert (
+        np.isfinite(row.predicted)
+        and np.isnan(row.measured)
+        and "take longer" in row.left_out["measured"]
+    )
 
 
 def test_runs_that_leave_the_state_where_no_linear_step_fails_are_explained():
     nodes = {"high": chamber(1e-3, 3e5), "low": chamber(1e-3, 2e5)}
-    case = scene(nodes, {"hole": valve("high", "low", 1e-5)}, 1.0, {"method": "rodas-4", "step": 1.0})
+    case = scene(
+        nodes, {"hole": valve("high", "low", 1e-5)}, 1.0, {"method": "rodas-4", "step": 1.0}
+    )
     (row,) = stability(case, steps=100).rows
     assert np.isinf(row.predicted) and 0.0 < row.measured < np.inf
     assert any("leaves the linearised state" in note for note in row.notes)

@@ -33,7 +33,9 @@ def case(cells: int = 20, friction=scenes.NO_FRICTION, **numerics) -> dict:
 def free(pipe, x, t):
     """Pressure and flow of a standing wave without source."""
     swing = 1e5 * AREA / (scenes.RHO * SPEED)
-    return 3e5 + 1e5 * np.sin(K * x) * np.cos(K * SPEED * t), -swing * np.cos(K * x) * np.sin(K * SPEED * t)
+    return 3e5 + 1e5 * np.sin(K * x) * np.cos(K * SPEED * t), -swing * np.cos(K * x) * np.sin(
+        K * SPEED * t
+    )
 
 
 def driven(pipe, x, t):
@@ -44,11 +46,16 @@ def driven(pipe, x, t):
 def drive(pipe, x, t):
     """Source of `driven`: p_t A / a^2 + rho q_x, and rho q_t + A p_x."""
     p_t, p_x = -W * 1e5 * np.sin(K * x) * np.sin(W * t), K * 1e5 * np.cos(K * x) * np.cos(W * t)
-    q_t, q_x = 0.6 * W * np.cos(K * x) * np.cos(2 * W * t), -0.3 * K * np.sin(K * x) * np.sin(2 * W * t)
+    q_t, q_x = (
+        0.6 * W * np.cos(K * x) * np.cos(2 * W * t),
+        -0.3 * K * np.sin(K * x) * np.sin(2 * W * t),
+    )
     return AREA / SPEED**2 * p_t + scenes.RHO * q_x, scenes.RHO * q_t + AREA * p_x
 
 
-@pytest.mark.parametrize(("scheme", "p"), [("upwind", 1), ("fromm", 2), ("upwind3", 3), ("upwind5", 5)])
+@pytest.mark.parametrize(
+    ("scheme", "p"), [("upwind", 1), ("fromm", 2), ("upwind3", 3), ("upwind5", 5)]
+)
 def test_a_standing_wave_shows_the_order_of_the_scheme(scheme, p):
     cells = {1: 80, 5: 15}.get(p, 40)
     found = order(case(cells), schemes=scheme, exact=free, levels=5)
@@ -58,7 +65,9 @@ def test_a_standing_wave_shows_the_order_of_the_scheme(scheme, p):
 
 
 @pytest.mark.parametrize(("scheme", "p"), [("upwind3", 3), ("upwind5", 5)])
-@pytest.mark.parametrize("probe", ["main.pressure@0.37", "main.flow@0.61", "end.pressure", "main.flow@0"])
+@pytest.mark.parametrize(
+    "probe", ["main.pressure@0.37", "main.flow@0.61", "end.pressure", "main.flow@0"]
+)
 def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
     """0.37 is at another place of its cell at each level."""
     found = order(case(20), schemes=scheme, exact=free, levels=4)
@@ -82,11 +91,16 @@ def test_friction_is_averaged_to_fourth_order_where_the_flow_retains_its_directi
     factor, loss, k = 0.5, 0.5 * scenes.RHO / (2 * DIAMETER * AREA), 2 * np.pi / LENGTH
 
     def exact(pipe, x, t):
-        return 3e5 + 1e5 * np.sin(k * x) * np.cos(W * t), 0.6 + 0.3 * np.cos(k * x) * np.cos(2 * W * t)
+        return 3e5 + 1e5 * np.sin(k * x) * np.cos(W * t), 0.6 + 0.3 * np.cos(k * x) * np.cos(
+            2 * W * t
+        )
 
     def source(pipe, x, t):
         p_t, p_x = -W * 1e5 * np.sin(k * x) * np.sin(W * t), k * 1e5 * np.cos(k * x) * np.cos(W * t)
-        q_t, q_x = -0.6 * W * np.cos(k * x) * np.sin(2 * W * t), -0.3 * k * np.sin(k * x) * np.cos(2 * W * t)
+        q_t, q_x = (
+            -0.6 * W * np.cos(k * x) * np.sin(2 * W * t),
+            -0.3 * k * np.sin(k * x) * np.cos(2 * W * t),
+        )
         q = exact(pipe, x, t)[1]
         return AREA / SPEED**2 * p_t + scenes.RHO * q_x, scenes.RHO * q_t + AREA * p_x + loss * q**2
 
@@ -112,8 +126,11 @@ def test_a_start_alone_is_judged_by_a_finer_run():
 def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_requested():
     grid = order(case(10), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)
-    asked = order(case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, reference="exact")
-    assert asked.kind == "function" and asked.rows[-1].errors["pressure"]["L2"] > 1.0  # the error of the grid
+    asked = order(
+        case(10), methods="ssp-rk3", exact=free, refine="time", levels=4, reference="exact"
+    )
+    # the error of the grid
+    assert asked.kind == "function" and asked.rows[-1].errors["pressure"]["L2"] > 1.0
     with pytest.raises(FvsolveError, match="needs the function"):
         order(case(20), initial=lambda pipe, x: free(pipe, x, 0.0), reference="exact")
 
@@ -131,8 +148,12 @@ def raises(pipe, x, t):
 
 @pytest.mark.parametrize("numerics", [{}, {"courant": None, "rtol": 1e-6}], ids=["courant", "rtol"])
 def test_exceptions_of_a_source_are_the_stated_cause(numerics):
-    given = {key: value for key, value in case(10, **numerics)["numerics"].items() if value is not None}
-    with pytest.raises(FvsolveError, match=r'source.*"main" raised ZeroDivisionError: no mass at noon') as error:
+    given = {
+        key: value for key, value in case(10, **numerics)["numerics"].items() if value is not None
+    }
+    with pytest.raises(
+        FvsolveError, match=r'source.*"main" raised ZeroDivisionError: no mass at noon'
+    ) as error:
         order({**case(10), "numerics": given}, exact=driven, source=raises, levels=3)
     assert isinstance(error.value.__cause__, ZeroDivisionError)
 
@@ -146,21 +167,30 @@ def test_exceptions_of_a_source_are_the_stated_cause(numerics):
 @pytest.mark.parametrize("name", ["initial", "source", "exact"])
 def test_wrong_results_of_a_function_are_named(name, wrong):
     given = {"exact": driven, "source": drive, name: wrong}
-    with pytest.raises(FvsolveError, match=rf'{name}\(pipe, x.*"main" must return two numbers or arrays of'):
+    with pytest.raises(
+        FvsolveError, match=rf'{name}\(pipe, x.*"main" must return two numbers or arrays of'
+    ):
         order(case(10), levels=3, **given)
 
 
 @pytest.mark.parametrize("name", ["initial", "source", "exact"])
 def test_places_where_a_function_is_not_finite_are_stated(name):
-    given = {"exact": driven, "source": drive, name: lambda pipe, x, *t: (np.where(x > 55.0, np.nan, 3e5), 0.0)}
+    given = {
+        "exact": driven,
+        "source": drive,
+        name: lambda pipe, x, *t: (np.where(x > 55.0, np.nan, 3e5), 0.0),
+    }
     with pytest.raises(
-        FvsolveError, match=rf'{name}\(pipe, x.*"main" returns values that are not finite, first at x = 5'
+        FvsolveError,
+        match=rf'{name}\(pipe, x.*"main" returns values that are not finite, first at x = 5',
     ):
         order(case(10), levels=3, **given)
 
 
 def test_a_source_that_is_two_numbers_is_spread_along_the_pipe():
-    found = order(case(10), initial=lambda pipe, x: (3e5, 0.0), source=lambda *_: (0.0, 0.0), levels=3)
+    found = order(
+        case(10), initial=lambda pipe, x: (3e5, 0.0), source=lambda *_: (0.0, 0.0), levels=3
+    )
     assert all(not row.reason for row in found.rows)
 
 
@@ -181,7 +211,9 @@ def test_averages_over_other_cells_are_those_of_the_same_function(cells):
 
 def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
     case = pulses.case(30, points=pulses.FEW)
-    exact, finer = (order(case, schemes="upwind3", levels=3, reference=one) for one in ("exact", "finer"))
+    exact, finer = (
+        order(case, schemes="upwind3", levels=3, reference=one) for one in ("exact", "finer")
+    )
     assert (exact.kind, finer.kind) == ("exact", "finer") and "upwind5" in finer.words
     for a, b in zip(exact.rows, finer.rows, strict=True):
         for variable in ("pressure", "flow", "gate.pressure", "main.pressure@0.37"):
@@ -189,19 +221,32 @@ def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
                 assert a.errors[variable][norm] == approx(b.errors[variable][norm], rel=0.02)
 
 
-@pytest.mark.parametrize(("case", "scheme"), [(pulses.case(20), "upwind3"), (pulses.front(40), "upwind")])
+@pytest.mark.parametrize(
+    ("case", "scheme"), [(pulses.case(20), "upwind3"), (pulses.front(40), "upwind")]
+)
 def test_the_stated_error_of_a_reference_is_about_its_true_error(case, scheme):
     case = load(case, {"numerics.scheme": scheme})
     keys = {"links.main.cells": 4 * case.links["main"].cells}
-    made = find_reference(case, recording_keys(case, keys), opinions=1, exclude_own=True, exact=False)
+    made = find_reference(
+        case, recording_keys(case, keys), opinions=1, exclude_own=True, exact=False
+    )
     exact = find_reference(case, recording_keys(case, keys), opinions=1)
     [cells] = [int(word) for word in made.words.split() if word.isdigit()]
-    keys = {"numerics.scheme": "upwind5", "numerics.method": "dormand-prince", "links.main.cells": cells}
-    run = outcome(case, recording_keys(case, {**keys, "numerics.step": 0.5 * 100.0 / 1000.0 / cells}))
+    keys = {
+        "numerics.scheme": "upwind5",
+        "numerics.method": "dormand-prince",
+        "links.main.cells": cells,
+    }
+    run = outcome(
+        case, recording_keys(case, {**keys, "numerics.step": 0.5 * 100.0 / 1000.0 / cells})
+    )
     true = error_norms(run, exact)
     for variable in ("pressure", "flow"):
         for norm in ("L1", "L2"):
-            assert 0.3 < made.own_error[variable][norm] / true[variable][norm] < 6.0, (variable, norm)
+            assert 0.3 < made.own_error[variable][norm] / true[variable][norm] < 6.0, (
+                variable,
+                norm,
+            )
 
 
 def test_rows_that_the_reference_cannot_judge_are_marked_and_reported():
@@ -216,7 +261,9 @@ def test_rows_that_the_reference_cannot_judge_are_marked_and_reported():
 def test_a_reference_that_is_no_better_than_the_runs_is_refused_with_a_way_out():
     """Upwind with Euler at Courant number 1 is exact, fronts included, so finer runs cannot judge it."""
     case = pulses.front(50, method="euler", courant=1.0)
-    with pytest.raises(FvsolveError, match=r"not more accurate than the rows.*\[exact\].*richardson"):
+    with pytest.raises(
+        FvsolveError, match=r"not more accurate than the rows.*\[exact\].*richardson"
+    ):
         order(case, reference="finer", levels=3)
     exact = order(case, levels=3)
     assert all(row.errors["pressure"]["max"] < 1e-4 for row in exact.rows)
@@ -268,26 +315,57 @@ def test_a_tolerance_is_refined_where_a_case_steps_by_error():
 
 def test_a_lumped_case_shows_the_order_of_a_method_against_its_exact_solution():
     nodes = {"a": scenes.tank(2.0, 3.0), "b": scenes.tank(5.0, 2.5)}
-    links = {"column": {"type": "rigid-column", "from": "a", "to": "b", "length": 30.0, "diameter": 0.3,
-                        "friction": scenes.NO_FRICTION}}  # fmt: skip
-    case = scenes.scene(nodes, links, 100.0, {"step": 2.0, "method": "rk4"}, ["a.level"], every=10.0,
-                        exact={"name": "oscillation"})  # fmt: skip
-    for method, p in (("euler", 1), ("ssp-rk2", 2), ("heun", 3), ("rk4", 4), ("trapezoid", 2), ("radau-iia-5", 5)):
+    links = {
+        "column": {
+            "type": "rigid-column",
+            "from": "a",
+            "to": "b",
+            "length": 30.0,
+            "diameter": 0.3,
+            "friction": scenes.NO_FRICTION,
+        }
+    }
+    case = scenes.scene(
+        nodes,
+        links,
+        100.0,
+        {"step": 2.0, "method": "rk4"},
+        ["a.level"],
+        every=10.0,
+        exact={"name": "oscillation"},
+    )
+    for method, p in (
+        ("euler", 1),
+        ("ssp-rk2", 2),
+        ("heun", 3),
+        ("rk4", 4),
+        ("trapezoid", 2),
+        ("radau-iia-5", 5),
+    ):
         found = order(case, methods=method, refine="time", levels=7 if p < 2 else 5)
         fit = found.fits["a.level"]["L2"]
-        assert found.kind == "exact" and abs(fit.order - p) <= max(fit.spread, 0.1) < 0.5, (method, fit)
+        assert found.kind == "exact" and abs(fit.order - p) <= max(fit.spread, 0.1) < 0.5, (
+            method,
+            fit,
+        )
 
 
 def test_the_ends_of_nodes_and_links_are_compared_too():
     case = load("cases/tank-draining.toml", {"numerics.end": 600.0})
     assert end_probes(case) == ["nodes.tank.pressure", "nodes.tank.level", "links.hole.flow"]
     found = order(case, levels=3)
-    assert {"nodes at the end: level", "nodes at the end: pressure", "links at the end: flow"} <= set(found.variables)
+    assert {
+        "nodes at the end: level",
+        "nodes at the end: pressure",
+        "links at the end: flow",
+    } <= set(found.variables)
     last = found.rows[0].errors
     run = outcome(case, {"numerics.rtol": found.rows[0].level.size})
     area = 0.61 * np.pi / 4 * 0.05**2
     level = (np.sqrt(3.0) - area * np.sqrt(9.80665 / 2) / 2.0 * 600.0) ** 2
-    assert last["nodes at the end: level"]["max"] == approx(abs(run.rows[-1, 1] - level), rel=1e-6, abs=1e-15)
+    assert last["nodes at the end: level"]["max"] == approx(
+        abs(run.rows[-1, 1] - level), rel=1e-6, abs=1e-15
+    )
 
 
 def test_rows_that_are_finished_are_reused_and_give_the_same(tmp_path):
@@ -309,7 +387,8 @@ def test_a_reference_that_fails_is_reported():
     case["nodes"]["gate"] = scenes.junction(scenes.step(0.01, 0.0, 5.0))
     with pytest.raises(FvsolveError, match="reference run failed.*vapour"):
         order(case, levels=2, cells=4, reference="finer")
-    with pytest.raises(FvsolveError, match="no row could be run.*vapour"):  # nor with the next row as reference
+    # nor with the next row as reference
+    with pytest.raises(FvsolveError, match="no row could be run.*vapour"):
         order(case, levels=2, cells=4)
 
 
@@ -328,13 +407,18 @@ def test_other_density_laws_are_compared_by_cell_averages_as_well(law):
 @pytest.mark.parametrize(("cells", "levels"), [(24, 4), (28, 4), (20, 5)])
 def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, levels):
     """Upwind smears the pulse: orders of differences stay near 0.42 between coarse rows and approach 1 late."""
-    exact, found = (order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, reference=way)
-                    for way in ("exact", "richardson"))  # fmt: skip
+    exact, found = (
+        order(pulses.case(cells, points=pulses.FEW), schemes="upwind", levels=levels, reference=way)
+        for way in ("exact", "richardson")
+    )
     for norm, own in found.fits["pressure"].items():
         assert own.reason or abs(own.order - 1.0) <= own.spread + 0.1, (norm, own)
         shown = [row.errors["pressure"][norm] for row in found.rows[:-1]]
         true = [row.errors["pressure"][norm] for row in exact.rows[:-1]]
-        told = any("nothing is extrapolated" in note and f"pressure ({norm}" in note for note in found.notes)
+        told = any(
+            "nothing is extrapolated" in note and f"pressure ({norm}" in note
+            for note in found.notes
+        )
         assert told or shown == approx(true, rel=0.25) or norm != "L1"
     if cells == 24:
         assert "three differences" in found.fits["pressure"]["L1"].reason
@@ -342,16 +426,27 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
 
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
     case = pulses.case(80, points=pulses.FEW)
-    exact, found = (order(case, schemes="upwind", levels=5, reference=way) for way in ("exact", "richardson"))
+    exact, found = (
+        order(case, schemes="upwind", levels=5, reference=way) for way in ("exact", "richardson")
+    )
     assert abs(found.fits["pressure"]["L1"].order - 1.0) <= found.fits["pressure"]["L1"].spread
     for a, b in zip(exact.rows[:-1], found.rows[:-1], strict=True):
         assert b.errors["pressure"]["L1"] == approx(a.errors["pressure"]["L1"], rel=0.15)
 
 
-@pytest.mark.parametrize(("scheme", "method", "p"), [("upwind5", "rk4", 5), ("upwind3", "ssp-rk3", 3)])
+@pytest.mark.parametrize(
+    ("scheme", "method", "p"), [("upwind5", "rk4", 5), ("upwind3", "ssp-rk3", 3)]
+)
 def test_refining_space_alone_shows_the_order_of_the_scheme_by_default(scheme, method, p):
     """At the Courant number 0.9 of the case, the error of the step would hide the order."""
-    found = order(pulses.case(20, courant=0.9), schemes=scheme, methods=method, refine="space", levels=4, cells=30)
+    found = order(
+        pulses.case(20, courant=0.9),
+        schemes=scheme,
+        methods=method,
+        refine="space",
+        levels=4,
+        cells=30,
+    )
     assert len({row.level.step for row in found.rows}) == 1
     assert f"Courant number {0.19 if p == 5 else 0.22}" in found.plan.words
     assert found.fits["pressure"]["L1"].order == approx(p, abs=0.3)
@@ -458,7 +553,11 @@ def test_a_last_row_that_leaves_the_line_is_reported():
     e = H[:6] ** 4
     e[-1] *= 4.0
     found = fit(H[:6], e)
-    assert found.order == approx(4.0) and found.marks[-1] == "off the line" and "leaves the line" in found.note
+    assert (
+        found.order == approx(4.0)
+        and found.marks[-1] == "off the line"
+        and "leaves the line" in found.note
+    )
 
 
 @pytest.mark.parametrize("sigma", [0.3, 1.0, 3.0])

@@ -29,7 +29,11 @@ class Work:
         self.deadly, self.once, self.home = deadly, once, os.getpid()
 
     def __call__(self, task):
-        if task in self.deadly and os.getpid() != self.home and not (self.once and os.path.exists(self.once)):
+        if (
+            task in self.deadly
+            and os.getpid() != self.home
+            and not (self.once and os.path.exists(self.once))
+        ):
             if self.once:
                 open(self.once, "w").close()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -55,8 +59,12 @@ def test_all_tasks_are_done_and_the_first_in_this_process():
     found = dict(run_tasks(Work(), tasks, jobs=2))
     assert squares(found) == {k: task * task for k, task in enumerate(tasks)}
     assert found[0][1] == os.getpid() and os.getpid() not in {found[k][1] for k in range(1, 8)}
-    assert dict(run_tasks(Work(), tasks)) == {k: (task * task, os.getpid()) for k, task in enumerate(tasks)}
-    assert [*run_tasks(Work(), [], jobs=2)] == [] and squares(dict(run_tasks(Work(), [7], jobs=2))) == {0: 49}
+    assert dict(run_tasks(Work(), tasks)) == {
+        k: (task * task, os.getpid()) for k, task in enumerate(tasks)
+    }
+    assert [*run_tasks(Work(), [], jobs=2)] == [] and squares(
+        dict(run_tasks(Work(), [7], jobs=2))
+    ) == {0: 49}
 
 
 def test_a_process_that_is_killed_costs_its_chunk_and_another_repeats_it(tmp_path):
@@ -65,7 +73,8 @@ def test_a_process_that_is_killed_costs_its_chunk_and_another_repeats_it(tmp_pat
 
 
 def test_a_task_that_kills_every_process_is_lost_and_nothing_else():
-    found = dict(run_tasks(Work({1, 8}), range(12), jobs=2))  # alone at first, and later among others of a chunk
+    # alone at first, and later among others of a chunk
+    found = dict(run_tasks(Work({1, 8}), range(12), jobs=2))
     assert {k for k, answer in found.items() if answer == ("lost", k)} == {1, 8}
     rest = {*range(12)} - {1, 8}
     assert squares({k: found[k] for k in rest}) == {k: k * k for k in rest}
@@ -85,7 +94,11 @@ def test_processes_end_with_their_parent(tmp_path):
     until(lambda: len([*(tmp_path / "there").iterdir()]) == 2)
     running.kill()
     running.wait()
-    until(lambda: not any(os.path.exists(f"/proc/{one.name}") for one in (tmp_path / "there").iterdir()))
+    until(
+        lambda: (
+            not any(os.path.exists(f"/proc/{one.name}") for one in (tmp_path / "there").iterdir())
+        )
+    )
 
 
 def until(holds) -> None:
@@ -119,7 +132,9 @@ def test_workers_of_dask_give_the_results_of_processes(cluster):
 
 
 def test_a_worker_of_dask_that_is_killed_costs_its_chunk(cluster, tmp_path):
-    found = dict(run_tasks(Work({5}, str(tmp_path / "killed")), range(60), dask=cluster.scheduler_address))
+    found = dict(
+        run_tasks(Work({5}, str(tmp_path / "killed")), range(60), dask=cluster.scheduler_address)
+    )
     assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(60)}
 
 
@@ -151,9 +166,9 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
     from fvsolve.studies import parallel as room
 
     own = room.program_versions()
-    assert room.program_differences(own) == [] and room.program_differences({**own, "sources": "other"}) == [
-        f"sources other (here {own['sources']})"
-    ]
+    assert room.program_differences(own) == [] and room.program_differences(
+        {**own, "sources": "other"}
+    ) == [f"sources other (here {own['sources']})"]
     assert room.program_differences(ModuleNotFoundError("No module named 'fvsolve'")) == [
         "no fvsolve (No module named 'fvsolve')"
     ]
@@ -161,7 +176,8 @@ def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
 
     def versions(said, own=room.version_numbers):
         asked.append(said)
-        return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})  # the first call is local
+        # the first call is local
+        return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})
 
     monkeypatch.setattr(room, "version_numbers", versions)
     said = (
@@ -177,7 +193,9 @@ def test_a_scheduler_that_goes_away_is_reported_without_endless_waiting(monkeypa
     from fvsolve.studies import parallel as room
 
     monkeypatch.setattr(room, "TIMEOUT", 3.0)
-    made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False)
+    made = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False
+    )
     found = run_tasks(Slow(), range(20), dask=made.scheduler_address)
     next(found), next(found)
     made.close()
@@ -203,7 +221,9 @@ def line() -> dict:
     """Case of a pipe with a closing valve."""
     nodes = {"lake": reservoir(1e6), "gate": junction(), "out": reservoir(101325.0)}
     links = {
-        "main": pipe("lake", "gate", 100.0, 0.3, 1000.0, 10, friction=NO_FRICTION, initial_flow=0.05),
+        "main": pipe(
+            "lake", "gate", 100.0, 0.3, 1000.0, 10, friction=NO_FRICTION, initial_flow=0.05
+        ),
         "valve": valve("gate", "out", 0.01, {"start": 0.05, "duration": 0.2, "value": [1.0, 0.2]}),
     }
     numerics = {"scheme": "upwind5", "method": "rk4", "courant": 0.8}
@@ -225,12 +245,17 @@ def test_an_order_is_the_same(line):
 
 def test_a_map_is_the_same_by_a_method_that_only_this_process_knows(line, tmp_path):
     tableau("midpoint-of-mine", "0 |\n1/2 | 1/2\n----+----\n | 0 1")
-    asked = {"schemes": ["upwind"], "methods": ["euler", "midpoint-of-mine"], "courants": [0.5, 0.9, 1.5]}
+    asked = {
+        "schemes": ["upwind"],
+        "methods": ["euler", "midpoint-of-mine"],
+        "courants": [0.5, 0.9, 1.5],
+    }
     alone = failure_map(line, tolerance=0.05, **asked)
     together = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)
     assert timeless(plain(together.plain())) == timeless(plain(alone.plain()))
     assert len({one.verdict for one in alone.squares}) > 1  # with verdicts that need shorter steps
-    again = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)  # all runs are in the cache
+    # all runs are in the cache
+    again = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)
     assert again.squares == together.squares
 
 
@@ -251,18 +276,29 @@ def test_rows_of_stability_are_the_same(line):
     [
         (order, {"levels": 3, "cells": 8, "reference": "finer"}),
         (chart, {"schemes": ["upwind5"], "methods": ["rk4", "ssp-rk3"], "cells": [10, 20]}),
-        (failure_map, {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 0.9, 1.5], "tolerance": 0.05}),
+        (
+            failure_map,
+            {
+                "schemes": ["upwind"],
+                "methods": ["euler"],
+                "courants": [0.5, 0.9, 1.5],
+                "tolerance": 0.05,
+            },
+        ),
         (stability, {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "steps": 10}),
     ],
 )
 def test_workers_of_dask_find_the_same(line, cluster, study, asked):
-    alone, there = (plain(study(line, dask=dask, **asked).plain()) for dask in (None, cluster.scheduler_address))
+    alone, there = (
+        plain(study(line, dask=dask, **asked).plain()) for dask in (None, cluster.scheduler_address)
+    )
     assert timeless(there) == timeless(alone)
 
 
 def test_tasks_without_a_name_to_be_sent_by_are_refused(line):
     with pytest.raises(
-        FvsolveError, match="initial, source and exact are functions of this process; expected jobs = 1"
+        FvsolveError,
+        match="initial, source and exact are functions of this process; expected jobs = 1",
     ):
         order(line, jobs=2, initial=lambda pipe, x: (x, x))
     with pytest.raises(FvsolveError, match="jobs = 0 is out of range; expected 1 or more"):
@@ -271,7 +307,17 @@ def test_tasks_without_a_name_to_be_sent_by_are_refused(line):
 
 def test_commands_take_jobs(line, fvs, tmp_path):
     (tmp_path / "line.toml").write_text(write(line))
-    words = ("order", tmp_path / "line.toml", "--levels", "2", "--cells", "8", "--reference", "finer", "--json")
+    words = (
+        "order",
+        tmp_path / "line.toml",
+        "--levels",
+        "2",
+        "--cells",
+        "8",
+        "--reference",
+        "finer",
+        "--json",
+    )
     code, out, _ = fvs(*words, "--jobs", "2", "--out", tmp_path / "two")
     assert code == 0 and len(json.loads(out)["studies"][0]["rows"]) == 2
     code, _, err = fvs("stability", "--jobs", "2")

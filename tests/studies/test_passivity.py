@@ -26,19 +26,38 @@ import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.energy_balance import energy, measure_pairs
 from fvsolve.studies.outcome import outcome, study_model
-from fvsolve.studies.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
+from fvsolve.studies.passivity import (
+    closed_pipe,
+    courant_limit,
+    method_claim,
+    passivity,
+    scheme_claim,
+)
 
 study = importlib.import_module("fvsolve.studies.passivity")
 VOLUME, FLOW = 0.2, 1e-3
 BETA = WATER["bulk_modulus"]
-ALWAYS = ["implicit-euler", "implicit-midpoint", "gauss-4", "gauss-6", "radau-iia-3", "radau-iia-5", "lobatto-iiic-4"]
+ALWAYS = [
+    "implicit-euler",
+    "implicit-midpoint",
+    "gauss-4",
+    "gauss-6",
+    "radau-iia-3",
+    "radau-iia-5",
+    "lobatto-iiic-4",
+]
 NEVER = ["euler", "improved-euler", "rk4", "ssp-rk3", "dormand-prince", "trapezoid", "esdirk-4"]
 
 
 def pumped(method: str, h: float, half: int) -> dict:
     """Case of a chamber at ambient pressure that is filled for `half` steps and emptied for as many."""
-    nodes = {"pump": {"type": "inflow", "flow": stepped(half * h, FLOW, -FLOW)}, "pot": chamber(VOLUME, AMBIENT)}
-    return scene(nodes, {"way": valve("pump", "pot", 10.0)}, 2 * half * h, {"method": method, "step": h})
+    nodes = {
+        "pump": {"type": "inflow", "flow": stepped(half * h, FLOW, -FLOW)},
+        "pot": chamber(VOLUME, AMBIENT),
+    }
+    return scene(
+        nodes, {"way": valve("pump", "pot", 10.0)}, 2 * half * h, {"method": method, "step": h}
+    )
 
 
 @pytest.mark.parametrize("name", ALWAYS)
@@ -93,8 +112,16 @@ def test_others_keep_condition_2_on_it(method):
 def swinging(method: str, h_omega: float, steps: int = 60) -> dict:
     omega = math.sqrt(GRAVITY * area(0.5) / 50.0 / 2.0)
     nodes = {"sea": reservoir(AMBIENT + RHO * GRAVITY * 3.0), "pond": tank(2.0, 5.0)}
-    links = {"way": {"type": "rigid-column", "from": "sea", "to": "pond", "length": 50.0, "diameter": 0.5,
-                     "friction": NO_FRICTION}}  # fmt: skip
+    links = {
+        "way": {
+            "type": "rigid-column",
+            "from": "sea",
+            "to": "pond",
+            "length": 50.0,
+            "diameter": 0.5,
+            "friction": NO_FRICTION,
+        }
+    }
     h = h_omega / omega
     return scene(nodes, links, steps * h, {"method": method, "step": h, "initial": "rest"})
 
@@ -123,9 +150,17 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
     """Model of the closed pipe of the study, for some steps at a Courant number."""
     h = courant * 50.0 / 1000.0
     nodes = {"a": junction(), "b": junction(), "tap": reservoir(1e6)}
-    links = {"pipe": pipe("a", "b", 1000.0, 0.3, 1000.0, study.CELLS), "shut": valve("b", "tap", 1e-4, 0.0)}
+    links = {
+        "pipe": pipe("a", "b", 1000.0, 0.3, 1000.0, study.CELLS),
+        "shut": valve("b", "tap", 1e-4, 0.0),
+    }
     return study_model(
-        scene(nodes, links, steps * h, {"scheme": scheme, "method": method, "step": h, "initial": "rest"})
+        scene(
+            nodes,
+            links,
+            steps * h,
+            {"scheme": scheme, "method": method, "step": h, "initial": "rest"},
+        )
     )
 
 
@@ -136,7 +171,10 @@ def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)
     r = stability_function(method_named(method))
-    up, down = (study.matrix_polynomial([float(x) for x in p.coefficients], b) for p in (r.numerator, r.denominator))
+    up, down = (
+        study.matrix_polynomial([float(x) for x in p.coefficients], b)
+        for p in (r.numerator, r.denominator)
+    )
     assert a.shape == s.shape
     return np.linalg.solve(s, np.linalg.svd(np.linalg.solve(down, up))[2][0])
 
@@ -188,10 +226,17 @@ def test_other_schemes_create_energy_at_pipe_ends_and_no_more_than_stated(scheme
 
 def test_the_tool_names_the_pairs_that_break_passivity():
     found = passivity(["upwind", "fromm", "upwind5"], ["euler", "rk4", "gauss-4"])
-    assert set(found.breaking) == {("fromm", "euler"), ("upwind5", "euler"), ("upwind5", "rk4"), ("upwind5", "gauss-4")}
+    assert set(found.breaking) == {
+        ("fromm", "euler"),
+        ("upwind5", "euler"),
+        ("upwind5", "rk4"),
+        ("upwind5", "gauss-4"),
+    }
     said = found.plain()
     assert [one["method"] for one in said["methods"]] == ["euler", "rk4", "gauss-4"]
-    assert {"scheme": "upwind", "method": "gauss-4", "courant": None, "any_step": True} in said["pairs"]
+    assert {"scheme": "upwind", "method": "gauss-4", "courant": None, "any_step": True} in said[
+        "pairs"
+    ]
     with pytest.raises(FvsolveError, match='did you mean "upwind5"'):
         passivity(["upwnd5"])
 
@@ -199,7 +244,10 @@ def test_the_tool_names_the_pairs_that_break_passivity():
 def test_a_case_is_tried_by_pairs_and_those_that_create_energy_are_named():
     case = fvsolve.load(swinging("rk4", 0.5))
     rows = {
-        row["method"]: row for row in measure_pairs(case, None, ["euler", "implicit-midpoint", "implicit-euler"], "sea")
+        row["method"]: row
+        for row in measure_pairs(
+            case, None, ["euler", "implicit-midpoint", "implicit-euler"], "sea"
+        )
     }
     assert rows["euler"]["creates"]
     assert not rows["implicit-euler"]["creates"]

@@ -41,7 +41,10 @@ def test_a_run_equals_the_same_steps_in_numpy(scheme):
             13 / 12 * (b - 2 * c + d) ** 2 + (b - d) ** 2 / 4,
             13 / 12 * (c - 2 * d + e) ** 2 + (3 * c - 4 * d + e) ** 2 / 4,
         )
-        w = [g * (1 + (np.abs(s[0] - s[2]) / (x + 1e-18)) ** 2) for g, x in zip((0.1, 0.6, 0.3), s, strict=True)]
+        w = [
+            g * (1 + (np.abs(s[0] - s[2]) / (x + 1e-18)) ** 2)
+            for g, x in zip((0.1, 0.6, 0.3), s, strict=True)
+        ]
         f = sum(x * y for x, y in zip(w, p, strict=True)) / sum(w)
         return np.roll(f, 1) - f
 
@@ -50,7 +53,9 @@ def test_a_run_equals_the_same_steps_in_numpy(scheme):
         one = wanted + courant * rate(wanted)
         two = 0.75 * wanted + 0.25 * (one + courant * rate(one))
         wanted = wanted / 3 + 2 / 3 * (two + courant * rate(two))
-    assert PeriodicPipe(scheme, "ssp-rk3", cells).run(u, courant, steps) == pytest.approx(wanted, rel=1e-11, abs=1e-11)
+    assert PeriodicPipe(scheme, "ssp-rk3", cells).run(u, courant, steps) == pytest.approx(
+        wanted, rel=1e-11, abs=1e-11
+    )
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
@@ -72,21 +77,30 @@ def test_a_run_fails_where_the_matrix_of_a_step_predicts():
     for courant, fails in ((one.measured * 1.0001, True), (one.measured * 0.9999, False)):
         s = courant * j
         step = sum(np.linalg.matrix_power(s, m) / math.factorial(m) for m in range(5))
-        growth = max(np.linalg.norm(np.linalg.matrix_power(step, n), 2) for n in range(1, steps + 1))
+        growth = max(
+            np.linalg.norm(np.linalg.matrix_power(step, n), 2) for n in range(1, steps + 1)
+        )
         assert (growth > 1e3) == fails
 
 
 def test_longer_runs_fail_nearer_to_the_exact_limit():
     exact = advection_limit("upwind5", "ssp-rk3").limit
-    excess = [measured_limit("upwind5", "ssp-rk3", 100, n).measured / exact - 1 for n in (100, 1000, 10000)]
+    excess = [
+        measured_limit("upwind5", "ssp-rk3", 100, n).measured / exact - 1
+        for n in (100, 1000, 10000)
+    ]
     assert 0 < excess[2] < 0.12 * excess[1] < 0.02 * excess[0]
 
 
 @pytest.mark.parametrize(
-    "scheme, method, least", [("upwind5", "ssp-rk2", 0.5), ("central", "verner-7", 4.0), ("central", "tsitouras", 1.6)]
+    "scheme, method, least",
+    [("upwind5", "ssp-rk2", 0.5), ("central", "verner-7", 4.0), ("central", "tsitouras", 1.6)],
 )
 def test_a_short_run_looks_stable_far_beyond_the_exact_limit(scheme, method, least):
-    assert advection_limit(scheme, method).limit < 0.5 and measured_limit(scheme, method).measured > least
+    assert (
+        advection_limit(scheme, method).limit < 0.5
+        and measured_limit(scheme, method).measured > least
+    )
 
 
 # ---- limited schemes
@@ -98,8 +112,12 @@ def test_frozen_slopes_are_the_tangents_of_the_limiters():
     for name, one in LIMITERS.items():
         found = set()
         for a, b in ((tiny, 1.0), (1.0, tiny), (1.0, 0.99), (1.0, 1.01), (1.0, -1.0)):
-            by_a = (limited(CODES[name], a * (1 + tiny), b) - limited(CODES[name], a, b)) / (a * tiny)
-            by_b = (limited(CODES[name], a, b * (1 + tiny)) - limited(CODES[name], a, b)) / (b * tiny)
+            by_a = (limited(CODES[name], a * (1 + tiny), b) - limited(CODES[name], a, b)) / (
+                a * tiny
+            )
+            by_b = (limited(CODES[name], a, b * (1 + tiny)) - limited(CODES[name], a, b)) / (
+                b * tiny
+            )
             found.add((round(2 * by_a + 1e-9, 1) / 2, round(2 * by_b + 1e-9, 1) / 2))
         assert found == {(0.0, 0.0), *((float(a), float(b)) for a, b in one.tangents)}, name
         assert all(sum(weights) == 1 for weights in branches("muscl", name).values())
@@ -115,7 +133,9 @@ def test_weno_stencils_with_their_ideal_weights_are_upwind5():
     assert mixed == list(parts["upwind5"])
 
 
-@pytest.mark.parametrize("limiter, bound", [("minmod", 2 / 3), ("van-leer", 0.5), ("monotonized-central", 0.5)])
+@pytest.mark.parametrize(
+    "limiter, bound", [("minmod", 2 / 3), ("van-leer", 0.5), ("monotonized-central", 0.5)]
+)
 @pytest.mark.parametrize("method", ["euler", "ssp-rk3"])
 def test_total_variation_does_not_grow_up_to_the_bound(limiter, bound, method):
     assert monotone_limit(limiter, method) == pytest.approx(bound)
@@ -135,7 +155,13 @@ def test_van_leers_limiter_with_euler_has_no_sharp_limit():
 
 def test_a_limit_that_falls_as_runs_get_longer_is_not_called_sharp():
     euler = limited_limit("muscl", "van-leer", "euler", 30, 100)
-    assert euler.sharp is False and euler.monotone == 0.5 and euler.least[0] > 1.1 * euler.least[2] > 0.55
+    assert (
+        euler.sharp is False
+        and euler.monotone == 0.5
+        and euler.least[0] > 1.1 * euler.least[2] > 0.55
+    )
     assert {name: one.limit for name, one in euler.frozen.items()}["fromm"] == 0.0
     third = limited_limit("muscl", "van-leer", "ssp-rk3", 30, 100)
-    assert third.sharp and third.least[-1] == pytest.approx(advection_limit("upwind", "ssp-rk3").limit, rel=0.01)
+    assert third.sharp and third.least[-1] == pytest.approx(
+        advection_limit("upwind", "ssp-rk3").limit, rel=0.01
+    )

@@ -61,8 +61,16 @@ NO = {
     "Khalil 1/(s^2+s+1)": ([1], [1, 1, 1], "w > 1 rad/s"),
     "(s+4)/(s+1)(s+2)": ([1, 4], [1, 3, 2], "w > 2.82842712475 rad/s"),
     "pole on the axis and a right one": ([1], [1, -1, 1, -1], "near s = 1"),
-    "two zeros side by side": ([1, 0, 4, 0, 3, 0], [1, 0, 6, 0, 8], "w = 1.41421356237 rad/s has the negative residue"),
-    "one residue of two negative": ([0, -1, 0, 2, 0], [1, 0, 5, 0, 4], "w = 2 rad/s has the negative residue"),
+    "two zeros side by side": (
+        [1, 0, 4, 0, 3, 0],
+        [1, 0, 6, 0, 8],
+        "w = 1.41421356237 rad/s has the negative residue",
+    ),
+    "one residue of two negative": (
+        [0, -1, 0, 2, 0],
+        [1, 0, 5, 0, 4],
+        "w = 2 rad/s has the negative residue",
+    ),
 }
 
 
@@ -104,13 +112,16 @@ def total(p, q):
 
 
 @pytest.mark.parametrize("name", YES)
-@pytest.mark.parametrize("back", ["resistor", "capacitor 1/s", "inductor s", "1/(s+1)", "PI (s+1)/s"])
+@pytest.mark.parametrize(
+    "back", ["resistor", "capacitor 1/s", "inductor s", "1/(s+1)", "PI (s+1)/s"]
+)
 def test_passive_systems_in_feedback_are_passive(name, back):
     assert positive_real(*closed(YES[name], YES[back]))
 
 
 def test_stable_systems_in_feedback_need_not_be_stable():
-    three = ([1], [1, 3, 3, 1])  # 1 / (s + 1)^3 is not passive, and its feedback is unstable above a gain of 8
+    # 1 / (s + 1)^3 is not passive, and its feedback is unstable above a gain of 8
+    three = ([1], [1, 3, 3, 1])
     assert not positive_real(*three)
     assert max(np.roots([float(x) for x in closed(three, ([9], [1]))[1]]).real) > 0.0
     assert max(np.roots([float(x) for x in closed(three, ([7], [1]))[1]]).real) < 0.0
@@ -120,7 +131,9 @@ def in_the_right_half_plane(n, d):
     """Least Re H / |H| right of the axis, near poles and zeros and far from them; greatest |Im H| on the real axis."""
     poles, zeros = (np.roots([float(x) for x in p]) for p in (d, n))
     about = np.concatenate([poles, zeros, [0.0]])
-    rings = about[:, None, None] + np.geomspace(1e-4, 1e4, 65)[:, None] * np.exp(1j * np.linspace(-np.pi, np.pi, 181))
+    rings = about[:, None, None] + np.geomspace(1e-4, 1e4, 65)[:, None] * np.exp(
+        1j * np.linspace(-np.pi, np.pi, 181)
+    )
     s, real = rings[rings.real > 0], np.geomspace(1.1e-4, 1.1e4, 99) + 0j
 
     def h(s):
@@ -163,17 +176,29 @@ def test_a_residue_that_is_not_real():
 def test_strictly_positive_real_as_khalil_defines_it():
     strictly = {name: positive_real(*pair).strictly for name, pair in YES.items()}
     assert {name for name, holds in strictly.items() if holds} == {
-        "resistor", "(s+2)/(s+1)", "(s+1)/(s+2)", "1/(s+1)"}  # fmt: skip
+        "resistor",
+        "(s+2)/(s+1)",
+        "(s+1)/(s+2)",
+        "1/(s+1)",
+    }
     assert positive_real([1, 2], [1, 3, 2]).strictly  # (s + 2) / (s + 1)(s + 2) = 1 / (s + 1)
     assert positive_real([2, 3, 1], [2, 1]).strictly  # s + 1
     # Khalil, example 6.4 kind: (s + 3)/((s + 1)(s + 2)) has w^2 Re H -> 0
-    assert not positive_real([1, 3], [1, 3, 2]).strictly and positive_real([1, 2.5], [1, 3, 2]).strictly
+    assert (
+        not positive_real([1, 3], [1, 3, 2]).strictly
+        and positive_real([1, 2.5], [1, 3, 2]).strictly
+    )
 
 
 def test_lossless_functions_are_reported():
     assert {name for name, pair in YES.items() if positive_real(*pair).lossless} == {
-        "capacitor 1/s", "inductor s", "s + 1/s", "tank circuit s/(s^2+1)", "Foster (s^2+1)/(s(s^2+4))",
-        "Foster of poles and zeros by turns"}  # fmt: skip
+        "capacitor 1/s",
+        "inductor s",
+        "s + 1/s",
+        "tank circuit s/(s^2+1)",
+        "Foster (s^2+1)/(s(s^2+4))",
+        "Foster of poles and zeros by turns",
+    }
 
 
 def biquad(b0):
@@ -186,7 +211,11 @@ def test_the_boundary_is_decided_on_both_sides():
     assert positive_real(*biquad(1)).zeros == (approx(math.sqrt(2), rel=1e-15),)
     tiny = F(1, 10**40)
     assert positive_real(*biquad(1 + tiny)) and not positive_real(*biquad(1 - tiny))
-    assert positive_real(*biquad(9)) and positive_real(*biquad(9 - tiny)) and not positive_real(*biquad(9 + tiny))
+    assert (
+        positive_real(*biquad(9))
+        and positive_real(*biquad(9 - tiny))
+        and not positive_real(*biquad(9 + tiny))
+    )
     assert positive_real(*biquad(9)).zeros == (approx(math.sqrt(6), rel=1e-15),)
 
 
@@ -196,8 +225,13 @@ def test_a_band_of_width_1e_9_is_detected_and_located():
     (band,) = positive_real(*biquad(1 - tiny)).bands
     b0 = 1 - tiny
     x = [float(b0 + 3) / 2 - s * math.sqrt(float((b0 - 1) * (b0 - 9))) / 2 for s in (1, -1)]
-    assert (band.low, band.high) == (approx(math.sqrt(x[0]), rel=1e-15), approx(math.sqrt(x[1]), rel=1e-15))
-    assert band.width == approx(math.sqrt(8e-18) / math.sqrt(2) / 2, rel=1e-6) and band.width < 1.01e-9
+    assert (band.low, band.high) == (
+        approx(math.sqrt(x[0]), rel=1e-15),
+        approx(math.sqrt(x[1]), rel=1e-15),
+    )
+    assert (
+        band.width == approx(math.sqrt(8e-18) / math.sqrt(2) / 2, rel=1e-6) and band.width < 1.01e-9
+    )
     assert band.low < band.worst < band.high
     # least of Re H: E / P at x = 2, E = x^2 - (b0 + 3) x + 4 b0 -> -2 tiny, P = (4 - x)^2 + x = 6
     assert band.least == approx(-2e-18 / 6, rel=1e-6)
@@ -213,7 +247,10 @@ def test_two_adjacent_bands():
     # Re H = (x - 1)(x - 4)(x - 9)(x - 16) / |D|^2 with D Hurwitz: N from Re N(jw) D(-jw) = E, all even
     d = times([1, 1], [1, 2], [1, 3], [1, 5])
     found = positive_real(*with_real_part([F(1), F(4), F(9), F(16)], d))
-    assert [(b.low, b.high) for b in found.bands] == [(approx(1), approx(2)), (approx(3), approx(4))]
+    assert [(b.low, b.high) for b in found.bands] == [
+        (approx(1), approx(2)),
+        (approx(3), approx(4)),
+    ]
     double = positive_real(*with_real_part([F(1), F(1), F(9), F(9)], d))
     assert double and double.zeros == (approx(1), approx(3))
 
@@ -244,7 +281,12 @@ def solved(matrix, right):
 
 
 def test_hidden_cancellations_are_reported_and_do_not_change_the_function():
-    for factor, side in (([1, -1], "right"), ([1, 0], "axis"), ([1, 0, 7], "axis"), ([1, 5], "left")):
+    for factor, side in (
+        ([1, -1], "right"),
+        ([1, 0], "axis"),
+        ([1, 0, 7], "axis"),
+        ([1, 5], "left"),
+    ):
         found = positive_real(times([1, 2], factor), times([1, 1], factor))
         assert found.positive_real and {mode.side for mode in found.hidden} == {side}
         assert found.hidden_unstable == (side != "left") and "hidden" in found.reason
@@ -287,13 +329,19 @@ def test_half_planes_are_counted_where_rows_of_routh_degenerate(name):
 
 
 @examples(60)
-@given(st.lists(st.integers(-3, 3), max_size=3), st.lists(st.tuples(st.integers(-2, 2), st.integers(1, 4)), max_size=3))
+@given(
+    st.lists(st.integers(-3, 3), max_size=3),
+    st.lists(st.tuples(st.integers(-2, 2), st.integers(1, 4)), max_size=3),
+)
 def test_half_planes_of_products_of_known_roots(real, pairs):
     p = times([1], *([1, -r] for r in real), *([1, -2 * a, a * a + b * b] for a, b in pairs))
     where = [*real, *(a for a, _ in pairs for _ in range(2))]
     found = locate_roots(Polynomial(p[::-1]))
     assert (found.right, found.axis, found.left) == (
-        sum(x > 0 for x in where), sum(x == 0 for x in where), sum(x < 0 for x in where))  # fmt: skip
+        sum(x > 0 for x in where),
+        sum(x == 0 for x in where),
+        sum(x < 0 for x in where),
+    )
 
 
 # random passive networks ----------------------------------------------------------------------------------------
@@ -329,7 +377,10 @@ def test_every_ladder_of_passive_elements_is_positive_real(steps):
 
 
 @examples(60)
-@given(st.lists(st.tuples(values, st.fractions(0, 9, max_denominator=9)), min_size=1, max_size=4), values)
+@given(
+    st.lists(st.tuples(values, st.fractions(0, 9, max_denominator=9)), min_size=1, max_size=4),
+    values,
+)
 def test_a_lossless_foster_form_less_a_grain_of_resistance_is_not(tanks, inductance):
     found = ([inductance, 0], [1])
     for k, x in tanks:
@@ -346,7 +397,9 @@ def test_a_network_less_a_little_more_than_its_least_real_part_is_not(steps, shi
     found = added((n, d), ([-shift], [1]))
     w = np.concatenate([np.logspace(-4, 4, 4001), [1e-7, 1e7]])
     with np.errstate(divide="ignore", invalid="ignore"):
-        re = np.nan_to_num((np.polyval(np.array(n, float), 1j * w) / np.polyval(np.array(d, float), 1j * w)).real)
+        re = np.nan_to_num(
+            (np.polyval(np.array(n, float), 1j * w) / np.polyval(np.array(d, float), 1j * w)).real
+        )
     if re.min() < shift - 1e-6:
         assert not positive_real(*found)
     elif re.min() > shift + 1e-2 * (1 + shift):
@@ -378,7 +431,9 @@ def test_bands_agree_with_dense_sampling_of_stable_functions(n, pairs):
 def test_floats_are_the_binary_fractions_they_are_and_text_is_decimal():
     # 0.1 + 0.2 is not 0.3 in floats, so the factor is not shared; as text it is shared
     assert positive_real(["0.3"], ["0.3"]).hidden == ()
-    assert positive_real([1, "-0.3"], [1, "-0.3"]).hidden and not positive_real([1, -0.1 - 0.2], [1, -0.3])
+    assert positive_real([1, "-0.3"], [1, "-0.3"]).hidden and not positive_real(
+        [1, -0.1 - 0.2], [1, -0.3]
+    )
     found = positive_real([1, 0.1], [1, Decimal("0.1")])
     assert found.numerator[1] == F(3602879701896397, 2**55) and found.denominator[1] == F(1, 10)
     assert positive_real(np.array([1.0, 2.0]), np.array([1, 1])) and positive_real("1/3", 2)
@@ -388,7 +443,9 @@ def test_leading_zeros_are_no_degree():
     assert positive_real([0, 0, 1], [0, 1, 0]) and not positive_real([0, 1, 0, 0], [0, 0, 1])
 
 
-@pytest.mark.parametrize("bad", [[], [1, "x"], [1j], [math.nan], [math.inf, 1], None, [True], [[1, 2]], ["1/0"]])
+@pytest.mark.parametrize(
+    "bad", [[], [1, "x"], [1j], [math.nan], [math.inf, 1], None, [True], [[1, 2]], ["1/0"]]
+)
 def test_coefficients_that_are_not_real_are_refused(bad):
     with pytest.raises(FvsolveError, match="numerator.*expected"):
         positive_real(bad, [1])
@@ -413,6 +470,8 @@ def test_a_verdict_is_plain_for_json():
 def test_coefficients_of_too_large_a_number_of_digits_are_refused():
     """Floats of degree 30 took more than three minutes; whole numbers of this degree take a second."""
     roots = np.random.default_rng(0).uniform(0.1, 10.0, (2, 30))
-    with pytest.raises(FvsolveError, match="degree 30 with up to .* binary digits take too long.*rounded"):
+    with pytest.raises(
+        FvsolveError, match="degree 30 with up to .* binary digits take too long.*rounded"
+    ):
         positive_real(*map(list, map(np.poly, -roots)))
     assert positive_real([1] * 31, [1] * 31).positive_real

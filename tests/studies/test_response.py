@@ -28,8 +28,17 @@ OIL = {"name": "user", "density": 870.0, "bulk_modulus": BETA, "viscosity": 0.03
 
 def bottle():
     """Case of a chamber filled through an orifice at a drop of 100 bar."""
-    nodes = {"pump": reservoir(101e5), "bottle": {"type": "chamber", "volume": VOLUME, "initial_pressure": 1e5}}
-    hole = {"type": "orifice", "from": "pump", "to": "bottle", "area": HOLE, "discharge_coefficient": CD}
+    nodes = {
+        "pump": reservoir(101e5),
+        "bottle": {"type": "chamber", "volume": VOLUME, "initial_pressure": 1e5},
+    }
+    hole = {
+        "type": "orifice",
+        "from": "pump",
+        "to": "bottle",
+        "area": HOLE,
+        "discharge_coefficient": CD,
+    }
     return scene(nodes, {"hole": hole}, 1.0, {"method": "dormand-prince", "rtol": 1e-8}, fluid=OIL)
 
 
@@ -45,7 +54,9 @@ def test_chamber_and_orifice_are_a_resistance_and_a_capacity():
     assert np.allclose(fed(s), RESISTANCE / (1.0 + RESISTANCE * CAPACITY * s), rtol=1e-7)
     assert (seen.kind, fed.kind) == ("admittance", "impedance")
     assert seen.verdict.answer == fed.verdict.answer == "yes"
-    assert positive_real([CAPACITY, 0], [RESISTANCE * CAPACITY, 1]) and positive_real([RESISTANCE], [1, 1])
+    assert positive_real([CAPACITY, 0], [RESISTANCE * CAPACITY, 1]) and positive_real(
+        [RESISTANCE], [1, 1]
+    )
 
 
 WAVE, LENGTH, DIAMETER, CELLS = 1000.0, 1000.0, 0.5, 30
@@ -54,9 +65,22 @@ WAVE, LENGTH, DIAMETER, CELLS = 1000.0, 1000.0, 0.5, 30
 def response_of_line(scheme, port="gate", cells=CELLS, reverse=False, instead=None):
     """Response of a lossless pipe between a reservoir and a dead end."""
     ends = ("gate", "lake") if reverse else ("lake", "gate")
-    pipe = {"type": "pipe", "from": ends[0], "to": ends[1], "length": LENGTH, "diameter": DIAMETER,
-            "wave_speed": WAVE, "cells": cells, "friction": NO_FRICTION}  # fmt: skip
-    case = scene({"lake": reservoir(1e6), "gate": junction()}, {"main": pipe}, 1.0, {"scheme": scheme, "method": "rk4"})
+    pipe = {
+        "type": "pipe",
+        "from": ends[0],
+        "to": ends[1],
+        "length": LENGTH,
+        "diameter": DIAMETER,
+        "wave_speed": WAVE,
+        "cells": cells,
+        "friction": NO_FRICTION,
+    }
+    case = scene(
+        {"lake": reservoir(1e6), "gate": junction()},
+        {"main": pipe},
+        1.0,
+        {"scheme": scheme, "method": "rk4"},
+    )
     return response(case, port, scheme=instead)
 
 
@@ -68,7 +92,9 @@ def test_a_lossless_line_is_its_closed_form(reverse):
     s = 1j * np.array([0.2, 0.9, 1.4, 2.1, 3.0])
     open_, closed = LineImpedance(Z0, LENGTH / WAVE, -1.0), LineImpedance(Z0, LENGTH / WAVE, 1.0)
     assert np.allclose(response_of_line("upwind5", "gate", reverse=reverse)(s), open_(s), rtol=2e-5)
-    assert np.allclose(response_of_line("upwind5", "lake", reverse=reverse)(s), 1.0 / closed(s), rtol=2e-5)
+    assert np.allclose(
+        response_of_line("upwind5", "lake", reverse=reverse)(s), 1.0 / closed(s), rtol=2e-5
+    )
 
 
 def test_upwind_biased_lines_are_positive_real_or_on_the_boundary_and_upwind_beyond_doubt():
@@ -90,16 +116,29 @@ def test_central_differences_break_positive_realness_as_a_direct_solve_confirms(
 
 
 def test_friction_moves_a_line_off_the_boundary():
-    pipe = {"type": "pipe", "from": "lake", "to": "gate", "length": LENGTH, "diameter": DIAMETER, "wave_speed": WAVE,
-            "cells": CELLS, "friction": {"model": "steady", "factor": 0.02}}  # fmt: skip
+    pipe = {
+        "type": "pipe",
+        "from": "lake",
+        "to": "gate",
+        "length": LENGTH,
+        "diameter": DIAMETER,
+        "wave_speed": WAVE,
+        "cells": CELLS,
+        "friction": {"model": "steady", "factor": 0.02},
+    }
     valve = {"type": "valve", "from": "gate", "to": "out", "area": 0.01, "opening": 1.0}
     nodes = {"lake": reservoir(1e6), "gate": junction(), "out": reservoir(2e5)}
     case = scene(nodes, {"main": pipe, "valve": valve}, 1.0, {"scheme": "upwind5", "method": "rk4"})
     assert response(case, "gate").verdict.margin > 1e-3
     # s -> 0: pipe and valve in parallel, each d dp / dq = 2 dp / q
-    friction, loss = 0.02 * LENGTH / DIAMETER * RHO / (2.0 * area(DIAMETER) ** 2), RHO / (2.0 * (0.61 * 0.01) ** 2)
+    friction, loss = (
+        0.02 * LENGTH / DIAMETER * RHO / (2.0 * area(DIAMETER) ** 2),
+        RHO / (2.0 * (0.61 * 0.01) ** 2),
+    )
     q = math.sqrt(8e5 / (friction + loss))
-    assert response(case, "gate")(0.0).real == approx(1.0 / (1.0 / (2 * friction * q) + 1.0 / (2 * loss * q)), rel=1e-6)
+    assert response(case, "gate")(0.0).real == approx(
+        1.0 / (1.0 / (2 * friction * q) + 1.0 / (2 * loss * q)), rel=1e-6
+    )
 
 
 def test_ports_that_are_none_and_cases_that_are_too_large_are_refused():
@@ -117,21 +156,30 @@ def test_ports_that_are_none_and_cases_that_are_too_large_are_refused():
 
 
 def test_the_command_prints_a_single_object_and_leaves_table_and_pictures(tmp_path, fvs):
-    code, out, _ = fvs("response", "chamber-and-orifice", "--port", "bottle", "--json", "--out", tmp_path)
+    code, out, _ = fvs(
+        "response", "chamber-and-orifice", "--port", "bottle", "--json", "--out", tmp_path
+    )
     assert code == 0
     said = json.loads(out)
-    assert said["verdict"]["answer"] == "yes" and said["kind"] == "impedance" and len(said["A"]) == 1
+    assert (
+        said["verdict"]["answer"] == "yes" and said["kind"] == "impedance" and len(said["A"]) == 1
+    )
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {f"bottle.response.{ending}" for ending in ("csv", "npz", "png", "svg")}
     rows = (tmp_path / "bottle.response.csv").read_text().splitlines()
-    assert rows[0].startswith("frequency [Hz],w [rad/s],real") and len(rows) == len(said["frequency"]) + 1
+    assert (
+        rows[0].startswith("frequency [Hz],w [rad/s],real")
+        and len(rows) == len(said["frequency"]) + 1
+    )
 
 
 def test_central_differences_are_not_positive_real_however_fine_the_cells():
     firsts, worst = [], []
     for cells in (20, 40):
         nodes = {"top": lake(50.0), "end": junction()}
-        made = scene(nodes, {"p": pipe("top", "end", 600.0, 0.5, 1200.0, cells)}, 1.0, {"scheme": "central"})
+        made = scene(
+            nodes, {"p": pipe("top", "end", 600.0, 0.5, 1200.0, cells)}, 1.0, {"scheme": "central"}
+        )
         found = response(made, "top")
         a, eye = found.a, np.eye(len(found.a))
         w = max(found.verdict.dips, key=lambda dip: -dip.angle).worst
@@ -165,10 +213,16 @@ def verdict(n, d):
 
 def test_a_transfer_function_is_the_result_of_a_direct_solve():
     rng = np.random.default_rng(3)
-    a, b, c = rng.normal(size=(9, 9)) * 10.0 ** rng.integers(-3, 3, (9, 1)), rng.normal(size=9), rng.normal(size=9)
+    a, b, c = (
+        rng.normal(size=(9, 9)) * 10.0 ** rng.integers(-3, 3, (9, 1)),
+        rng.normal(size=9),
+        rng.normal(size=9),
+    )
     h = Transfer(a, b, c, 0.7)
     for s in (0.3, 2j, -1 + 5j, 1e3j):
-        assert h(s)[0] == approx(0.7 + c @ np.linalg.solve(s * np.eye(9) - a, b.astype(complex)), rel=1e-9)
+        assert h(s)[0] == approx(
+            0.7 + c @ np.linalg.solve(s * np.eye(9) - a, b.astype(complex)), rel=1e-9
+        )
     parts = 0.7 + np.sum(h.residues / (2j - h.poles))
     assert h(2j)[0] == approx(parts, rel=1e-9)
 
@@ -215,7 +269,10 @@ def test_a_narrow_band_is_located_without_a_grid():
     found = verdict([1, 1, b0], [1, 1, 4])
     x = np.sort(np.roots([1, -(b0 + 3), 4 * b0]))
     (dip,) = found.dips
-    assert (dip.low, dip.high) == (approx(math.sqrt(x[0]), rel=1e-9), approx(math.sqrt(x[1]), rel=1e-9))
+    assert (dip.low, dip.high) == (
+        approx(math.sqrt(x[0]), rel=1e-9),
+        approx(math.sqrt(x[1]), rel=1e-9),
+    )
     assert found.positive_real is False and verdict([1, 1, 2 - b0], [1, 1, 4]).positive_real is True
 
 
@@ -258,7 +315,11 @@ def test_a_lossless_line_is_positive_real_whatever_passive_end_it_has(reflection
     found = line_positive_real(LineImpedance(Z_LINE, T, reflection))
     u = abs(reflection) * math.exp(-2e-3)
     exact = Z_LINE * (1.0 - u) / (1.0 + u)  # the least of Z_LINE (1 - u^2) / |1 - g e|^2
-    assert found.positive_real is True and found.least == approx(exact, rel=1e-9) and 0.0 <= found.floor <= exact
+    assert (
+        found.positive_real is True
+        and found.least == approx(exact, rel=1e-9)
+        and 0.0 <= found.floor <= exact
+    )
 
 
 def test_the_closed_forms_of_open_and_closed_ends():
@@ -267,12 +328,18 @@ def test_the_closed_forms_of_open_and_closed_ends():
     assert np.allclose(LineImpedance(Z_LINE, T, 1.0)(s), Z_LINE / np.tanh(s * T), rtol=1e-12)
     resistance = 5.0e6
     ended = Z_LINE * (resistance + Z_LINE * np.tanh(s * T)) / (Z_LINE + resistance * np.tanh(s * T))
-    assert np.allclose(LineImpedance(Z_LINE, T, (resistance - Z_LINE) / (resistance + Z_LINE))(s), ended, rtol=1e-12)
+    assert np.allclose(
+        LineImpedance(Z_LINE, T, (resistance - Z_LINE) / (resistance + Z_LINE))(s),
+        ended,
+        rtol=1e-12,
+    )
 
 
 def test_a_line_that_ends_in_a_negative_resistance_is_not_positive_real():
     for resistance in (-0.5 * Z_LINE, -3.0 * Z_LINE):
-        found = line_positive_real(LineImpedance(Z_LINE, T, (resistance - Z_LINE) / (resistance + Z_LINE)))
+        found = line_positive_real(
+            LineImpedance(Z_LINE, T, (resistance - Z_LINE) / (resistance + Z_LINE))
+        )
         assert found.positive_real is False and "a pole with Re s" in found.reason
 
 
@@ -293,7 +360,11 @@ def test_the_bound_of_the_slope_holds_between_any_two_frequencies(g, shift, low,
 
 def test_a_delayed_element_is_not_positive_real_with_the_frequency_stated():
     found = sweep_positive_real(lambda s: np.exp(-0.3 * s), 0.3, 2.0 * math.pi / 0.3)
-    assert found.positive_real is False and np.cos(0.3 * found.worst) < 0.0 and found.least == approx(-1.0, abs=1e-3)
+    assert (
+        found.positive_real is False
+        and np.cos(0.3 * found.worst) < 0.0
+        and found.least == approx(-1.0, abs=1e-3)
+    )
 
 
 def test_a_delay_under_a_resistance_is_decided_a_millionth_from_the_boundary():
@@ -309,7 +380,9 @@ def test_a_negative_resistance_is_not_positive_real():
     assert sweep_positive_real(lambda s: -1.0 + 0.0 * s, 0.0, 1.0).positive_real is False
 
 
-@pytest.mark.parametrize("slope, high, shift", [(math.nan, 1, 0), (math.inf, 1, 0), (-1, 1, 0), (1, 0, 0), (1, 1, -1)])
+@pytest.mark.parametrize(
+    "slope, high, shift", [(math.nan, 1, 0), (math.inf, 1, 0), (-1, 1, 0), (1, 0, 0), (1, 1, -1)]
+)
 def test_a_sweep_without_a_bound_or_a_range_is_refused(slope, high, shift):
     with pytest.raises(FvsolveError, match="expected|bounded"):
         sweep_positive_real(lambda s: s, slope, high, shift)

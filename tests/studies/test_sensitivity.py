@@ -30,16 +30,25 @@ def test_the_ishigami_function_has_its_known_indices():
     found = sensitivity(ishigami, CIRCLE, samples=4096)
     assert found.S1 == approx([one / whole for one in first], abs=0.02)
     assert found.ST == approx([(first[0] + both) / whole, first[1] / whole, both / whole], abs=0.02)
-    assert np.all(np.abs(np.array(found.S1) - [one / whole for one in first]) < 2.0 * np.array(found.S1_conf))
+    assert np.all(
+        np.abs(np.array(found.S1) - [one / whole for one in first]) < 2.0 * np.array(found.S1_conf)
+    )
     assert found.runs == 4096 * 5 + 1024 * 4 and found.quantity == "the function"
-    assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)  # effects of both signs cancel
+    # effects of both signs cancel
+    assert found.mu_star[1] > 0.0 and found.mu[1] == approx(0.0, abs=0.5)
 
 
 def test_a_line_has_its_slopes_whatever_its_units():
     """For a sum S1 = ST, in the ratio of squares of slope times range; all effects are equal, so sigma is zero."""
-    found = sensitivity(lambda x: 1e9 + 3e-4 * x["a"] + 4e2 * x["b"], {"a": (0.0, 1e6), "b": (-0.5, 0.5)}, samples=256)
+    found = sensitivity(
+        lambda x: 1e9 + 3e-4 * x["a"] + 4e2 * x["b"],
+        {"a": (0.0, 1e6), "b": (-0.5, 0.5)},
+        samples=256,
+    )
     assert found.S1 == approx([0.36, 0.64], abs=0.02) and found.ST == approx([0.36, 0.64], abs=0.02)
-    assert found.mu_star == approx([300.0, 400.0], rel=1e-6) and found.sigma == approx([0.0, 0.0], abs=1e-3)
+    assert found.mu_star == approx([300.0, 400.0], rel=1e-6) and found.sigma == approx(
+        [0.0, 0.0], abs=1e-3
+    )
 
 
 def test_the_same_seed_gives_the_same_indices():
@@ -52,7 +61,10 @@ def line() -> dict:
     """Case of a frictionless pipe shut at once: the first rise is rho a v."""
     nodes = {"lake": reservoir(3e6), "gate": junction(), "out": reservoir(101325.0)}
     main = pipe("lake", "gate", 100.0, 0.3, 1000.0, 5, friction=NO_FRICTION)
-    links = {"main": main, "valve": valve("gate", "out", 0.001, {"start": 0.05, "duration": 0.0, "value": [1.0, 0.0]})}
+    links = {
+        "main": main,
+        "valve": valve("gate", "out", 0.001, {"start": 0.05, "duration": 0.0, "value": [1.0, 0.0]}),
+    }
     numerics = {"scheme": "upwind", "method": "euler", "courant": 1.0}
     return scene(nodes, links, 0.15, numerics, ["gate.pressure"])
 
@@ -66,7 +78,8 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     assert found.quantity == "max(gate.pressure) [Pa]"
     assert found.S1 == approx([one / sum(terms) for one in terms[:2]], abs=0.03)
     assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)
-    rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # rise per speed and area
+    # rise per speed and area
+    rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)
     assert found.mu_star == approx([rise * 0.0015 * 400.0, rise * 1100.0 * 0.001], rel=0.1)
 
 
@@ -92,13 +105,30 @@ def test_no_label_of_its_picture_covers_another_or_leaves_it():
 
 def test_the_command_prints_it_and_reuses_its_runs(line, fvs, tmp_path):
     (tmp_path / "line.toml").write_text(write(line))
-    ask = ("sensitivity", tmp_path / "line.toml", "--vary", "links.main.wave_speed=900 m/s,1300",
-           "--vary", "nodes.out.pressure=1 atm,2 atm", "--quantity", "max(gate.pressure)", "--samples", 4, "--out",
-           tmp_path)  # fmt: skip
+    ask = (
+        "sensitivity",
+        tmp_path / "line.toml",
+        "--vary",
+        "links.main.wave_speed=900 m/s,1300",
+        "--vary",
+        "nodes.out.pressure=1 atm,2 atm",
+        "--quantity",
+        "max(gate.pressure)",
+        "--samples",
+        4,
+        "--out",
+        tmp_path,
+    )
     code, out, _ = fvs(*ask, "--json")
     said = json.loads(out)
-    assert code == 0 and said["keys"] == ["links.main.wave_speed", "nodes.out.pressure"] and said["runs"] == 16 + 12
-    assert {"S1", "ST", "S1_conf", "mu_star", "sigma"} <= said.keys() and said["ST"][1] < 0.02 < said["ST"][0]
+    assert (
+        code == 0
+        and said["keys"] == ["links.main.wave_speed", "nodes.out.pressure"]
+        and said["runs"] == 16 + 12
+    )
+    assert {"S1", "ST", "S1_conf", "mu_star", "sigma"} <= said.keys() and said["ST"][
+        1
+    ] < 0.02 < said["ST"][0]
     before = (tmp_path / "points.jsonl").read_bytes()
     code, out, _ = fvs(*ask)
     assert code == 0 and "28 runs" in out and (tmp_path / "points.jsonl").read_bytes() == before
@@ -120,7 +150,10 @@ def test_impossible_requests_are_named(line):
             {"vary": {"nodes.gate.position": [0.0, 1.0]}, "quantity": "max(gate.pressure)"},
             "is not a continuous quantity",
         ),
-        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "quantity": "max(gate.pressure)"}, "no key changes it"),
+        (
+            {"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "quantity": "max(gate.pressure)"},
+            "no key changes it",
+        ),
         (
             {"vary": {"fluid.viscosity": ["1 cSt", "2 cSt"]}, "quantity": "max(gate.pressure)"},
             "is a kinematic viscosity",
@@ -136,5 +169,8 @@ def test_impossible_requests_are_named(line):
 def test_runs_that_have_no_quantity_are_counted_and_the_first_is_named(line):
     refused = {"links.main.wave_speed": [900.0, 1300.0]}
     blown = {"numerics.courant": 4.0, "numerics.end": 20.0}
-    with pytest.raises(FvsolveError, match=r"runs ha(s|ve) no max\(gate.pressure\).*first at links.main.wave_speed = "):
+    with pytest.raises(
+        FvsolveError,
+        match=r"runs ha(s|ve) no max\(gate.pressure\).*first at links.main.wave_speed = ",
+    ):
         sensitivity(line, refused, "max(gate.pressure)", 2, set=blown)

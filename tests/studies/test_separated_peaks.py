@@ -9,19 +9,36 @@ from reference.scenes import junction, lake, pipe, scene
 import fvsolve
 from fvsolve.studies.peak_error import peak_errors, troughs
 from fvsolve.studies.resolution import refined_keys
-from fvsolve.studies.separated_peaks import first_peak, remainders_beyond, separate_maxima, separated_error
+from fvsolve.studies.separated_peaks import (
+    first_peak,
+    remainders_beyond,
+    separate_maxima,
+    separated_error,
+)
 
 
 def stopped_column(cells: int = 24) -> dict:
     """Column of 100 m that leaves a closing end, separates, and returns twice."""
-    water = {"name": "user", "density": 1000.0, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2300.0,
-             "cavitation": True}  # fmt: skip
+    water = {
+        "name": "user",
+        "density": 1000.0,
+        "bulk_modulus": 2.2e9,
+        "viscosity": 1e-3,
+        "vapor_pressure": 2300.0,
+        "cavitation": True,
+    }
     flow = 0.25 * math.pi * 0.1**2 * 0.8
     nodes = {"lake": lake(30.0, elevation=0.0)}
     nodes["end"] = junction({"start": 0.1, "duration": 0.02, "value": [flow, 0.0]}, elevation=0.0)
-    links = {"main": pipe("lake", "end", 100.0, 0.1, 1000.0, cells, friction={"model": "steady", "factor": 0.02})}
+    links = {
+        "main": pipe(
+            "lake", "end", 100.0, 0.1, 1000.0, cells, friction={"model": "steady", "factor": 0.02}
+        )
+    }
     limits = {"vacuum": {"on": "main", "quantity": "gauge_pressure", "minimum": "-0.4 bar"}}
-    case = scene(nodes, links, 1.4, {}, ["end.pressure", "end.head", "main.flow@1"], 0.005, limits=limits)
+    case = scene(
+        nodes, links, 1.4, {}, ["end.pressure", "end.head", "main.flow@1"], 0.005, limits=limits
+    )
     return case | {"fluid": water}
 
 
@@ -32,7 +49,10 @@ def test_bands_of_a_separated_column() -> None:
     pressure, head, flow = found["peaks"].values()
     assert found["cavities"]
     # the start: flow and head of the steady state
-    assert flow["maximum"]["error"] <= 1e-4 * flow["maximum"]["value"] and flow["maximum"]["first"]["error"] == 0.0
+    assert (
+        flow["maximum"]["error"] <= 1e-4 * flow["maximum"]["value"]
+        and flow["maximum"]["first"]["error"] == 0.0
+    )
     # vapour: no pressure is below 2300 Pa, and no head below that of this pressure
     assert pressure["minimum"]["error"] <= pressure["minimum"]["value"] - 2300.0 + 1.0
     assert head["minimum"]["error"] <= 0.05
@@ -42,12 +62,17 @@ def test_bands_of_a_separated_column() -> None:
     near = abs(fine.t - first["time"]) < 0.15
     true = abs(float(fine["end.pressure"][near].max()) - first["value"])
     assert true <= first["error"] <= 3.0 * true
-    assert abs(fine.extremes["end.pressure"].maximum - pressure["maximum"]["value"]) <= pressure["maximum"]["error"]
+    assert (
+        abs(fine.extremes["end.pressure"].maximum - pressure["maximum"]["value"])
+        <= pressure["maximum"]["error"]
+    )
 
 
 @pytest.mark.parametrize("order", [0.75, 1.0, 2.0])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_it_holds_an_error_of_any_order_and_is_at_most_twice_as_large(order: float, sign: float) -> None:
+def test_it_holds_an_error_of_any_order_and_is_at_most_twice_as_large(
+    order: float, sign: float
+) -> None:
     values = [3.0 + sign * 0.1 * h**order for h in (1.0, 0.5, 0.25)]
     found = separated_error(values, np.array([values]))
     assert 0.1 <= found <= 0.2
@@ -63,16 +88,23 @@ def test_no_value_is_above_the_ceiling() -> None:
 def bumps(late: float, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Times and values of a signal that falls from 1, and has peaks of 1.5 and `height` at 2 s and 4 s."""
     t = np.linspace(0.0, 6.0, 6001)
-    peaks = 1.5 * np.exp(-(((t - 2.0 - late) / 0.2) ** 2)) + height * np.exp(-(((t - 4.0 - late) / 0.2) ** 2))
+    peaks = 1.5 * np.exp(-(((t - 2.0 - late) / 0.2) ** 2)) + height * np.exp(
+        -(((t - 4.0 - late) / 0.2) ** 2)
+    )
     return t, np.maximum(1.0 - 2.0 * t, 0.0) + peaks
 
 
 def test_later_peaks_do_not_widen_the_band_of_the_first() -> None:
     signals = [bumps(late, height) for late, height in ((0.1, 1.2), (0.05, 1.6), (0.02, 2.2))]
     first = first_peak(signals, troughs)
-    assert first["value"] == pytest.approx(1.5) and first["time"] == pytest.approx(2.1) and first["error"] < 1e-6
+    assert (
+        first["value"] == pytest.approx(1.5)
+        and first["time"] == pytest.approx(2.1)
+        and first["error"] < 1e-6
+    )
     values, times = separate_maxima(signals, troughs)
-    assert len(values) == 3 and times[:, 0] == pytest.approx([0.0, 2.1, 4.1])  # the start, and both peaks
+    # the start, and both peaks
+    assert len(values) == 3 and times[:, 0] == pytest.approx([0.0, 2.1, 4.1])
     assert separated_error([1.5, 1.6, 2.2], values) >= 0.7
 
 

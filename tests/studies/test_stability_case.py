@@ -7,7 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.delays import main, turned
-from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    RHO,
+    area,
+    chamber,
+    junction,
+    pipe,
+    reservoir,
+    scene,
+    tank,
+    valve,
+)
 from reference.short_lines import short, vessel
 from scipy.optimize import brentq
 
@@ -20,7 +32,12 @@ from fvsolve.features.delay_lines.feature import history_of
 from fvsolve.studies import work_limit
 from fvsolve.studies.linearise import linearise, linearise_at
 from fvsolve.studies.operating_point import operating_point, with_held_schedules
-from fvsolve.studies.stability.delay_line_limits import DelayLineLimits, DelayLineRuns, DelayLineSystem, read_history
+from fvsolve.studies.stability.delay_line_limits import (
+    DelayLineLimits,
+    DelayLineRuns,
+    DelayLineSystem,
+    read_history,
+)
 from fvsolve.studies.stability.growth import (
     DenseGrowth,
     VectorGrowth,
@@ -38,7 +55,15 @@ from fvsolve.studies.stability.stability import LinearSystem, stability
 from fvsolve.studies.stability.stability_row import field_of_values, region_limit
 
 NUMERICS = {"method": "rk4", "step": 1e-3}
-IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-iiic-4", "tr-bdf2", "rodas-5p"]
+IMPLICIT = [
+    "implicit-euler",
+    "trapezoid",
+    "gauss-4",
+    "radau-iia-5",
+    "lobatto-iiic-4",
+    "tr-bdf2",
+    "rodas-5p",
+]
 
 
 def shut(cells, scheme):
@@ -54,15 +79,29 @@ def through(cells, scheme):
     conductance = 2 * flow * admittance  # M |M| = G dp
     opened, drop = math.sqrt(conductance / (2 * RHO)), flow**2 / conductance
     nodes = {"A": reservoir(1e6 + 2 * drop), "a": junction(), "b": junction(), "B": reservoir(1e6)}
-    links = {"p": pipe("a", "b", 100.0, 0.3, 1000.0, cells), "v": valve("A", "a", opened), "w": valve("b", "B", opened)}
+    links = {
+        "p": pipe("a", "b", 100.0, 0.3, 1000.0, cells),
+        "v": valve("A", "a", opened),
+        "w": valve("b", "B", opened),
+    }
     return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
 
 
 def branches(cells, scheme):
     """Case of three pipes that join, with a reservoir, a flowing valve and a dead end."""
-    nodes = {"A": reservoir(1.2e6), "t": junction(), "g": junction(), "B": reservoir(1e6), "d": junction()}
-    links = {"p": pipe("A", "t", 100.0, 0.3, 1000.0, cells), "q": pipe("t", "g", 60.0, 0.2, 1100.0, 5),
-             "r": pipe("t", "d", 80.0, 0.25, 900.0, 7), "v": valve("g", "B", 2e-3)}  # fmt: skip
+    nodes = {
+        "A": reservoir(1.2e6),
+        "t": junction(),
+        "g": junction(),
+        "B": reservoir(1e6),
+        "d": junction(),
+    }
+    links = {
+        "p": pipe("A", "t", 100.0, 0.3, 1000.0, cells),
+        "q": pipe("t", "g", 60.0, 0.2, 1100.0, 5),
+        "r": pipe("t", "d", 80.0, 0.25, 900.0, 7),
+        "v": valve("g", "B", 2e-3),
+    }
     return scene(nodes, links, 1.0, {**NUMERICS, "scheme": scheme})
 
 
@@ -89,7 +128,9 @@ def test_powers_are_powers_and_hold_the_last():
     for steps in (1, 2, 33, 999, 1000, 1024):
         found = dict(matrix_powers(m, steps))
         assert max(found) == steps and set(range(1, min(steps, 64) + 1)) <= set(found)
-        assert all(np.allclose(p, np.linalg.matrix_power(m, n), rtol=1e-10) for n, p in found.items())
+        assert all(
+            np.allclose(p, np.linalg.matrix_power(m, n), rtol=1e-10) for n, p in found.items()
+        )
         assert set(dict(matrix_powers(m, steps, few=True))) <= set(found)
 
 
@@ -97,13 +138,17 @@ def test_powers_are_powers_and_hold_the_last():
 def test_a_step_matrix_is_the_stability_function_of_its_eigenvalues(name):
     method, rng = method_named(name), np.random.default_rng(1)
     rotated = np.linalg.qr(rng.standard_normal((4, 4)))[0]
-    blocks = np.array([[-0.3, 0.7, 0, 0], [-0.7, -0.3, 0, 0], [0, 0, -2.0, 0.5], [0, 0, -0.5, -2.0]])
+    blocks = np.array(
+        [[-0.3, 0.7, 0, 0], [-0.7, -0.3, 0, 0], [0, 0, -2.0, 0.5], [0, 0, -0.5, -2.0]]
+    )
     found = np.linalg.eigvals(step_matrix(method, rotated @ blocks @ rotated.T))
     exact = stability_function(method)(np.array([-0.3 + 0.7j, -0.3 - 0.7j, -2 + 0.5j, -2 - 0.5j]))
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(exact), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name and m.explicit])
+@pytest.mark.parametrize(
+    "name", [name for name, m in METHODS.items() if name == m.name and m.explicit]
+)
 def test_a_step_of_the_program_is_the_step_matrix_to_round_off(name):
     case = branches(5, "upwind5")
     del case["nodes"]["B"], case["links"]["v"]  # exactly linear without its valve
@@ -134,9 +179,14 @@ def step_error(case, name, h):
 def test_limits_of_a_single_mode_are_those_of_its_powers(steps):
     decay = predicted_limit(DenseGrowth(method_named("euler"), np.array([[-5.0]]), steps))
     assert decay.step == pytest.approx((1 + 1000 ** (1 / steps)) / 5.0, rel=2e-4)
-    swing = predicted_limit(DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
+    swing = predicted_limit(
+        DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps)
+    )
     assert swing.step == pytest.approx(math.sqrt(1000 ** (2 / steps) - 1) / 3.0, rel=2e-4)
-    assert predicted_limit(DenseGrowth(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
+    assert (
+        predicted_limit(DenseGrowth(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step
+        == math.inf
+    )
 
 
 def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
@@ -148,9 +198,9 @@ def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
             most = max(most, np.linalg.norm(power, 2))
         found = power_growth(m, 400)
         assert 0.99 * most <= found.size <= most * (1 + 1e-9)
-        assert np.linalg.norm(np.linalg.matrix_power(m, found.steps) @ found.start) == pytest.approx(
-            found.size, rel=1e-6
-        )
+        assert np.linalg.norm(
+            np.linalg.matrix_power(m, found.steps) @ found.start
+        ) == pytest.approx(found.size, rel=1e-6)
 
 
 def test_an_inflow_pipe_grows_at_courant_numbers_far_below_the_limit_of_its_eigenvalues():
@@ -230,22 +280,43 @@ def test_both_ways_to_a_prediction_spend_a_common_limit(states, monkeypatch):
     growth.fails(0.01)
     assert 0.0 < growth.work.spent < 1.0
     monkeypatch.setattr(work_limit, "TIME_LIMIT", growth.work.spent)
-    with pytest.raises(FvsolveError, match=f"{states} states and 50 steps take longer.*fewer cells.*fewer --steps"):
+    with pytest.raises(
+        FvsolveError, match=f"{states} states and 50 steps take longer.*fewer cells.*fewer --steps"
+    ):
         growth.fails(0.02)
 
 
 def test_a_basin_of_384_states_is_predicted_within_the_limit():
     """As many products of matrices as powers are checked, not as many singular values; runs confirm the limit."""
-    pool = {"type": "basin", "physics": "liquid", "size": [2.0, 1.0], "cells": [16, 8], "thickness": 0.1,
-            "pressure": 5e5, "patches": {"port": {"side": "west", "span": [0.25, 0.75]}}}  # fmt: skip
-    hole = {"type": "orifice", "laminar_reynolds": 1e6, "from": "pool.port", "to": "o", "area": 0.004}
-    case = scene({"o": reservoir(5e5), "pool": pool}, {"g": hole}, 0.004,
-                 {"scheme": "upwind", "method": "rk4", "courant": 0.8})  # fmt: skip
+    pool = {
+        "type": "basin",
+        "physics": "liquid",
+        "size": [2.0, 1.0],
+        "cells": [16, 8],
+        "thickness": 0.1,
+        "pressure": 5e5,
+        "patches": {"port": {"side": "west", "span": [0.25, 0.75]}},
+    }
+    hole = {
+        "type": "orifice",
+        "laminar_reynolds": 1e6,
+        "from": "pool.port",
+        "to": "o",
+        "area": 0.004,
+    }
+    case = scene(
+        {"o": reservoir(5e5), "pool": pool},
+        {"g": hole},
+        0.004,
+        {"scheme": "upwind", "method": "rk4", "courant": 0.8},
+    )
     side = LinearSystem(operating_point(case))
     growth = growth_method(method_named("rk4"), side.e, 100)
     found = predicted_limit(growth)
     assert side.e.shape == (384, 384) and growth.work.spent < 10.0
-    small, large = (np.linalg.matrix_power(growth.matrix(h), 100) for h in (0.9 * found.step, 1.1 * found.fails))
+    small, large = (
+        np.linalg.matrix_power(growth.matrix(h), 100) for h in (0.9 * found.step, 1.1 * found.fails)
+    )
     assert np.linalg.norm(small, 2) < 1e3 < np.linalg.norm(large, 2)
 
 
@@ -253,17 +324,31 @@ def test_powers_below_a_bound_are_not_computed(monkeypatch):
     """A step matrix of norm 1 needs one check, and its powers none."""
     rotation = np.array([[0.0, 3.0], [-3.0, 0.0]])
     growth, seen = DenseGrowth(method_named("implicit-midpoint"), rotation, 1000), []
-    monkeypatch.setattr(growth, "powers", lambda m, few: (seen.append(n) or (n, p) for n, p in matrix_powers(m, 1000)))
+    monkeypatch.setattr(
+        growth,
+        "powers",
+        lambda m, few: (seen.append(n) or (n, p) for n, p in matrix_powers(m, 1000)),
+    )
     assert not growth.fails(0.5) and seen == [1]
 
 
 PAIRS = [
-    (shut, "upwind", "euler"), (shut, "fromm", "heun"), (shut, "central", "rk4"), (shut, "upwind5", "ssp-rk3"),
-    (through, "upwind", "euler"), (through, "upwind", "rk4"), (through, "upwind3", "ssp-rk2"),
-    (through, "upwind5", "dormand-prince"), (branches, "linear-upwind", "bogacki-shampine"),
-    (branches, "upwind5", "rk4"), (branches, "upwind", "tsitouras"), (chambers, "upwind", "euler"),
-    (through, "linear-upwind", "dormand-prince"), (chambers, "upwind", "rk4"), (chambers, "upwind", "dormand-prince"),
-]  # fmt: skip
+    (shut, "upwind", "euler"),
+    (shut, "fromm", "heun"),
+    (shut, "central", "rk4"),
+    (shut, "upwind5", "ssp-rk3"),
+    (through, "upwind", "euler"),
+    (through, "upwind", "rk4"),
+    (through, "upwind3", "ssp-rk2"),
+    (through, "upwind5", "dormand-prince"),
+    (branches, "linear-upwind", "bogacki-shampine"),
+    (branches, "upwind5", "rk4"),
+    (branches, "upwind", "tsitouras"),
+    (chambers, "upwind", "euler"),
+    (through, "linear-upwind", "dormand-prince"),
+    (chambers, "upwind", "rk4"),
+    (chambers, "upwind", "dormand-prince"),
+]
 
 
 @pytest.mark.parametrize("make, scheme, method", PAIRS)
@@ -304,11 +389,15 @@ def test_rows_that_are_finished_are_reused(tmp_path):
     first = stability(chambers(3), None, ["euler"], steps=100, out=tmp_path).rows
     before = (tmp_path / "points.jsonl").read_text()
     again = stability(chambers(3), None, ["euler"], steps=100, out=tmp_path).rows
-    assert again[0].plain() == first[0].plain() and (tmp_path / "points.jsonl").read_text() == before
+    assert (
+        again[0].plain() == first[0].plain() and (tmp_path / "points.jsonl").read_text() == before
+    )
 
 
 def test_unanswerable_requests_are_reported():
-    case = scene({"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, NUMERICS)
+    case = scene(
+        {"a": reservoir(2e6), "b": reservoir(1e6)}, {"v": valve("a", "b", 1e-4)}, 1.0, NUMERICS
+    )
     with pytest.raises(FvsolveError, match="has no state"):
         stability(case)
     with pytest.raises(FvsolveError, match="at least 10 steps"):
@@ -325,7 +414,11 @@ def test_the_command_prints_a_single_json_object_and_draws(tmp_path, monkeypatch
     (row,) = found["rows"]
     assert abs(row["difference"]) < 0.01 and row["eigenvalues"] < row["predicted"]
     folder = tmp_path / "runs" / "chamber-chain.stability"
-    assert {path.name for path in folder.iterdir()} == {"points.jsonl", "stability.csv", "spectrum-rk4.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        "points.jsonl",
+        "stability.csv",
+        "spectrum-rk4.png",
+    }
 
 
 def test_without_a_case_the_command_answers_for_a_periodic_grid(fvs):
@@ -364,13 +457,16 @@ def real_end(method, low, high):
 @pytest.mark.in_turn
 @pytest.mark.parametrize(("method", "low", "high"), [("euler", 1.5, 2.5), ("rk4", 2.0, 3.5)])
 @pytest.mark.parametrize("quick", [{"decay": 800.0}, {"diffusivity": 30000.0}])
-def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(method, low, high, quick):
+def test_scalars_of_pipes_bound_the_step_in_powers_eigenvalues_and_real_runs(
+    method, low, high, quick
+):
     case = carried(method, **quick)
     fastest = quick.get("decay") or -spread(build(load(case)), quick["diffusivity"]).min()
     row = stability(case).rows[0]
     truth = real_end(method, low, high) / fastest
     assert row.eigenvalues == pytest.approx(truth, rel=1e-3)  # the flow adds little
-    assert row.predicted == pytest.approx(truth, rel=6e-3)  # growth by 1000 in 1000 steps needs a longer step
+    # growth by 1000 in 1000 steps needs a longer step
+    assert row.predicted == pytest.approx(truth, rel=6e-3)
     assert row.measured == pytest.approx(row.predicted, rel=2e-3)
 
 
@@ -404,16 +500,24 @@ def system(case: dict, method: str, h: float) -> DelayLineSystem:
 def test_a_step_of_the_linear_system_is_a_step_of_the_program(method, scene):
     """40 steps from given waves: with a chamber, with lines shorter than steps and a valve, and with friction."""
     rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
-    case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
+    case = {
+        "vessel": vessel(method, 0.01, volume=0.15),
+        "short": short("delay-line"),
+        "rough": rough,
+    }[scene]
     one = system(case, method, 0.01)
     x, before = (part[..., :1] * 1e-6 for part in one.starts())  # a start that moves all states
     runs = DelayLineRuns.__new__(DelayLineRuns)
     runs.steps = 40
-    moved, still = (runs.start_run(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
+    moved, still = (
+        runs.start_run(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0)
+    )
     for run in (moved, still):
         run.run(40.0)
     _, _, x, before = one.propagate(x, before, 40, np.inf)
-    found = read_history(history_of(moved.run_data), one) - read_history(history_of(still.run_data), one)
+    found = read_history(history_of(moved.run_data), one) - read_history(
+        history_of(still.run_data), one
+    )
     assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
     assert moved.now[one.states] - still.now[one.states] == pytest.approx(
         x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0)
@@ -433,9 +537,17 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
 
 def test_a_notice_of_growth_by_check_has_a_limit_below_the_step():
     """Runs that tests/features/test_growth_in_lines.py compares with `check`, with steps of 10 ms for 30 s."""
-    for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
+    for method, volume, grows in (
+        ("euler", 0.6, True),
+        ("ssp-rk3", 0.15, True),
+        ("rk4", 0.15, False),
+    ):
         made = DelayLineLimits(
-            fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0
+            fvsolve.load(vessel(method, 0.01, 30.0, volume)),
+            "upwind",
+            method_named(method),
+            3000,
+            30.0,
         )
         assert made.fails(0.01) == grows
 
@@ -454,7 +566,9 @@ def test_the_energy_of_waves_in_lines_is_summed_as_they_enter_and_leave():
 
 def test_lines_next_to_a_small_chamber_are_refused_before_their_waves_are_stored():
     """0.1 s of a line in steps for a chamber of 1e-8 m3: 1e10 past waves, for which there is no memory."""
-    with pytest.raises(FvsolveError, match="states and 1000 steps take longer than.*as of a small chamber"):
+    with pytest.raises(
+        FvsolveError, match="states and 1000 steps take longer than.*as of a small chamber"
+    ):
         studies.stability(vessel("rk4", 0.01, volume=1e-8), methods=["rk4"])
 
 
@@ -471,7 +585,8 @@ def test_where_no_store_is_no_step_fails():
 
 ARM = Path(__file__).parents[1] / "reference" / "servo-arm.toml"
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.4e9, "viscosity": 46e-6, "law": "linear"}
-THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity, |R| > 1 beyond |h lambda| = 10
+# |R| = 1.5 at infinity, |R| > 1 beyond |h lambda| = 10
+THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"
 
 
 @pytest.fixture(scope="module")
@@ -524,7 +639,10 @@ def test_an_implicit_method_that_fails_is_detected_at_its_predicted_place():
     """Chambers and flowing valves: |R| of this method exceeds 1 beyond h = 10 / |lambda|."""
     fvsolve.tableau("theta-4-10", THETA)
     nodes = {"in": reservoir(2e6), "a": chamber(1e-3), "b": chamber(2e-3), "out": reservoir(1e6)}
-    links = {f"v{k}": valve(*pair, 1e-5) for k, pair in enumerate((("in", "a"), ("a", "b"), ("b", "out")))}
+    links = {
+        f"v{k}": valve(*pair, 1e-5)
+        for k, pair in enumerate((("in", "a"), ("a", "b"), ("b", "out")))
+    }
     (row,) = stability(scene(nodes, links, 1.0, {"method": "theta-4-10", "step": 1e-6})).rows
     assert row.measured == pytest.approx(row.predicted, rel=1e-3)
     assert row.eigenvalues < row.predicted < 1.1 * row.eigenvalues
@@ -532,15 +650,35 @@ def test_an_implicit_method_that_fails_is_detected_at_its_predicted_place():
 
 def pushed():
     """Case of a cylinder that a spool valve moves to its end in 1.5 s, where its model ends."""
-    nodes = {"P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4), "B": chamber(4e-4),
-             "post": {"type": "frame"}, "load": {"type": "mass", "mass": 350.0, "initial_position": 1.0}}  # fmt: skip
+    nodes = {
+        "P": reservoir(2e7),
+        "T": reservoir(3e5),
+        "A": chamber(4e-4),
+        "B": chamber(4e-4),
+        "post": {"type": "frame"},
+        "load": {"type": "mass", "mass": 350.0, "initial_position": 1.0},
+    }
     links = {
-        "spool": {"type": "spool-valve", "ports": {port: port for port in "PTAB"}, "area": 2e-5, "position": 0.4},
-        "hoseA": valve("A", "lift.A", area(9e-3)), "hoseB": valve("B", "lift.B", area(9e-3)),
-        "lift": {"type": "cylinder", "ports": {"rod": "load", "case": "post"}, "closed_length": 0.8, "stroke": 0.6,
-                 "piston_diameter": 63e-3, "rod_diameter": 36e-3, "dead_volume_A": 60e-6, "dead_volume_B": 60e-6,
-                 "initial_pressure_B": 4e6},
-    }  # fmt: skip
+        "spool": {
+            "type": "spool-valve",
+            "ports": {port: port for port in "PTAB"},
+            "area": 2e-5,
+            "position": 0.4,
+        },
+        "hoseA": valve("A", "lift.A", area(9e-3)),
+        "hoseB": valve("B", "lift.B", area(9e-3)),
+        "lift": {
+            "type": "cylinder",
+            "ports": {"rod": "load", "case": "post"},
+            "closed_length": 0.8,
+            "stroke": 0.6,
+            "piston_diameter": 63e-3,
+            "rod_diameter": 36e-3,
+            "dead_volume_A": 60e-6,
+            "dead_volume_B": 60e-6,
+            "initial_pressure_B": 4e6,
+        },
+    }
     return scene(nodes, links, 1.0, {"method": "radau-iia-5", "rtol": 1e-6}, fluid=OIL)
 
 

@@ -48,7 +48,9 @@ from fvsolve.studies.work_limit import TooLarge
 
 def case(name, **numerics):
     """Shipped case with changed keys, in which double underscores are dots."""
-    return fvsolve.load(CASES / f"{name}.toml", {key.replace("__", "."): value for key, value in numerics.items()})
+    return fvsolve.load(
+        CASES / f"{name}.toml", {key.replace("__", "."): value for key, value in numerics.items()}
+    )
 
 
 # stability ------------------------------------------------------------------------------------------------------
@@ -61,8 +63,12 @@ def test_two_runs_of_a_scene_with_events_have_separate_states_of_valves():
 
 def test_a_state_that_moves_is_named_where_prediction_and_measurement_differ_and_at_rest_they_do_not():
     (moves,) = stability(case("surge-tank")).rows
-    assert abs(moves.difference) > 0.1 and any("the state leaves the linearised state" in note for note in moves.notes)
-    (rests,) = stability(case("surge-tank", links__tunnel__initial_flow=0.0, nodes__shaft__level=50.0)).rows
+    assert abs(moves.difference) > 0.1 and any(
+        "the state leaves the linearised state" in note for note in moves.notes
+    )
+    (rests,) = stability(
+        case("surge-tank", links__tunnel__initial_flow=0.0, nodes__shaft__level=50.0)
+    ).rows
     assert abs(rests.difference) < 1e-3
 
 
@@ -80,7 +86,12 @@ def test_a_limited_scheme_is_measured_where_its_frozen_weights_take_too_long(mon
     def never(one):
         raise TooLarge("too large")
 
-    few = case("surge-tank", links__tunnel__type="pipe", links__tunnel__wave_speed=1000.0, links__tunnel__cells=20)
+    few = case(
+        "surge-tank",
+        links__tunnel__type="pipe",
+        links__tunnel__wave_speed=1000.0,
+        links__tunnel__cells=20,
+    )
     known = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows[0].measured
     monkeypatch.setattr(room, "predicted_limit", never)
     (row,) = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows
@@ -105,7 +116,9 @@ def test_every_probe_has_the_unit_of_its_part(variable, said):
 ])  # fmt: skip
 def test_every_state_has_its_unit(name, states):
     found = linearise(case(name), outputs=(), scheme="upwind")
-    units = dict(zip((state.rsplit(".", 1)[1] for state in found.states), found.state_units, strict=True))
+    units = dict(
+        zip((state.rsplit(".", 1)[1] for state in found.states), found.state_units, strict=True)
+    )
     assert states.items() <= units.items()
 
 
@@ -128,10 +141,15 @@ def test_an_order_that_would_take_long_begins_on_fewer_cells_with_a_notice(monke
     assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
     monkeypatch.setattr(refine, "CPU_BUDGET", 1e-6)
     made = affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path))
-    assert [level.cells for level in made.levels] == [8, 16, 32] and "starts with 8 of 64 cells" in made.words
+    assert [level.cells for level in made.levels] == [
+        8,
+        16,
+        32,
+    ] and "starts with 8 of 64 cells" in made.words
     assert affordable_plan(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
     monkeypatch.undo()
-    assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made  # continued study
+    # continued study
+    assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made
 
 
 def test_errors_that_fall_quicker_than_scheme_and_method_allow_show_no_order():
@@ -151,8 +169,12 @@ def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
 def test_a_chart_leaves_out_schemes_that_do_not_follow_cavities():
     found, coarse = case("adelaide"), CoarseRun(25, 800.0, 800, [1e6], 0.0)
     made = chart_settings(found, coarse, None, None, [50], None, None)
-    assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
-    assert unsupported_schemes(found, None) == ["upwind5", "weno5"] and not unsupported_schemes(found, ["weno5"])
+    assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(
+        found
+    ) == "muscl rk4"
+    assert unsupported_schemes(found, None) == ["upwind5", "weno5"] and not unsupported_schemes(
+        found, ["weno5"]
+    )
     assert not unsupported_schemes(case("pump-trip"), None)
 
 
@@ -169,7 +191,10 @@ def test_the_work_of_a_chart_counts_pipes_of_1_cell_once():
 
 
 def test_a_chart_of_dear_rates_has_fewer_cells():
-    cheap, dear = (CoarseRun(25, 800.0, 800, [8e6, 2e6, 5e5, 1e5], 0.0, dearness).levels for dearness in (1.0, 30.0))
+    cheap, dear = (
+        CoarseRun(25, 800.0, 800, [8e6, 2e6, 5e5, 1e5], 0.0, dearness).levels
+        for dearness in (1.0, 30.0)
+    )
     assert max(dear) < max(cheap) and len(dear) == len(cheap)
 
 
@@ -193,9 +218,12 @@ def test_a_vessel_is_not_described_by_a_volume():
 def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
     monkeypatch.setattr(model_hierarchy, "LEVEL_CPU_LIMIT", 0.0)
     with pytest.raises(
-        FvsolveError, match="the case itself does not run: not run: the run with 1 cell was already given up"
+        FvsolveError,
+        match="the case itself does not run: not run: the run with 1 cell was already given up",
     ):
-        model_hierarchy.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
+        model_hierarchy.ladder(
+            case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001)
+        )
 
 
 # map ------------------------------------------------------------------------------------------------------------
@@ -204,12 +232,22 @@ def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
 def test_a_map_of_cavities_has_a_reference_and_a_limit():
     few = case("adelaide", links__main__cells=8)
     found = find_reference(few)
-    assert found.words.startswith("muscl van-leer on 32 cells") and 0.0 < found.uncertainty.trajectory < 1.0
-    assert np.array_equal(eigenvalues_of(few, {}), eigenvalues_of(few, {"numerics.scheme": "upwind"}))
+    assert (
+        found.words.startswith("muscl van-leer on 32 cells")
+        and 0.0 < found.uncertainty.trajectory < 1.0
+    )
+    assert np.array_equal(
+        eigenvalues_of(few, {}), eigenvalues_of(few, {"numerics.scheme": "upwind"})
+    )
 
 
-def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
-    late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
+def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(
+    monkeypatch,
+):
+    late, off = (
+        Measures(f"{GIVEN_UP} 10 s", False),
+        Measures("finished", True, error=0.5, farthest=0.0),
+    )
     assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == NOT_RUN
     monkeypatch.setattr(import_module("fvsolve.studies.failure_map"), "CPU_LIMIT", 0.0)
     found, _ = run_recorded(case("relief-on-closed-main", links__main__cells=4))
@@ -226,7 +264,13 @@ def rough(**numerics) -> dict:
     case["links"]["main"]["friction"] = {"model": "steady", "factor": 0.5}
     demand = case["nodes"]["gate"]["demand"]
     demand["value"] = [one + 0.2 for one in demand["value"]]
-    given = {"pipe_model": "delay-line", "method": "euler", "step": 0.00125, "delay_tolerance": 0.01, **numerics}
+    given = {
+        "pipe_model": "delay-line",
+        "method": "euler",
+        "step": 0.00125,
+        "delay_tolerance": 0.01,
+        **numerics,
+    }
     return case | {"numerics": {"end": pulses.END, **given}}
 
 
@@ -237,7 +281,9 @@ def test_friction_of_lines_is_of_second_order_next_to_cells():
         assert found.fits[probe]["L1"].order == pytest.approx(2.0, abs=0.1)
     stretched = studies.order(rough(step=0.0002), refine="space")
     assert stretched.fits["gate.pressure"]["L1"].order == pytest.approx(2.0, abs=0.2)
-    assert [row.level.size for row in stretched.rows] == pytest.approx([0.1 / n for n in (6, 11, 21, 41)])
+    assert [row.level.size for row in stretched.rows] == pytest.approx(
+        [0.1 / n for n in (6, 11, 21, 41)]
+    )
 
 
 def test_drawn_the_other_way_or_by_two_the_study_is_the_same():
@@ -260,8 +306,12 @@ def test_smooth_waves_between_steps_are_of_sixth_order():
 
 def test_a_run_exact_at_any_step_is_reported_as_exact():
     found = studies.order(main(4.0), levels=3)
-    assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
-    with pytest.raises(FvsolveError, match="no delay line of this case into more stretches: there is no friction"):
+    assert found.words.startswith("upwind on") and any(
+        "exact here, at any step" in note for note in found.notes
+    )
+    with pytest.raises(
+        FvsolveError, match="no delay line of this case into more stretches: there is no friction"
+    ):
         studies.order(main(4.0), refine="space")
     with pytest.raises(FvsolveError, match="functions along pipes need cells, but main would be"):
         studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))
@@ -274,7 +324,11 @@ def test_lines_next_to_cells_are_refined_with_them():
         friction={"model": "steady", "factor": 0.05},
     )
     case["links"]["up"]["pipe_model"] = "auto"
-    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    case["nodes"]["gate"]["demand"] |= {
+        "time": [0.0, 0.5, 1.5],
+        "value": [0.03, 0.03, 0.0],
+        "kind": "smooth",
+    }
     found = studies.order(case, levels=3)
     assert [row.level.cells for row in found.rows] == [5, 10, 20]
     errors = [row.errors["gate.pressure"]["L1"] for row in found.rows]
@@ -285,11 +339,17 @@ def test_a_chart_of_lines_is_judged_by_cells():
     """Shorter steps help until the error of friction remains; four times the stretches divide it by fourteen."""
     steps, methods = [0.013, 0.0031, 0.00078], ["euler"]
     found = studies.chart(rough(delay_tolerance=0.005), methods=methods, step=steps)
-    assert found.reference.startswith("upwind5 on") and found.floor["trajectory"] < 1e-6 and found.default == "rk4"
+    assert (
+        found.reference.startswith("upwind5 on")
+        and found.floor["trajectory"] < 1e-6
+        and found.default == "rk4"
+    )
     errors = [point.trajectory for point in found.curves()["euler"]]
     assert errors[0] > 20.0 * errors[1] > 20.0 * errors[2]
     finer = studies.chart(rough(delay_tolerance=0.00125), methods=methods, step=[0.00078])
-    assert finer.curves()["euler"][0].trajectory == pytest.approx(errors[2] * (11.0 / 41.0) ** 2, rel=0.2)
+    assert finer.curves()["euler"][0].trajectory == pytest.approx(
+        errors[2] * (11.0 / 41.0) ** 2, rel=0.2
+    )
     other = turned(rough(delay_tolerance=0.005))
     other["output"]["probes"] = ["gate.pressure", "main.pressure@0.63"]
     two = studies.chart(other, methods=methods, step=steps[:2], jobs=2)
@@ -308,23 +368,33 @@ def test_a_chart_of_lines_has_steps_and_no_more():
 def test_a_chart_of_lines_next_to_cells_refines_the_cells():
     case = fork({"scheme": "upwind5", "method": "rk4", "courant": 0.9}, 2.0, every=0.0499)
     case["links"]["up"]["pipe_model"] = "delay-line"
-    case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
+    case["nodes"]["gate"]["demand"] |= {
+        "time": [0.0, 0.5, 1.5],
+        "value": [0.03, 0.03, 0.0],
+        "kind": "smooth",
+    }
     found = studies.chart(case, schemes=["upwind5"], methods=["rk4"], cells=[6, 12, 24])
     errors = [one.trajectory for one in found.curves()["upwind5 rk4"]]
-    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2] and math.isfinite(found.floor["trajectory"])
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2] and math.isfinite(
+        found.floor["trajectory"]
+    )
     assert "links.up.cells" not in found.points[0].setting.keys and found.default == "weno5 rk4"
 
 
 def test_a_map_of_lines_states_the_least_step_of_growth_at_a_store():
     """A chamber that fills within 10 ms at a line of 0.1 s: the limit, and runs on both sides of it."""
     case = vessel("rk4", 0.01, 6.0, 0.15, 60)
-    found = studies.failure_map(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
+    found = studies.failure_map(
+        case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068]
+    )
     assert found.wave_rate is None and found.reference.startswith("upwind5")
     row = found.row("weno5", "implicit-midpoint")
     assert [one.step <= one.limit for one in row] == [True, False, False]
     assert [one.verdict == "blown up" for one in row] == [False, True, True]
     row = found.row("weno5", "rk4")  # explicit steps are divided beside lines
-    assert [one.limit for one in row] == [math.inf] * 3 and [one.verdict for one in row] == ["stable"] * 3
+    assert [one.limit for one in row] == [math.inf] * 3 and [one.verdict for one in row] == [
+        "stable"
+    ] * 3
     assert found.row("weno5", "rodas-5p")[0].limit is None
     with pytest.raises(FvsolveError, match="Courant numbers need pipes with cells"):
         studies.failure_map(case, courants=[0.5])
@@ -337,7 +407,9 @@ def test_a_map_of_lines_without_stores_predicts_no_limit():
     assert [one.verdict for one in found.squares] == ["stable", "stable"]
     assert all(math.isinf(one.limit) for one in found.squares)
     two = studies.failure_map(turned(case), methods=["euler"], steps=[0.03, 0.11], jobs=2)
-    assert [one.measures.error for one in two.squares] == [one.measures.error for one in found.squares]
+    assert [one.measures.error for one in two.squares] == [
+        one.measures.error for one in found.squares
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------------------------
@@ -351,11 +423,17 @@ def poles(case) -> np.ndarray:
 def test_a_free_body_about_its_middle_axis_has_the_poles_of_eulers_equations():
     """Poles +-w sqrt((I2 - I1) (I3 - I2) / (I1 I3)), one of them unstable; rows of A may be rounding alone."""
     stone = body(5.0, [0.3, 0.5, 0.7], {"kind": "free", "rate": [0.0, 2.0, 0.0]})
-    found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
+    found = poles(
+        bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0}
+    )
     wanted = 2.0 * math.sqrt(0.2 * 0.2 / (0.3 * 0.7))
-    assert max(found.real) == pytest.approx(wanted, rel=1e-9) and min(found.real) == pytest.approx(-wanted, rel=1e-9)
+    assert max(found.real) == pytest.approx(wanted, rel=1e-9) and min(found.real) == pytest.approx(
+        -wanted, rel=1e-9
+    )
     stone["joint"]["rate"] = [0.01, 2.0, 0.02]  # near the equilibrium; it can still be linearised
-    found = poles(bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0})
+    found = poles(
+        bodies({"stone": stone}, 1.0, ["stone.wy"], method="gauss-4", step=0.01) | {"gravity": 0.0}
+    )
     assert max(found.real) == pytest.approx(wanted, rel=1e-3)
 
 
@@ -373,11 +451,29 @@ def test_a_tank_on_a_spring_has_the_pole_of_the_tangent_law():
         nodes = {
             "cart": body(mass, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0]}),
             "world": {"type": "frame", "points": {"far": [5.0, 0, 0]}},
-            "b": {"type": "basin", "on": "cart", "size": [length, 1.0], "cells": [n, 1], "level": depth},
-        }  # fmt: skip
-        spring = {"type": "spring", "from": "cart", "to": "world.far", "stiffness": stiff, "preload": 0.0}
+            "b": {
+                "type": "basin",
+                "on": "cart",
+                "size": [length, 1.0],
+                "cells": [n, 1],
+                "level": depth,
+            },
+        }
+        spring = {
+            "type": "spring",
+            "from": "cart",
+            "to": "world.far",
+            "stiffness": stiff,
+            "preload": 0.0,
+        }
         found = poles(
-            scene(nodes, {"spring": spring}, 1.0, {"scheme": "upwind5", "method": "rk4", "step": 0.01}, ["cart.rate"])
+            scene(
+                nodes,
+                {"spring": spring},
+                1.0,
+                {"scheme": "upwind5", "method": "rk4", "step": 0.01},
+                ["cart.rate"],
+            )
         )
         off.append(np.abs(found - 1j * w).min() / w)
     assert off[1] < 5e-5 and off[0] / off[1] > 3.5
@@ -401,8 +497,14 @@ def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_closes():
     for step in (8e-3, 4e-3):
         found = energy(flume("ssp-rk3"), {"numerics.step": step})
         parts.append(float(np.abs(found.step).max()))
-    assert {"b.paddle"} <= {*found.supplied} and {"tap"} <= {*found.dissipated} and {"t"} <= {*found.stored}
-    passed = max(np.abs(one).max() for one in [*found.supplied.values(), *found.dissipated.values()])
+    assert (
+        {"b.paddle"} <= {*found.supplied}
+        and {"tap"} <= {*found.dissipated}
+        and {"t"} <= {*found.stored}
+    )
+    passed = max(
+        np.abs(one).max() for one in [*found.supplied.values(), *found.dissipated.values()]
+    )
     assert found.dissipated["tap"][-1] > 1e-4 * passed
     assert parts[1] < parts[0] / 5.0 and parts[1] < 1e-3 * passed
 
@@ -410,16 +512,34 @@ def test_the_ledger_of_energy_of_a_basin_with_a_wall_and_of_a_device_closes():
 def test_a_map_names_the_probe_that_its_reference_does_not_know():
     case = SCENES["loop"]("rk4")
     case["output"]["probes"] = ["one.angle", "loop.gap"]
-    with pytest.raises(FvsolveError, match="of the range of loop.gap.*remove this probe from output.probes"):
+    with pytest.raises(
+        FvsolveError, match="of the range of loop.gap.*remove this probe from output.probes"
+    ):
         failure_map(case, methods=["rk4"], steps=[4e-3])
 
 
-def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp_path, fvs, monkeypatch):
+def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(
+    tmp_path, fvs, monkeypatch
+):
     monkeypatch.setattr(import_module("fvsolve.studies.work_limit"), "TIME_LIMIT", 0.0)
-    pool = {"type": "basin", "size": [1.0, 1.0], "cells": [20, 20], "level": 0.3, "start": {"level": "0.3 + 0.001 * x"}}
-    case = scene({"b": pool}, {}, 1.0, {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, ["b.depth@0.1,0.1"])
+    pool = {
+        "type": "basin",
+        "size": [1.0, 1.0],
+        "cells": [20, 20],
+        "level": 0.3,
+        "start": {"level": "0.3 + 0.001 * x"},
+    }
+    case = scene(
+        {"b": pool},
+        {},
+        1.0,
+        {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5},
+        ["b.depth@0.1,0.1"],
+    )
     (tmp_path / "pool.toml").write_text(write(case))
-    code, said, error = fvs("stability", tmp_path / "pool.toml", "--steps", 20, "--out", tmp_path / "out")
+    code, said, error = fvs(
+        "stability", tmp_path / "pool.toml", "--steps", 20, "--out", tmp_path / "out"
+    )
     assert code == 0 and "give pipes or basins fewer cells" in said + error
     assert "1e4 / ||J||" not in said + error
 
@@ -460,15 +580,25 @@ def test_without_a_terminal_a_study_prints_its_place_at_intervals(monkeypatch, c
     assert said.splitlines()[0] == "3 of 9: upwind with rk4"
 
 
-def test_without_a_terminal_a_run_prints_its_place_and_the_remaining_time_at_intervals(path, capsys):
+def test_without_a_terminal_a_run_prints_its_place_and_the_remaining_time_at_intervals(
+    path, capsys
+):
     with terminal.run_progress(fvsolve.load(path)) as progress:
-        for t, seconds, steps in ((0.0, 0.0, 0), (1.0, 9.0, 40), (2.0, 20.0, 80), (2.5, 31.0, 700), (2.5, 50.0, 900)):
+        for t, seconds, steps in (
+            (0.0, 0.0, 0),
+            (1.0, 9.0, 40),
+            (2.0, 20.0, 80),
+            (2.5, 31.0, 700),
+            (2.5, 50.0, 900),
+        ):
             progress(t, seconds, steps)
     lines = [line.partition(" of ")[0::2] for line in capsys.readouterr().err.splitlines()]
     end = fvsolve.load(path).numerics.end
     left = [(end - 2.0) * 10.0, (end - 2.5) * 22.0, math.inf]
     assert [at for at, _ in lines] == ["t = 2 s", "t = 2.5 s", "t = 2.5 s"]
-    assert [rest.partition("; ")[2] for _, rest in lines] == [f"about {one:.2g} s left at this pace" for one in left]
+    assert [rest.partition("; ")[2] for _, rest in lines] == [
+        f"about {one:.2g} s left at this pace" for one in left
+    ]
 
 
 def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):

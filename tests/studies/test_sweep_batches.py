@@ -27,7 +27,9 @@ METHODS = {
 def network(numerics: dict, opening=CLOSING, head=20.0) -> dict:
     """Case of a loop of pipes with a demand, and a valve that closes."""
     steady = {"model": "steady", "factor": 0.02}
-    nodes = {name: junction(demand) for name, demand in {"fork": 0.0, "side": 0.002, "gate": 0.0}.items()}
+    nodes = {
+        name: junction(demand) for name, demand in {"fork": 0.0, "side": 0.002, "gate": 0.0}.items()
+    }
     nodes |= {"lake": reservoir(101325.0 + 9810.0 * head), "out": reservoir(101325.0)}
     links = {
         "main": pipe("lake", "fork", 120.0, 0.3, 1000.0, 12, friction=steady),
@@ -41,8 +43,14 @@ def network(numerics: dict, opening=CLOSING, head=20.0) -> dict:
 
 VARIED = {
     "area": lambda draw: {"links.valve.area": draw(0.002, 0.006)},
-    "pressure": lambda draw: {"nodes.lake.pressure": draw(2.5e5, 4e5), "nodes.side.demand": draw(5e-4, 3e-3)},
-    "diameter": lambda draw: {"links.upper.diameter": draw(0.15, 0.25), "links.main.friction.factor": draw(0.01, 0.03)},
+    "pressure": lambda draw: {
+        "nodes.lake.pressure": draw(2.5e5, 4e5),
+        "nodes.side.demand": draw(5e-4, 3e-3),
+    },
+    "diameter": lambda draw: {
+        "links.upper.diameter": draw(0.15, 0.25),
+        "links.main.friction.factor": draw(0.01, 0.03),
+    },
     "opening": lambda draw: {
         "links.valve.opening.value": [1.0, draw(0.0, 0.6)],
         "links.valve.area": draw(0.002, 0.006),
@@ -87,7 +95,10 @@ def restated(how: str) -> dict:
     case = network(METHODS["upwind5"])
     links = case["links"]
     if how == "order":
-        case["links"], case["nodes"] = dict(reversed(links.items())), dict(reversed(case["nodes"].items()))
+        case["links"], case["nodes"] = (
+            dict(reversed(links.items())),
+            dict(reversed(case["nodes"].items())),
+        )
     elif how == "ends":
         for link in links.values():
             link["from"], link["to"] = link["to"], link["from"]
@@ -102,7 +113,10 @@ def restated(how: str) -> dict:
     elif how == "wave":
         links["valve"]["opening"] = {"mean": 0.5, "amplitude": 0.4, "period": 0.3}
     elif how == "units":
-        links["main"]["length"], case["output"]["units"] = "0.12 km", {"pressure": "bar", "flow": "l/s"}
+        links["main"]["length"], case["output"]["units"] = (
+            "0.12 km",
+            {"pressure": "bar", "flow": "l/s"},
+        )
     elif how == "no probes":
         del case["output"]["probes"]
     else:
@@ -111,7 +125,8 @@ def restated(how: str) -> dict:
 
 
 @pytest.mark.parametrize(
-    "how", ["order", "ends", "elevations", "no pipes", "wave", "units", "no probes", "rest", "early"]
+    "how",
+    ["order", "ends", "elevations", "no pipes", "wave", "units", "no probes", "rest", "early"],
 )
 def test_rows_of_restated_cases_have_the_bits_of_rows_alone(how):
     case, tasks = restated(how), tasks_of("area", 20)
@@ -123,7 +138,9 @@ def test_variants_that_grow_are_stopped_as_alone():
     case, tasks = network(METHODS["muscl"] | {"courant": 3.0}), tasks_of("area", 20)
     rows = batched(case, tasks, failed=1)
     assert untimed(rows) == untimed(alone(case, tasks))
-    assert not any(row["ok"] for row in rows) and all(row["reason"].startswith("stopped") for row in rows)
+    assert not any(row["ok"] for row in rows) and all(
+        row["reason"].startswith("stopped") for row in rows
+    )
 
 
 def test_rows_do_not_depend_on_order_and_size_of_batches(monkeypatch):
@@ -134,7 +151,9 @@ def test_rows_do_not_depend_on_order_and_size_of_batches(monkeypatch):
     assert untimed(batched(case, tasks)) == forward
     monkeypatch.undo()
     processes = sweep(case, points=tasks, jobs=2).rows
-    assert [{key: row[key] for key in own} for row, own in zip(processes, forward, strict=True)] == forward
+    assert [
+        {key: row[key] for key in own} for row, own in zip(processes, forward, strict=True)
+    ] == forward
 
 
 def test_a_variant_that_is_refused_is_named_in_its_row_and_the_others_are_as_alone():
@@ -145,12 +164,17 @@ def test_a_variant_that_is_refused_is_named_in_its_row_and_the_others_are_as_alo
     assert rows[11]["reason"].startswith("refused") and sum(row["ok"] for row in rows) == 29
     tasks[11] = {"links.valve.area": 0.004, "nodes.side.demand": 1e3}
     rows = batched(case, tasks, failed=1)
-    assert untimed(rows) == untimed(alone(case, tasks)) and rows[11]["reason"].startswith("refused: numerics.initial")
+    assert untimed(rows) == untimed(alone(case, tasks)) and rows[11]["reason"].startswith(
+        "refused: numerics.initial"
+    )
 
 
 def test_marks_and_notices_are_those_of_the_own_run():
     case = network(METHODS["muscl"] | {"below_vapor": "continue"}, head=8.0)
-    tasks = [{"links.valve.area": area, "nodes.side.demand": 0.0} for area in np.linspace(1e-5, 0.02, 24).tolist()]
+    tasks = [
+        {"links.valve.area": area, "nodes.side.demand": 0.0}
+        for area in np.linspace(1e-5, 0.02, 24).tolist()
+    ]
     rows = batched(case, tasks)
     assert untimed(rows) == untimed(alone(case, tasks))
     assert 0 < sum(bool(row["marks"]) for row in rows) < 24
@@ -165,7 +189,10 @@ def test_expectations_are_those_of_the_own_run():
     }
     tasks = tasks_of("area", 20)
     rows = batched(case, tasks)
-    assert untimed(rows) == untimed(alone(case, tasks)) and len({row["expectations"] for row in rows}) == 2
+    assert (
+        untimed(rows) == untimed(alone(case, tasks))
+        and len({row["expectations"] for row in rows}) == 2
+    )
 
 
 LIMITS = {
@@ -187,24 +214,33 @@ def test_verdicts_are_those_of_the_own_run(shape, name, limit):
     for node, height in zip(case["nodes"].values(), (3.0, 1.0, 2.0, 0.0, 1.5), strict=True):
         node["elevation"] = height
     if shape == "profile":
-        case["links"]["main"]["profile"] = {"chainage": [0.0, 50.0, 120.0], "elevation": [0.0, 9.0, 3.0]}
+        case["links"]["main"]["profile"] = {
+            "chainage": [0.0, 50.0, 120.0],
+            "elevation": [0.0, 9.0, 3.0],
+        }
     case["expect"] = {"max(pipes.pressure)": {"value": 8e5, "atol": 2e5}}
     tasks = [{"links.valve.area": area} for area in np.linspace(5e-4, 0.012, 20).tolist()]
     rows = batched(case, tasks)
     assert untimed(rows) == untimed(alone(case, tasks))
-    assert {row["verdicts"] for row in rows} == {True, False} and {row["expectations"] for row in rows} == {True, False}
+    assert {row["verdicts"] for row in rows} == {True, False} and {
+        row["expectations"] for row in rows
+    } == {True, False}
 
 
 OTHER_STEPS = {
-    "links.valve.opening.duration": [0.1, 0.2], "links.main.cells": [12, 14], "numerics.end": [1.0, 0.8],
+    "links.valve.opening.duration": [0.1, 0.2],
+    "links.main.cells": [12, 14],
+    "numerics.end": [1.0, 0.8],
     "links.main.wave_speed": [1000.0, 1200.0],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("key", OTHER_STEPS)
 def test_variants_with_other_steps_or_cells_run_alone(key):
     case = network(METHODS["upwind5"])
-    tasks = [{key: OTHER_STEPS[key][k % 5 == 3]} | task for k, task in enumerate(tasks_of("area", 20))]
+    tasks = [
+        {key: OTHER_STEPS[key][k % 5 == 3]} | task for k, task in enumerate(tasks_of("area", 20))
+    ]
     assert untimed(batched(case, tasks, failed=1)) == untimed(alone(case, tasks))
 
 
@@ -226,9 +262,14 @@ def test_cases_with_steps_that_depend_on_states_run_alone():
 def test_a_notice_on_the_run_as_a_whole_or_on_two_copies_is_detected():
     own = Notice("range", "links.main~3~", "main~3~: odd")
     found = sweep_batches.notices_of_copies([own])
-    assert found[3] == [replace(own, place="links.main", text="main: odd")] and not any(found[:3] + found[4:])
+    assert found[3] == [replace(own, place="links.main", text="main: odd")] and not any(
+        found[:3] + found[4:]
+    )
     assert sweep_batches.notices_of_copies([Notice("range", "numerics", "all is odd")]) is None
-    assert sweep_batches.notices_of_copies([Notice("range", "links.main~3~", "main~3~ and main~4~")]) is None
+    assert (
+        sweep_batches.notices_of_copies([Notice("range", "links.main~3~", "main~3~ and main~4~")])
+        is None
+    )
 
 
 def test_a_step_beyond_a_limit_is_reported_in_every_row():

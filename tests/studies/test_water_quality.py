@@ -16,8 +16,15 @@ HOUR = 3600.0
 
 
 def pipe(start, end, length=600.0, diameter=0.2):
-    return {"type": "pipe", "from": start, "to": end, "length": length, "diameter": diameter,
-            "friction": {"model": "hazen-williams", "coefficient": 120.0}, "pipe_model": "quasi-steady"}  # fmt: skip
+    return {
+        "type": "pipe",
+        "from": start,
+        "to": end,
+        "length": length,
+        "diameter": diameter,
+        "friction": {"model": "hazen-williams", "coefficient": 120.0},
+        "pipe_model": "quasi-steady",
+    }
 
 
 def line(demand, end=4 * HOUR, **more):
@@ -52,7 +59,8 @@ def test_water_that_returns_is_the_water_that_left():
     assert share[away] == pytest.approx(1.0) and delay < 0.9 * 2 * HOUR
     assert share[found.t > 4 * HOUR - delay + 60.0] == pytest.approx(0.0, abs=1e-9)
     age = found.of("mid")
-    back = away & (found.t > 2 * HOUR)  # the water entered the pipe at 4 h - t - delay, and passes at t
+    # the water entered the pipe at 4 h - t - delay, and passes at t
+    back = away & (found.t > 2 * HOUR)
     assert age[back] == pytest.approx(found.t[back] - (4 * HOUR - found.t[back] - delay), abs=1e-6)
     assert found.error < 1e-12
 
@@ -65,7 +73,14 @@ def test_a_tank_mixes_all_its_water():
         "tower": tank(20.0, 3.0, elevation=40.0),
         "end": junction(elevation=10.0),
     }
-    case = scene(nodes, {"lift": pump, "main": pipe("tower", "end", 50.0)}, 10 * HOUR, {"rtol": 1e-8}, [], 100.0)
+    case = scene(
+        nodes,
+        {"lift": pump, "main": pipe("tower", "end", 50.0)},
+        10 * HOUR,
+        {"rtol": 1e-8},
+        [],
+        100.0,
+    )
     flow = 5000.0 / (1000.0 * 9.80665 * 33.0)
     case["nodes"]["end"] = junction(flow, elevation=10.0)
     run = fvsolve.run(case | {"output": {"probes": ["lift.flow", "tower.level"], "every": 600.0}})
@@ -84,9 +99,17 @@ def test_a_tank_mixes_all_its_water():
 
 def test_shares_of_two_sources_mix_by_their_flows_in_short_pipes():
     """Pipes much shorter than the way of the water in a step; sources, and a check of the sum."""
-    nodes = {"east": lake(60.0, elevation=10.0), "west": lake(60.05, elevation=10.0), "mid": junction(elevation=10.0),
-             "end": junction(0.02, elevation=10.0)}  # fmt: skip
-    links = {"a": pipe("east", "mid", 20.0), "b": pipe("west", "mid", 30.0), "c": pipe("mid", "end", 5.0)}
+    nodes = {
+        "east": lake(60.0, elevation=10.0),
+        "west": lake(60.05, elevation=10.0),
+        "mid": junction(elevation=10.0),
+        "end": junction(0.02, elevation=10.0),
+    }
+    links = {
+        "a": pipe("east", "mid", 20.0),
+        "b": pipe("west", "mid", 30.0),
+        "c": pipe("mid", "end", 5.0),
+    }
     case = scene(nodes, links, HOUR, {"rtol": 1e-8}, ["a.flow", "b.flow"], 100.0)
     run = fvsolve.run(case)
     found = water_quality(case, ["east", "west"], step=300.0)
@@ -104,18 +127,24 @@ def test_other_parts_wrong_nodes_and_steps_are_refused():
     with pytest.raises(FvsolveError, match="step = 0.0 s is out of range"):
         water_quality(case, step=0.0)
     case["links"]["main"]["pipe_model"] = "finite-volume"
-    with pytest.raises(FvsolveError, match='main: not supported; expected a network .* pipe_model = "quasi-steady"'):
+    with pytest.raises(
+        FvsolveError, match='main: not supported; expected a network .* pipe_model = "quasi-steady"'
+    ):
         water_quality(case)
 
 
 def epanet_quality(text: str, kind: str, folder: Path):
     """(times [s], names, values : float64[times, nodes]) of a quality run of EPANET with steps of 20 s."""
-    toolkit = pytest.importorskip("wntr.epanet.toolkit", reason="WNTR, the extra `epanet`, is not installed")
+    toolkit = pytest.importorskip(
+        "wntr.epanet.toolkit", reason="WNTR, the extra `epanet`, is not installed"
+    )
     keys = r"(?im)^\s*(hydraulic timestep|quality timestep|duration|quality|tolerance|report timestep)\s.*$"
     text = re.sub(keys, "", text)
     times = "[TIMES]\n Hydraulic Timestep 0:00:20\n Quality Timestep 0:00:20\n Duration 24:00\n"
     text = re.sub(r"\[QUALITY\][^\[]*", "", text)  # ages and shares at the start
-    text = text.replace("[TIMES]", times).replace("[OPTIONS]", f"[OPTIONS]\n Quality {kind}\n Tolerance 0.0001")
+    text = text.replace("[TIMES]", times).replace(
+        "[OPTIONS]", f"[OPTIONS]\n Quality {kind}\n Tolerance 0.0001"
+    )
     files = [str(folder / f"net.{ending}") for ending in ("inp", "rpt", "bin")]
     Path(files[0]).write_text(text)
     epanet = toolkit.ENepanet()

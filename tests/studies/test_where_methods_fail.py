@@ -40,8 +40,15 @@ def observed_order(errors: list[float]) -> float:
 
 
 def tiny(method: str, h: float, end: float, **more) -> dict:
-    return {"numerics.scheme": "upwind", "numerics.method": method, "numerics.step": h, "numerics.end": end,
-            "output.every": end, "expect": {}, **more}  # fmt: skip
+    return {
+        "numerics.scheme": "upwind",
+        "numerics.method": method,
+        "numerics.step": h,
+        "numerics.end": end,
+        "output.every": end,
+        "expect": {},
+        **more,
+    }
 
 
 def chamber_eigenvalue() -> float:
@@ -64,7 +71,9 @@ def test_an_explicit_method_fails_at_the_step_that_the_chambers_eigenvalue_predi
     for h in (0.99 * limit, 1.01 * limit):
         model = study_model(case, tiny(method, h, steps * h))
         y = np.zeros(model.y_size)
-        at = model.state_names.index(next(name for name in model.state_names if name.startswith("body")))
+        at = model.state_names.index(
+            next(name for name in model.state_names if name.startswith("body"))
+        )
         y[at] = 1e-12 * model.scale[at]
         found = outcome(model, y=y)
         sizes.append(abs(found.y[at]) / y[at] if found.ok else math.inf)
@@ -87,7 +96,10 @@ def test_an_implicit_method_takes_the_chamber_at_a_step_hundreds_of_times_longer
 def bottle(volume: float = 1e-5) -> dict:
     """Case of a bottle of water between two valves; the second valve closes by 1e-4 at once."""
     nodes = {"pump": reservoir(1e6), "body": chamber(volume), "sump": reservoir(AMBIENT)}
-    links = {"way-in": valve("pump", "body", 1e-5), "way-out": valve("body", "sump", 1e-5, step(0.5, 1.0, 0.9999))}
+    links = {
+        "way-in": valve("pump", "body", 1e-5),
+        "way-out": valve("body", "sump", 1e-5, step(0.5, 1.0, 0.9999)),
+    }
     return scene(nodes, links, 1.0, {"method": "radau-iia-5", "step": 0.01}, ["body.pressure"], 0.1)
 
 
@@ -95,7 +107,12 @@ def swings(method: str, h: float) -> tuple[np.ndarray, float]:
     """Deviations of the pressure from its final value after each step from the jump on, and h lambda."""
     case = bottle()
     rest = outcome(case, {"numerics.end": 20.0}).rows[-1, 1]
-    settings = {"numerics.method": method, "numerics.step": h, "numerics.end": 0.5 + 12 * h, "output.every": h}
+    settings = {
+        "numerics.method": method,
+        "numerics.step": h,
+        "numerics.end": 0.5 + 12 * h,
+        "output.every": h,
+    }
     found, bursts = run_recorded(case, settings)
     assert found.ok
     after = np.concatenate(bursts)[round(0.5 / h) - 1 :, 0]  # from the last step before the jump
@@ -106,7 +123,9 @@ def swings(method: str, h: float) -> tuple[np.ndarray, float]:
 
 
 @pytest.mark.parametrize("method", ["trapezoid", "implicit-midpoint"])
-def test_after_a_stiff_step_an_a_stable_method_rings_by_its_r_and_an_l_stable_method_does_not(method):
+def test_after_a_stiff_step_an_a_stable_method_rings_by_its_r_and_an_l_stable_method_does_not(
+    method,
+):
     h = 0.01
     away, z = swings(method, h)
     assert z < -50.0 and r_of(method, z).real < -0.9
@@ -134,13 +153,18 @@ def mild_sine(t, y):
 
 def sine_error(f, method: str, h: float) -> float:
     t = np.linspace(0.0, 6.0, 13)
-    return float(np.max(np.abs(fvsolve.integrate(f, [0.0], t, method, step=h)[3:, 0] - np.sin(t[3:]))))
+    return float(
+        np.max(np.abs(fvsolve.integrate(f, [0.0], t, method, step=h)[3:, 0] - np.sin(t[3:])))
+    )
 
 
-@pytest.mark.parametrize(("method", "left"), [("crouzeix-3", 2), ("crouzeix-4", 2), ("gauss-4", 2), ("gauss-6", 4)])
+@pytest.mark.parametrize(
+    ("method", "left"), [("crouzeix-3", 2), ("crouzeix-4", 2), ("gauss-4", 2), ("gauss-6", 4)]
+)
 def test_stiffness_leaves_a_method_the_order_that_its_stage_order_allows(method, left):
     facts = analyse(method)
-    swaps = facts.stage_order % 2 if abs(r_of(method, -1e12)) > 1 - 1e-6 else 1  # |R| = 1 at infinity: see the page
+    # |R| = 1 at infinity: see the page
+    swaps = facts.stage_order % 2 if abs(r_of(method, -1e12)) > 1 - 1e-6 else 1
     assert left == facts.stage_order + swaps
     stiff = observed_order([sine_error(stiff_sine, method, h) for h in (0.125, 0.0625)])
     assert stiff == pytest.approx(left, abs=0.2) and stiff <= facts.order - 0.8
@@ -150,7 +174,9 @@ def test_stiffness_leaves_a_method_the_order_that_its_stage_order_allows(method,
 
 def test_a_stiffly_accurate_method_of_higher_stage_order_is_a_million_times_closer():
     assert analyse("radau-iia-5").stage_order == 3 and analyse("radau-iia-5").stiffly_accurate
-    assert sine_error(stiff_sine, "radau-iia-5", 0.125) < 1e-6 * sine_error(stiff_sine, "crouzeix-4", 0.125)
+    assert sine_error(stiff_sine, "radau-iia-5", 0.125) < 1e-6 * sine_error(
+        stiff_sine, "crouzeix-4", 0.125
+    )
 
 
 # aliasing -----------------------------------------------------------------------------------------------------------
@@ -159,8 +185,14 @@ def test_a_stiffly_accurate_method_of_higher_stage_order_is_a_million_times_clos
 def surge(method: str, h: float, steps: int) -> dict:
     """Case of a lake, a rigid column and a bottle: an undamped oscillator of two states after a jump of pressure."""
     nodes = {"lake": reservoir(step(0.0, 1e6, 1.01e6)), "body": chamber(1e-3)}
-    column = {"type": "rigid-column", "from": "lake", "to": "body", "length": 10.0, "diameter": 0.05,
-              "friction": {"model": "none"}}  # fmt: skip
+    column = {
+        "type": "rigid-column",
+        "from": "lake",
+        "to": "body",
+        "length": 10.0,
+        "diameter": 0.05,
+        "friction": {"model": "none"},
+    }
     numerics = {"method": method, "step": h}
     return scene(nodes, {"column": column}, steps * h, numerics, ["body.pressure"], h)
 
@@ -183,7 +215,9 @@ def test_a_mode_beyond_pi_over_h_shows_at_the_wrong_frequency_that_is_predicted(
     omega = column_frequency()
     h = 3.0 * math.pi / omega
     model = study_model(surge(method, h, 1))
-    assert np.abs(np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag).max() == pytest.approx(omega, rel=1e-9)
+    assert np.abs(np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag).max() == pytest.approx(
+        omega, rel=1e-9
+    )
     shown = shown_frequency(method, h)
     assert shown == pytest.approx(seen_frequency(method, omega, h), rel=1e-3)
     assert shown <= math.pi / h and shown < 0.4 * omega
@@ -233,7 +267,8 @@ def slope_at_rest(h: float, reynolds: float) -> float:
 @pytest.mark.parametrize("times", [20.0, 4.0, 2.1, 1.9, 0.5])
 def test_the_softened_law_comes_to_rest_once_the_step_is_below_two_over_its_slope(times):
     h, level = 1.0, 2 * math.sqrt(LEVEL) / root_rate()
-    reynolds = 1e4 * h * slope_at_rest(h, 1e4) / times  # the slope is proportional to 1 / Reynolds number
+    # the slope is proportional to 1 / Reynolds number
+    reynolds = 1e4 * h * slope_at_rest(h, 1e4) / times
     assert h * slope_at_rest(h, reynolds) == pytest.approx(times, rel=2e-3)
     rows = outcome(levelling("euler", h, round(level) + 600.0, laminar_reynolds=reynolds)).rows
     gap = (rows[:, 1] - rows[:, 2])[-50:]
@@ -260,7 +295,15 @@ def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predict
         counted = []
         for end in (level, level + after):
             counts = {}
-            fvsolve.integrate(f, [LEVEL], [0.0, end], "dormand-prince", rtol=tolerance, atol=tolerance, counts=counts)
+            fvsolve.integrate(
+                f,
+                [LEVEL],
+                [0.0, end],
+                "dormand-prince",
+                rtol=tolerance,
+                atol=tolerance,
+                counts=counts,
+            )
             counted.append(counts["steps"] + counts["rejections"])
         return counted[1] - counted[0]
 
@@ -269,7 +312,10 @@ def test_error_control_shrinks_its_steps_at_a_bare_root_as_the_tolerance_predict
         assert 0.2 < count / (after * k / (2 * math.sqrt(tol))) < 2.0
     slope = k * 45 / (32 * math.sqrt(soft))
     for tol in (1e-6, 1e-8):
-        assert steps_at_rest(softened, tol) < 2 * after * slope / analyse("dormand-prince").real_interval
+        assert (
+            steps_at_rest(softened, tol)
+            < 2 * after * slope / analyse("dormand-prince").real_interval
+        )
     assert steps_at_rest(softened, 1e-8) < chatter[1e-8] / 10
 
 
@@ -296,22 +342,31 @@ def test_a_step_across_a_kink_costs_the_order_and_segments_restore_it(kind, orde
     straddling, landing = [], []
     for n in (33, 65, 129, 257, 513, 1025):
         h = 1.5 / n
-        straddling.append(abs(fvsolve.integrate(f, [1.0], [0.0, 1.5], "rk4", step=h)[-1, 0] - exact))
+        straddling.append(
+            abs(fvsolve.integrate(f, [1.0], [0.0, 1.5], "rk4", step=h)[-1, 0] - exact)
+        )
         y = np.array([1.0])
         for a, b in zip(pieces[:-1], pieces[1:], strict=True):
             y = fvsolve.integrate(f, y, [a, np.nextafter(b, 0.0)], "rk4", step=h)[-1]
         landing.append(abs(y[0] - exact))
-    fitted = np.polyfit(np.log(1.5 / np.array([33, 65, 129, 257, 513, 1025])), np.log(straddling), 1)[0]
+    fitted = np.polyfit(
+        np.log(1.5 / np.array([33, 65, 129, 257, 513, 1025])), np.log(straddling), 1
+    )[0]
     assert fitted == pytest.approx(order, abs=0.45)
     assert observed_order(landing[:3]) == pytest.approx(4.0, abs=0.3)
 
 
 @pytest.mark.parametrize(("kind", "order"), [("bends", 2), ("jumps", 1)])
-def test_the_program_ends_its_steps_at_kinks_and_jumps_and_retains_the_order_that_its_bare_law_loses(kind, order):
+def test_the_program_ends_its_steps_at_kinks_and_jumps_and_retains_the_order_that_its_bare_law_loses(
+    kind, order
+):
     bends, volume, flow_area, pump = kind == "bends", 50.0, 2e-4, 4e5
     value = ramp(BEND, SHUT - BEND, 0.2, 1.0) if bends else step(BEND, 0.2, 1.0)
     nodes = {"pump": reservoir(pump), "body": chamber(volume), "sump": reservoir(AMBIENT)}
-    links = {"way-in": valve("pump", "body", flow_area), "way-out": valve("body", "sump", flow_area, value)}
+    links = {
+        "way-in": valve("pump", "body", flow_area),
+        "way-out": valve("body", "sump", flow_area, value),
+    }
     gain = WATER["bulk_modulus"] / volume * flow_area * math.sqrt(2.0 / RHO)
 
     @njit
@@ -331,7 +386,9 @@ def test_the_program_ends_its_steps_at_kinks_and_jumps_and_retains_the_order_tha
 
     def worst(least: int) -> float:  # for any place of the kink in a step
         counts = range(least, 2 * least, max(1, least // 12))
-        ends = [fvsolve.integrate(law, [start], [0.0, 1.5], "rk4", step=1.5 / n)[-1, 0] for n in counts]
+        ends = [
+            fvsolve.integrate(law, [start], [0.0, 1.5], "rk4", step=1.5 / n)[-1, 0] for n in counts
+        ]
         return max(abs(p - exact) for p in ends)
 
     assert math.log2(worst(12) / worst(192)) / 4 == pytest.approx(order, abs=0.15)
@@ -376,7 +433,9 @@ def test_every_command_of_the_page_names_a_case_and_settings_that_it_takes(words
 
 
 @pytest.mark.parametrize(
-    "words", [words for words in commands() if words[1] == "failure-map"], ids=lambda words: words[2]
+    "words",
+    [words for words in commands() if words[1] == "failure-map"],
+    ids=lambda words: words[2],
 )
 def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, fvs):
     asked = []
@@ -400,4 +459,6 @@ def test_the_table_of_courant_limits_contains_computed_values():
             for scheme, number in zip(schemes, numbers.strip(" |").split("|"), strict=True):
                 model = lossless(cells, scheme, method, travel)
                 unit = travel * scaled(model, model.jacobian(0.0, np.zeros(2 * cells)))
-                assert courant_limit(method, unit, 1000) == pytest.approx(float(number), abs=6e-4), (method, scheme)
+                assert courant_limit(method, unit, 1000) == pytest.approx(
+                    float(number), abs=6e-4
+                ), (method, scheme)

@@ -31,7 +31,7 @@ from reference.scenes import (
     scene,
     step,
     valve,
-)  # fmt: skip
+)
 
 import fvsolve
 from fvsolve.case import load
@@ -43,7 +43,15 @@ from fvsolve.core.steppers import analyse
 from fvsolve.studies.outcome import outcome, study_model
 
 LINEAR = ("upwind", "linear-upwind", "fromm", "upwind3", "upwind5", "central")
-EXPLICIT = ("euler", "improved-euler", "heun", "rk4", "ssp-rk3", "bogacki-shampine", "dormand-prince")
+EXPLICIT = (
+    "euler",
+    "improved-euler",
+    "heun",
+    "rk4",
+    "ssp-rk3",
+    "bogacki-shampine",
+    "dormand-prince",
+)
 
 
 def energy_norm(model, y: np.ndarray) -> float:
@@ -95,7 +103,10 @@ def test_the_courant_limit_of_each_pair_agrees_with_real_runs_within_1_percent(s
     limit = courant_limit(method, unit, steps)
     assert limit > 0.01
     below, above = (
-        measured_growth(lossless(cells, scheme, method, c * travel, steps), worst_start(model, method, c * unit, steps))
+        measured_growth(
+            lossless(cells, scheme, method, c * travel, steps),
+            worst_start(model, method, c * unit, steps),
+        )
         for c in (0.995 * limit, 1.005 * limit)
     )
     assert below < THRESHOLD < above, (scheme, method, limit, below, above)
@@ -120,19 +131,29 @@ def matched(cells: int, scheme: str, method: str, h: float, steps: int):
     velocity = 1.0
     drop = 0.5 * RHO * SPEED * velocity
     flow_area = area(DIAMETER) * velocity / math.sqrt(2 * drop / RHO)
-    nodes = {"lake": reservoir(AMBIENT + 4 * drop), "end": junction(), "out": reservoir(AMBIENT + 3 * drop)}
-    links = {"main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells), "valve": valve("end", "out", flow_area)}
+    nodes = {
+        "lake": reservoir(AMBIENT + 4 * drop),
+        "end": junction(),
+        "out": reservoir(AMBIENT + 3 * drop),
+    }
+    links = {
+        "main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells),
+        "valve": valve("end", "out", flow_area),
+    }
     numerics = {"scheme": scheme, "method": method, "step": h}
     return study_model(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
 
 
 @pytest.mark.parametrize("courant", [1.3, 1.4, 1.5])
-def test_below_the_limit_of_the_eigenvalues_an_inflow_pipe_grows_by_orders_before_it_decays(courant):
+def test_below_the_limit_of_the_eigenvalues_an_inflow_pipe_grows_by_orders_before_it_decays(
+    courant,
+):
     cells = 8
     h = courant * LENGTH / cells / SPEED
     model = matched(cells, "upwind", "euler", h, 1)
     matrix = h * scaled(model, model.jacobian(0.0, np.zeros(model.y_size)))
-    assert np.max(np.abs(np.tril(matrix[:cells, :cells], -2))) < 1e-9  # a cell depends on itself and the last cell
+    # a cell depends on itself and the last cell
+    assert np.max(np.abs(np.tril(matrix[:cells, :cells], -2))) < 1e-9
     spectrum = 1.0 + np.diag(matrix)  # equal eigenvalues, below one up to Courant 2
     assert spectrum == pytest.approx(1.0 - courant) and abs(1.0 - courant) < 1.0
     norms = {n: growth("euler", matrix, n) for n in (5, 10, 15, 20, 30, 40, 60, 400)}
@@ -170,7 +191,8 @@ def explicit_rates(cells: int, left: float, right: float, datum: bool) -> np.nda
     comes = (left * goes[1], right * goes[0])
     rates = []
     for wave, node in enumerate(comes):
-        own = np.eye(2 * cells)[wave * cells : (wave + 1) * cells][:: -1 if wave else 1]  # in the direction of the wave
+        # in the direction of the wave
+        own = np.eye(2 * cells)[wave * cells : (wave + 1) * cells][:: -1 if wave else 1]
         enters = (beyond @ through) @ np.vstack([node, own[:4]]) if datum else leaving @ own[:5]
         wide = np.vstack([enters[::-1], own, leaving @ own[::-1][:5]])
         faces = np.array([node, *(weights @ wide[j : j + 5] for j in range(1, cells)), goes[wave]])
@@ -201,12 +223,17 @@ def test_a_closure_from_cells_alone_grows_and_the_closure_with_the_value_of_the_
 def test_the_closure_from_a_single_side_grows_in_every_short_pipe_and_ours_in_none():
     for cells in range(5, 25):
         for left, right in ((-1.0, 1.0), (-1.0, -1.0), (1.0, 1.0)):
-            assert np.linalg.eigvals(explicit_rates(cells, left, right, datum=True)).real.max() < 1e-9, (
+            assert (
+                np.linalg.eigvals(explicit_rates(cells, left, right, datum=True)).real.max() < 1e-9
+            ), (
                 cells,
                 left,
                 right,
             )
-    assert all(np.linalg.eigvals(explicit_rates(n, -1.0, 1.0, datum=False)).real.max() > 1e-6 for n in range(5, 25))
+    assert all(
+        np.linalg.eigvals(explicit_rates(n, -1.0, 1.0, datum=False)).real.max() > 1e-6
+        for n in range(5, 25)
+    )
 
 
 # fronts ------------------------------------------------------------------------------------------------------------
@@ -228,23 +255,36 @@ def crossed(heights, steps: int, method: str, courant: float, scheme: str, limit
     model = study_model(scene(nodes, links, steps * h, numerics, ["main.flow"], steps * h))
     y = np.zeros(model.y_size)
     y[18 : 18 + len(heights)] = heights
-    before, after = (np.abs(np.diff(np.pad(v[:cells], 1))).sum() for v in (y, outcome(model, y=y).y))
+    before, after = (
+        np.abs(np.diff(np.pad(v[:cells], 1))).sum() for v in (y, outcome(model, y=y).y)
+    )
     return float(after / before - 1.0)
 
 
-def more_variation(method: str, courant: float, scheme: str = "muscl", limiter: str = "minmod") -> float:
+def more_variation(
+    method: str, courant: float, scheme: str = "muscl", limiter: str = "minmod"
+) -> float:
     """Greatest increase of total variation of fronts of several heights."""
-    draws = [np.random.default_rng(seed).choice([0.0, 0.25, 0.5, 1.0, 2.0], 16) for seed in range(1, 6)]
+    draws = [
+        np.random.default_rng(seed).choice([0.0, 0.25, 0.5, 1.0, 2.0], 16) for seed in range(1, 6)
+    ]
     fronts = zip([np.ones(16), *draws], (12, 1, 1, 5, 5, 12), strict=True)
-    return max(crossed(heights, steps, method, courant, scheme, limiter) for heights, steps in fronts)
+    return max(
+        crossed(heights, steps, method, courant, scheme, limiter) for heights, steps in fronts
+    )
 
 
 @pytest.mark.parametrize("limiter", CODES)
-def test_euler_with_a_limiter_overshoots_just_above_the_courant_number_that_its_steepness_predicts(limiter):
+def test_euler_with_a_limiter_overshoots_just_above_the_courant_number_that_its_steepness_predicts(
+    limiter,
+):
     limit = tvd_courant(limiter)
     assert more_variation("euler", 0.99 * limit, limiter=limiter) < 1e-12
     assert more_variation("euler", 1.15 * limit, limiter=limiter) > 1e-3
-    assert more_variation("ssp-rk3", 0.99 * limit * analyse("ssp-rk3").ssp_radius, limiter=limiter) < 1e-12
+    assert (
+        more_variation("ssp-rk3", 0.99 * limit * analyse("ssp-rk3").ssp_radius, limiter=limiter)
+        < 1e-12
+    )
 
 
 def test_unlimited_slopes_overshoot_at_any_step_and_limited_ones_below_their_courant_number_do_not():
@@ -279,7 +319,9 @@ def test_a_method_without_ssp_radius_overshoots_where_its_ssp_twin_of_the_same_s
 
 
 def test_no_ssp_radius_is_no_sentence():
-    fvsolve.tableau("gottlieb-shu", "0 | 0 0\n-20 | -20 0\n--\n| 41/40 -1/40", source="Gottlieb and Shu 1998")
+    fvsolve.tableau(
+        "gottlieb-shu", "0 | 0 0\n-20 | -20 0\n--\n| 41/40 -1/40", source="Gottlieb and Shu 1998"
+    )
     assert analyse("gottlieb-shu").ssp_radius == 0.0
     assert more_variation("gottlieb-shu", 0.9 * tvd_courant("minmod")) < 1e-12
 
@@ -290,7 +332,10 @@ def test_no_ssp_radius_is_no_sentence():
 def struck(velocity: float = 1.0, every: float = 0.01, shut: float = 0.0411, **changed) -> dict:
     """Case of a frictionless pipe whose flow stops at once; upwind and Euler at Courant 1."""
     supply = 2 * AMBIENT + 2 * RHO * SPEED * velocity
-    nodes = {"lake": reservoir(supply), "gate": junction(step(shut, velocity * area(DIAMETER), 0.0))}
+    nodes = {
+        "lake": reservoir(supply),
+        "gate": junction(step(shut, velocity * area(DIAMETER), 0.0)),
+    }
     links = {"main": pipe("lake", "gate", 400.0, DIAMETER, SPEED, 40)}
     return scene(nodes, links, 3.0, SHARP, ["gate.pressure"], every, **changed)
 
@@ -351,7 +396,8 @@ def falling(velocity: float, closure: float = 0.0, **numerics) -> dict:
     return scene(nodes, links, 2.0, {**SHARP, **numerics}, ["gate.pressure"], 0.01)
 
 
-VAPOUR, LIMIT = 2300.0, (3e5 - 2300.0) / (RHO * SPEED)  # [Pa], and velocity whose rho a v reaches it [m/s]
+# [Pa], and velocity whose rho a v reaches it [m/s]
+VAPOUR, LIMIT = 2300.0, (3e5 - 2300.0) / (RHO * SPEED)
 
 
 def test_pressure_below_vapour_pressure_is_marked_at_the_gate_when_the_wave_is_back():
@@ -361,18 +407,28 @@ def test_pressure_below_vapour_pressure_is_marked_at_the_gate_when_the_wave_is_b
     back, travel = 0.1 + 2 * 400.0 / SPEED, 400.0 / SPEED / 40
     assert first.what == "below vapor pressure" and first.place in ("nodes.gate", "links.main")
     assert abs(first.time - back) <= 1.01 * travel
-    assert "nodes.gate" in [mark.place for mark in marks] and "nodes.lake" not in [mark.place for mark in marks]
+    assert "nodes.gate" in [mark.place for mark in marks] and "nodes.lake" not in [
+        mark.place for mark in marks
+    ]
 
 
 def test_below_vapour_the_run_can_be_stopped_and_a_slow_closure_needs_no_mark():
     stopped = fvsolve.run(falling(1.001 * LIMIT, below_vapor="stop"))
     back = 0.1 + 2 * 400.0 / SPEED
-    assert not stopped.ok and "vapour" in stopped.reason and stopped.t[-1] == pytest.approx(back, abs=0.03)
+    assert (
+        not stopped.ok
+        and "vapour" in stopped.reason
+        and stopped.t[-1] == pytest.approx(back, abs=0.03)
+    )
     assert not fvsolve.run(falling(1.001 * LIMIT, closure=4 * 2 * 400.0 / SPEED)).marks
 
 
-@pytest.mark.parametrize("factor, courant, grows", [(0.05, 1.0, False), (0.05, 0.9, False), (400.0, 1.0, True)])
-def test_upwind_with_euler_at_courant_1_takes_friction_up_to_twice_the_flow_in_a_step(factor, courant, grows):
+@pytest.mark.parametrize(
+    "factor, courant, grows", [(0.05, 1.0, False), (0.05, 0.9, False), (400.0, 1.0, True)]
+)
+def test_upwind_with_euler_at_courant_1_takes_friction_up_to_twice_the_flow_in_a_step(
+    factor, courant, grows
+):
     """Friction of the waves that enter a cell multiplies the flow by 1 - h g in a step: no growth up to h g = 2.
 
     With g = f v / D of steady friction; friction of the cell's own waves grew at Courant number 1 however small.

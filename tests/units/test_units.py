@@ -97,24 +97,61 @@ W/m2/K: watt/meter**2/kelvin | W/(m2 K): watt/meter**2/kelvin | kW/m2/K: kilowat
 lb ft2: pound*foot**2 | C: coulomb | F: farad | mF: millifarad | uF: microfarad | K: kelvin
 degC: degC | celsius: degC | degF: degF | degR: degR
 """
-PINT = dict(row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip())
+PINT = dict(
+    row.strip().split(": ") for line in ROWS.splitlines() for row in line.split("|") if row.strip()
+)
 PINT_SI = {
-    "m": "meter", "m2": "meter**2", "m3": "meter**3", "s": "second", "Pa": "pascal",
+    "m": "meter",
+    "m2": "meter**2",
+    "m3": "meter**3",
+    "s": "second",
+    "Pa": "pascal",
     "m3/s": "meter**3/second",
-    "N/m": "newton/meter", "N s/m": "newton*second/meter", "m3/s/Pa": "meter**3/second/pascal",
-    "m/s": "meter/second", "m/s2": "meter/second**2", "kg/m3": "kilogram/meter**3", "Pa s": "pascal*second",
-    "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram",
+    "N/m": "newton/meter",
+    "N s/m": "newton*second/meter",
+    "m3/s/Pa": "meter**3/second/pascal",
+    "m/s": "meter/second",
+    "m/s2": "meter/second**2",
+    "kg/m3": "kilogram/meter**3",
+    "Pa s": "pascal*second",
+    "K": "kelvin",
+    "-": "dimensionless",
+    "m2/s": "meter**2/second",
+    "kg": "kilogram",
     "kg/s": "kilogram/second",
-    "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "1/s": "1/second", "rad": "radian",
-    "1/Pa": "1/pascal", "Pa s/m": "pascal*second/meter",
-    "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
-    "N m s": "newton*meter*second", "N s": "newton*second",
-    "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",
-    "V": "volt", "A": "ampere", "ohm": "ohm", "H": "henry", "Wb": "weber", "N m/A": "newton*meter/ampere",
-    "1/H": "1/henry", "m3/rad": "meter**3/radian", "J/kg/K": "joule/kilogram/kelvin", "kg/mol": "kilogram/mole",
-    "mol/s": "mole/second", "J/mol": "joule/mole",
-    "N m/rad": "newton*meter/radian", "J/K": "joule/kelvin", "W/K": "watt/kelvin", "W/m2/K": "watt/meter**2/kelvin",
-}  # fmt: skip
+    "N": "newton",
+    "J": "joule",
+    "W": "watt",
+    "Hz": "1/second",
+    "1/s": "1/second",
+    "rad": "radian",
+    "1/Pa": "1/pascal",
+    "Pa s/m": "pascal*second/meter",
+    "rad/s": "radian/second",
+    "N m": "newton*meter",
+    "kg m2": "kilogram*meter**2",
+    "N m s": "newton*meter*second",
+    "N s": "newton*second",
+    "kg m2/s": "kilogram*meter**2/second",
+    "C": "coulomb",
+    "F": "farad",
+    "V": "volt",
+    "A": "ampere",
+    "ohm": "ohm",
+    "H": "henry",
+    "Wb": "weber",
+    "N m/A": "newton*meter/ampere",
+    "1/H": "1/henry",
+    "m3/rad": "meter**3/radian",
+    "J/kg/K": "joule/kilogram/kelvin",
+    "kg/mol": "kilogram/mole",
+    "mol/s": "mole/second",
+    "J/mol": "joule/mole",
+    "N m/rad": "newton*meter/radian",
+    "J/K": "joule/kelvin",
+    "W/K": "watt/kelvin",
+    "W/m2/K": "watt/meter**2/kelvin",
+}
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +172,11 @@ def test_spelling_agrees_with_pint(spelling, registry):
     factor, name = (float(words[0]), words[1]) if len(words) == 2 else (1.0, words[0])
     wanted = PINT_SI[DIMENSIONS[unit.dimension].si]
     for number in (1.0, 36.6):
-        si = registry.Quantity(number * factor, registry.parse_expression(name).units) if "/" not in name else None
+        si = (
+            registry.Quantity(number * factor, registry.parse_expression(name).units)
+            if "/" not in name
+            else None
+        )
         if si is None:
             si = number * factor * registry.parse_expression(name)
         assert unit.si(number) == approx(si.to(wanted).magnitude, rel=1e-12)
@@ -226,8 +267,16 @@ def test_pint_knows_the_rest():
 @pytest.mark.parametrize(
     "text, dimension, message",
     [
-        ("20 C", "temperature", '"20 C" is a charge; expected a temperature; did you mean "20 degC"?'),
-        ("68 F", "temperature", '"68 F" is a capacitance; expected a temperature; did you mean "68 degF"?'),
+        (
+            "20 C",
+            "temperature",
+            '"20 C" is a charge; expected a temperature; did you mean "20 degC"?',
+        ),
+        (
+            "68 F",
+            "temperature",
+            '"68 F" is a capacitance; expected a temperature; did you mean "68 degF"?',
+        ),
         ("304.8 kg", "length", '"304.8 kg" is a mass; expected a length, for example "300 mm"'),
         ("10 mPa", "pressure", 'unknown unit "mPa"; did you mean "10 MPa"?'),
         ("10 BAR", "pressure", 'unknown unit "BAR"; did you mean "10 bar"?'),
@@ -236,8 +285,16 @@ def test_pint_knows_the_rest():
         ("45 m", "pressure", '"45 m" is a length; expected a pressure; did you mean "45 mH2O"?'),
         ("3 kg m-2 s-1", "velocity", '"3 kg m-2 s-1" is a rate of rain; expected a velocity'),
         ("3 kg m-2 s-1", "flow", '"3 kg m-2 s-1" is a rate of rain; expected a flow'),
-        ("3 kg s-1", "rainfall", '"3 kg s-1" is a mass flow; expected a rate of rain, for example "25 mm/h"'),
-        ("45 metres", "pressure", '"45 metres" is a length; expected a pressure; did you mean "45 mH2O"?'),
+        (
+            "3 kg s-1",
+            "rainfall",
+            '"3 kg s-1" is a mass flow; expected a rate of rain, for example "25 mm/h"',
+        ),
+        (
+            "45 metres",
+            "pressure",
+            '"45 metres" is a length; expected a pressure; did you mean "45 mH2O"?',
+        ),
         ("3 mm/h-1", "rainfall", '"3 mm/h-1" is a quantity of'),
         ("10 Min", "time", 'unknown unit "Min"; did you mean "10 min"?'),
         ("3 kg/s", "flow", '"3 kg/s" is a mass flow; expected a flow, for example "20 l/s"'),
@@ -246,7 +303,11 @@ def test_pint_knows_the_rest():
         ("1.304,8 mm", "length", '"1.304,8 mm" has a comma; did you mean "1304.8 mm"?'),
         ("1,304.8 mm", "length", '"1,304.8 mm" has a comma; did you mean "1304.8 mm"?'),
         ("304,8 mm", "length", '"304,8 mm" has a comma; did you mean "304.8 mm"?'),
-        ("a lot", "length", '"a lot" is not a number with a unit; expected a length, for example "300 mm"'),
+        (
+            "a lot",
+            "length",
+            '"a lot" is not a number with a unit; expected a length, for example "300 mm"',
+        ),
         ("", "length", '"" is not a number with a unit; expected a length, for example "300 mm"'),
         (True, "length", 'true is true or false; expected a length, for example "300 mm"'),
         ([1], "length", '[1] is a list; expected a length, for example "300 mm"'),
@@ -255,7 +316,11 @@ def test_pint_knows_the_rest():
         (10**400, "length", "is not finite; expected a length"),
         ("1e999 m", "length", '"1e999 m" is not finite; expected a length, for example "300 mm"'),
         ("2 GPag", "modulus", '"2 GPag": unknown unit "GPag"'),
-        ("2 barg", "modulus", '"2 barg" is a gauge pressure; expected a modulus, for example "210 GPa"'),
+        (
+            "2 barg",
+            "modulus",
+            '"2 barg" is a gauge pressure; expected a modulus, for example "210 GPa"',
+        ),
         (
             "2 bara",
             "gauge_pressure",
@@ -263,7 +328,11 @@ def test_pint_knows_the_rest():
         ),
         ("3 m/s", "number", '"3 m/s" is a velocity; expected a number, for example 0.5'),
         ("3 V", "length", '"3 V" is a voltage; expected a length, for example "300 mm"'),
-        ("3 9**9**9", "length", '"3 9**9**9": unknown unit "9**9**9"; expected a length, for example "300 mm"'),
+        (
+            "3 9**9**9",
+            "length",
+            '"3 9**9**9": unknown unit "9**9**9"; expected a length, for example "300 mm"',
+        ),
     ],
 )
 def test_near_misses_are_refused(text, dimension, message):
@@ -277,10 +346,14 @@ def test_a_decimal_comma_is_refused_in_units_of_ratios_too():
         units.parse_ratio("0,8 1/m", "number", "length")
 
 
-@pytest.mark.parametrize("text, meant", [("0 bar", "0 barg"), ("-0.5 bar", "-0.5 barg"), ("-2 bar", "")])
+@pytest.mark.parametrize(
+    "text, meant", [("0 bar", "0 barg"), ("-0.5 bar", "-0.5 barg"), ("-2 bar", "")]
+)
 def test_a_vacuum_is_read_as_gauge_only_where_that_is_none(text, meant):
     said = units.vacuum(text, parse(text, "pressure")[0])
-    assert said == f'"{text}" is absolute, a vacuum' + (f'; did you mean "{meant}"?' if meant else "")
+    assert said == f'"{text}" is absolute, a vacuum' + (
+        f'; did you mean "{meant}"?' if meant else ""
+    )
 
 
 def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
@@ -294,12 +367,14 @@ def test_convert_is_the_inverse_and_counts_gauge_from_ambient():
 
 
 @pytest.mark.parametrize(
-    "text", ["1" * 10**6, "1" + " " * 10**6 + "x", " " * 10**6, "1 a" + " " * 10**6 + "b", "," * 10**6]
+    "text",
+    ["1" * 10**6, "1" + " " * 10**6 + "x", " " * 10**6, "1 a" + " " * 10**6 + "b", "," * 10**6],
 )
 def test_long_texts_are_refused_at_once(text):
     start = time.process_time()
     with pytest.raises(
-        ValueError, match="(has [0-9]+ letters, more than|is not) a number with (its|a) unit; expected a length"
+        ValueError,
+        match="(has [0-9]+ letters, more than|is not) a number with (its|a) unit; expected a length",
     ) as caught:
         parse(text, "length")
     assert len(str(caught.value)) < 300 and time.process_time() - start < 5.0
@@ -307,14 +382,23 @@ def test_long_texts_are_refused_at_once(text):
 
 def test_a_difference_has_the_unit_without_its_zero_for_each_spelling():
     assert [units.span(unit) for unit in ("barg", "bar(g)", "bara", "bar", "hectopascal")] == [
-        "bar", "bar", "bar", "bar", "hectopascal"]  # fmt: skip
+        "bar",
+        "bar",
+        "bar",
+        "bar",
+        "hectopascal",
+    ]
 
 
 def test_plain_numbers_name_the_first_text_that_is_not_a_number():
     assert units.plain_numbers("1 2.5\n-3e2\tnan\n").tolist()[:3] == [1.0, 2.5, -300.0]
     assert units.plain_numbers(" \n ").size == 0
-    for text, fault in {"1 2\n3 0,5": 'line 4: "0,5" has a comma; did you mean "0.5"?', "1 x": 'line 3: "x" is not a',
-                        "1 1_0": '"1_0" is not a number', "1.234,5": 'did you mean "1234.5"?'}.items():  # fmt: skip
+    for text, fault in {
+        "1 2\n3 0,5": 'line 4: "0,5" has a comma; did you mean "0.5"?',
+        "1 x": 'line 3: "x" is not a',
+        "1 1_0": '"1_0" is not a number',
+        "1.234,5": 'did you mean "1234.5"?',
+    }.items():
         with pytest.raises(ValueError) as caught:
             units.plain_numbers(text, 3)
         assert fault in str(caught.value)
@@ -336,14 +420,20 @@ LISTS = [
     ["1,5 m"], ["\u0661 m"], [""], ["m"],
 ]  # fmt: skip
 DECLARED = [
-    ("length", value.positive), ("length", value.nonnegative), ("number", value.between(0, 1)),
-    ("time", value.anything), ("pressure", value.positive), ("gauge_pressure", value.anything),
+    ("length", value.positive),
+    ("length", value.nonnegative),
+    ("number", value.between(0, 1)),
+    ("time", value.anything),
+    ("pressure", value.positive),
+    ("gauge_pressure", value.anything),
     ("number", value.Range(nonzero=True)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("given", LISTS, ids=str)
-@pytest.mark.parametrize("dimension, bounds", DECLARED, ids=[f"{name}-{bounds}" for name, bounds in DECLARED])
+@pytest.mark.parametrize(
+    "dimension, bounds", DECLARED, ids=[f"{name}-{bounds}" for name, bounds in DECLARED]
+)
 def test_a_list_is_read_as_each_of_its_entries(given, dimension, bounds):
     """Bare numbers are read all at once; values and faults are those of single numbers."""
     context, item = value.ReadContext(), value.Quantity(dimension, bounds)
@@ -355,5 +445,9 @@ def test_a_list_is_read_as_each_of_its_entries(given, dimension, bounds):
             return value.faults_of(error)
 
     whole = outcome(lambda: value.Rows(dimension, bounds).read(given, context))
-    single = outcome(lambda: tuple(value.read_each(enumerate(given), lambda one: item.read(one, context)).values()))
+    single = outcome(
+        lambda: tuple(
+            value.read_each(enumerate(given), lambda one: item.read(one, context)).values()
+        )
+    )
     assert whole == single

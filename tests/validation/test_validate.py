@@ -18,8 +18,10 @@ from fvsolve.studies.validation import data_files, library
 from fvsolve.studies.validation.row_texts import limits_of
 from fvsolve.studies.validation.row_verdicts import DIFFERS, OUTSIDE, WITHIN
 
-DATA = Path(os.environ.get("FVSOLVE_DATA") or Path(__file__).parents[3] / "shared" / "data")  # measured data, if here
-LEVEL = 1.0 + 0.2 / math.pi  # of the tank after 10 s: 0.02 m3/s sin(pi t / 10 s) over 2 m2, with a mean of 2 / pi
+# measured data, if here
+DATA = Path(os.environ.get("FVSOLVE_DATA") or Path(__file__).parents[3] / "shared" / "data")
+# of the tank after 10 s: 0.02 m3/s sin(pi t / 10 s) over 2 m2, with a mean of 2 / pi
+LEVEL = 1.0 + 0.2 / math.pi
 SCENE = """
 schema = 1
 title = "A tank fills"
@@ -52,7 +54,13 @@ source = "closed form"
 
 def scene(*rows: str, table: str = "", compare: str = "") -> str:
     """Case file of the scene with rows, further keys of `[validation]`, and series of `[compare]`."""
-    text = SCENE + table + "".join(f"\n[[validation.compare]]\nwhat = 'row {k}'\n{row}\n" for k, row in enumerate(rows))
+    text = (
+        SCENE
+        + table
+        + "".join(
+            f"\n[[validation.compare]]\nwhat = 'row {k}'\n{row}\n" for k, row in enumerate(rows)
+        )
+    )
     return text + (f"\n[compare]\n{compare}\n" if compare else "")
 
 
@@ -92,8 +100,11 @@ def test_a_right_value_is_within_and_a_planted_twelve_percent_is_outside(tmp_pat
 def test_a_gate_wider_than_all_spreads_needs_a_reason(tmp_path):
     bare = validated(tmp_path, scene(final(LEVEL, "rtol = 0.2")))
     assert bare.verdict == OUTSIDE and "gate.reason" in bare.rows[0].text
-    assert validated(tmp_path, scene(final(LEVEL, 'rtol = 0.2, reason = "a test"'))).verdict == WITHIN
-    others = f'others = [{{ code = "a", value = {0.8 * LEVEL} }}]'  # codes spread as widely as the gate
+    assert (
+        validated(tmp_path, scene(final(LEVEL, 'rtol = 0.2, reason = "a test"'))).verdict == WITHIN
+    )
+    # codes spread as widely as the gate
+    others = f'others = [{{ code = "a", value = {0.8 * LEVEL} }}]'
     assert validated(tmp_path, scene(final(LEVEL, "rtol = 0.19", more=others))).verdict == WITHIN
 
 
@@ -107,14 +118,17 @@ def test_a_far_measurement_widens_no_exact_gate_and_no_run_converges_to_itself(t
 
 
 @pytest.mark.parametrize("because, verdict", [('because = "no waves"', DIFFERS), ("", OUTSIDE)])
-def test_disagreement_with_the_measurement_in_agreement_with_codes_has_a_written_reason(tmp_path, because, verdict):
+def test_disagreement_with_the_measurement_in_agreement_with_codes_has_a_written_reason(
+    tmp_path, because, verdict
+):
     others = f'others = [{{ code = "a", value = {LEVEL} }}]\n{because}'
     measured = f"measured = {{ value = {1.2 * LEVEL} }}\n"
     row = final(LEVEL, "rtol = 0.01", "others", measured + others)
     found = validated(tmp_path, scene(row))
     assert found.verdict == verdict and "reason" in found.rows[0].text + "reason" * bool(because)
     assert library.exit_code([found]) == (verdict == OUTSIDE)
-    gated = final(1.2 * LEVEL, "rtol = 0.01", "measured", others)  # the measurement itself is the gate
+    # the measurement itself is the gate
+    gated = final(1.2 * LEVEL, "rtol = 0.01", "measured", others)
     assert validated(tmp_path, scene(gated)).verdict == verdict
 
 
@@ -133,10 +147,14 @@ def with_series(tmp_path: Path, shift: float, gate: str, rows: int = 100) -> tup
     data = tmp_path / "data"
     data.mkdir(exist_ok=True)
     t = np.linspace(0.0, 10.0, rows)
-    text = "t [s],level [m]\n" + "\n".join(f"{a:.6f},{b:.9f}" for a, b in zip(t, level(t - shift), strict=True))
+    text = "t [s],level [m]\n" + "\n".join(
+        f"{a:.6f},{b:.9f}" for a, b in zip(t, level(t - shift), strict=True)
+    )
     (data / "tank.csv").write_text(text)
     digest = hashlib.sha256(text.encode()).hexdigest()
-    table = f'files = {{ "tank.csv" = "sha256:{digest}, {len(text)} bytes" }}\nget = "from nowhere"\n'
+    table = (
+        f'files = {{ "tank.csv" = "sha256:{digest}, {len(text)} bytes" }}\nget = "from nowhere"\n'
+    )
     row = f'computed = "mean_error(tank.level)"\nfrom = "3 s"\nto = "8 s"\ngate = {{ of = "measured", {gate} }}'
     return scene(row, table=table, compare='"tank.level" = { file = "tank.csv" }'), data
 
@@ -176,7 +194,9 @@ def test_all_faults_of_the_table_are_reported_at_once(tmp_path):
         'computed = "max(tank.level)"\ngate = { of = "others" }',
         'computed = "mean_error(tank.level)"\ngate = { of = "exact" }',
     )
-    (tmp_path / "case.toml").write_text(scene(*rows, table='files = { "a.csv" = "md5:1" }\nnonsense = 1\n'))
+    (tmp_path / "case.toml").write_text(
+        scene(*rows, table='files = { "a.csv" = "md5:1" }\nnonsense = 1\n')
+    )
     with pytest.raises(CaseError) as caught:
         library.load(tmp_path / "case.toml")
     message = str(caught.value)
@@ -232,22 +252,38 @@ def test_a_value_that_is_never_reached_is_outside_and_prints(tmp_path, capsys):
 
 
 def test_a_scene_that_another_row_changes_runs_again(tmp_path):
-    half = final(1.0 + 0.1 / math.pi, REASON, more='set = { "nodes.source.flow" = "0.01*sin(pi*t/10)" }')
+    half = final(
+        1.0 + 0.1 / math.pi, REASON, more='set = { "nodes.source.flow" = "0.01*sin(pi*t/10)" }'
+    )
     found = validated(tmp_path, scene(final(LEVEL, REASON), half))
     assert [row.verdict for row in found.rows] == [WITHIN, WITHIN]
 
 
 def test_tables_are_formed_by_formulas_integrals_and_from_matrices(tmp_path):
     (tmp_path / "a.txt").write_text("a title\n1  10 NaN\n2\t20,30\n3 ; 30 ; 60\n-1 5 5\n")
-    made = data_files.derived_table(tmp_path / "a.txt", 1, {"t [s]": "c1 - 1", "x": "2*c2"}, False, 1, "c1 > 0")
+    made = data_files.derived_table(
+        tmp_path / "a.txt", 1, {"t [s]": "c1 - 1", "x": "2*c2"}, False, 1, "c1 > 0"
+    )
     assert list(made) == ["t [s]", "x"] and made["x"].tolist() == [20.0, 40.0, 60.0]
-    made = data_files.derived_table(tmp_path / "a.txt", 1, {"t [s]": "c1", "x": "integral(c2)"}, False, 1, "c1 > 0")
+    made = data_files.derived_table(
+        tmp_path / "a.txt", 1, {"t [s]": "c1", "x": "integral(c2)"}, False, 1, "c1 > 0"
+    )
     assert made["x"].tolist() == [0.0, 15.0, 40.0]
-    with_third = data_files.derived_table(tmp_path / "a.txt", 1, {"t [s]": "c1", "z": "c3"}, False, 1, "")
-    assert with_third["t [s]"].tolist() == [-1.0, 2.0, 3.0]  # in order of time, without the row that has no number
+    with_third = data_files.derived_table(
+        tmp_path / "a.txt", 1, {"t [s]": "c1", "z": "c3"}, False, 1, ""
+    )
+    # in order of time, without the row that has no number
+    assert with_third["t [s]"].tolist() == [-1.0, 2.0, 3.0]
     (tmp_path / "m.txt").write_text("1 2 3\n4 5 6\n7 8 9\n")
-    made = data_files.derived_table(tmp_path / "m.txt", 0, {"x": "c1", "y": "c2", "z": "c3"}, True, 2, "")
-    assert np.column_stack(list(made.values())).tolist() == [[0, 0, 1], [0, 2, 3], [2, 0, 7], [2, 2, 9]]
+    made = data_files.derived_table(
+        tmp_path / "m.txt", 0, {"x": "c1", "y": "c2", "z": "c3"}, True, 2, ""
+    )
+    assert np.column_stack(list(made.values())).tolist() == [
+        [0, 0, 1],
+        [0, 2, 3],
+        [2, 0, 7],
+        [2, 2, 9],
+    ]
     with pytest.raises(FvsolveError, match="c9 is unknown"):
         data_files.derived_table(tmp_path / "a.txt", 1, {"t": "c9"}, False, 1, "")
 
@@ -257,7 +293,13 @@ SHIPPED = library.paths()
 
 def test_the_library_covers_the_field():
     waves = {"solitary-wave", "island-a", "monai", "stoker", "ritter", "thacker", "triangular-sill"}
-    networks = {"adelaide-severe", "tnet3-valve", "epanet-networks", "laminar-line-exact", "heated-pipe"}
+    networks = {
+        "adelaide-severe",
+        "tnet3-valve",
+        "epanet-networks",
+        "laminar-line-exact",
+        "heated-pipe",
+    }
     assert waves | networks | {"stiff-problems"} <= {*SHIPPED}
 
 
@@ -275,7 +317,9 @@ def test_files_of_shipped_validations_have_their_sums(name):
     assert data_files.missing_files(table, DATA) == []
 
 
-@pytest.mark.parametrize("name", ["stoker", "ritter", "single-pipe", "laminar-line-exact", "adelaide-moderate"])
+@pytest.mark.parametrize(
+    "name", ["stoker", "ritter", "single-pipe", "laminar-line-exact", "adelaide-moderate"]
+)
 def test_shipped_validations_without_files_are_within(name):
     assert library.validate_file(SHIPPED[name]).verdict == WITHIN
 
@@ -293,15 +337,24 @@ def test_the_page_has_a_figure_of_each_case_in_both_themes(tmp_path):
     assert exit_code("stoker", "--page", str(tmp_path / "page")) == 0
     page = (tmp_path / "page" / "index.md").read_text()
     for theme in ("light", "dark"):
-        assert f"(stoker-{theme}.png)" in page and (tmp_path / "page" / f"stoker-{theme}.png").stat().st_size > 5000
-    assert "Stoker 1957" in page and "within" in page and "| depth, mean error over mean depth |" in page
+        assert (
+            f"(stoker-{theme}.png)" in page
+            and (tmp_path / "page" / f"stoker-{theme}.png").stat().st_size > 5000
+        )
+    assert (
+        "Stoker 1957" in page
+        and "within" in page
+        and "| depth, mean error over mean depth |" in page
+    )
     assert "| - | 0 to 0.004 | - | within |" in page  # the gate of the case: at most 0.004
 
 
 def test_limits_contain_the_measured_value_and_the_margin():
     row = library.validate_file(SHIPPED["adelaide-moderate"]).rows[0]
     low, high = limits_of(row)
-    assert low < row.in_unit(row.row.measured["value"]) < high and low < row.in_unit(row.value) < high
+    assert (
+        low < row.in_unit(row.row.measured["value"]) < high and low < row.in_unit(row.value) < high
+    )
     assert low + high == pytest.approx(2.0 * row.in_unit(row.row.measured["value"]), rel=1e-12)
 
 
@@ -309,7 +362,11 @@ def test_long_cases_begin_first():
     grids = {"few": [10, 10], "many": [20, 20], "finer": [10, 10]}
     tables = {name: {"nodes": {"pool": {"cells": cells}}} for name, cells in grids.items()}
     tables["finer"]["validation"] = {"compare": [{"exact": {"resolution": 4}}]}
-    assert sorted(tables, key=lambda name: -library.cell_steps(tables[name])) == ["finer", "many", "few"]
+    assert sorted(tables, key=lambda name: -library.cell_steps(tables[name])) == [
+        "finer",
+        "many",
+        "few",
+    ]
     assert library.cell_steps({"nodes": {"main": {"cells": 100}}}) == 0.0
 
 

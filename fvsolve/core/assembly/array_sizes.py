@@ -24,7 +24,8 @@ class ArraySizes:
         self.first_mark = 0  # of those of features
         self.event_flags = 0
         self.feature_power = self.feature_stored = 0
-        self.reads_rates = False  # True if `out` depends on rates, also where they are not requested
+        # True if `out` depends on rates, also where they are not requested
+        self.reads_rates = False
         self.scratch: list[Callable[[int], int]] = []
         self.spare: list[Callable[[int], int]] = [lambda out: out]
         self.places = [0]
@@ -66,7 +67,11 @@ class ArraySizes:
     def place(self) -> np.ndarray:
         """Place all stretches; offsets in `out` : `kernels.dtypes.LAYOUT`[1], without work arrays."""
         layout, at = np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
-        for name, size in (("pressure", self.stretches[0][1]), *self.ledger_rows, *self.stretches[1:]):
+        for name, size in (
+            ("pressure", self.stretches[0][1]),
+            *self.ledger_rows,
+            *self.stretches[1:],
+        ):
             self.offsets[name], at = at, at + size
             if name in rec.LAYOUT.names:
                 layout[name] = self.offsets[name]

@@ -18,7 +18,9 @@ import numpy as np
 from fvsolve.declarations import Declaration, Declarations
 from fvsolve.errors import FvsolveError
 
-HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)')
+HEADER = re.compile(
+    r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)'
+)
 FEATURES = Declarations("feature", "features", ("features/*/feature.py",), HEADER)
 
 
@@ -54,14 +56,20 @@ def words_in(text: str) -> frozenset[str]:
 
 def wakes(header: Header, case, words: set[str]) -> bool:
     """True if a case has one of the words of a header; words : result of `words_of`"""
-    sections = [word.removeprefix("section ") for word in header.wakes if word.startswith("section ")]
+    sections = [
+        word.removeprefix("section ") for word in header.wakes if word.startswith("section ")
+    ]
     return bool(header.wakes & words) or any(getattr(case, name, None) for name in sections)
 
 
 def words_of(case) -> set[str]:
     """Words of a case that may wake features: "pipe_model NAME" for pipes, and those of each part, see `Part.words`."""
     common = case.numerics.pipe_model
-    models = {f"pipe_model {link.pipe_model or common}" for link in case.links.values() if link.kind == "pipe"}
+    models = {
+        f"pipe_model {link.pipe_model or common}"
+        for link in case.links.values()
+        if link.kind == "pipe"
+    }
     return models.union(*(part.words for part in (*case.nodes.values(), *case.links.values())))
 
 
@@ -176,7 +184,9 @@ class Feature:
     def grouped(self, draft, group: np.ndarray) -> None:
         """Continue when nodes are grouped; group : label of the group of each node."""
 
-    def join(self, draft, row, ports, places, toward=None, about=None) -> tuple[float, float] | None:
+    def join(
+        self, draft, row, ports, places, toward=None, about=None
+    ) -> tuple[float, float] | None:
         """Write to the row of a force element what it joins; None if the feature has no such parts.
 
         Returns the distance of the second part from the first at the start [m], and its rate [m/s]; for points
@@ -259,7 +269,9 @@ class Feature:
     def start(self, draft, y: np.ndarray) -> None:
         """Write the states of the feature at the start; those that it leaves are 0. Add notices on them."""
 
-    def level(self, draft, y: np.ndarray, attitudes: Callable[[], dict[str, np.ndarray]] | None = None) -> list[str]:
+    def level(
+        self, draft, y: np.ndarray, attitudes: Callable[[], dict[str, np.ndarray]] | None = None
+    ) -> list[str]:
         """Write the states of its fluid at rest on bodies to the states y of the model.
 
         Returns the names of the functions that compute the loads of this fluid, "module: function".
@@ -543,7 +555,9 @@ class FeatureRun:
         """Reason why a run failed, with a time not before `earliest` [s]; "" if the feature knows none."""
         return ""
 
-    def waves(self, t: float, out: np.ndarray, parts: int) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
+    def waves(
+        self, t: float, out: np.ndarray, parts: int
+    ) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
         """Yield both waves along the pipes of the feature, see `RunData.along`."""
         yield from ()
 
@@ -576,7 +590,9 @@ class FeatureRun:
 
 def with_slot(members: list[Any], slot: int) -> Any:
     """Feature with a slot, or its data of a run; None if the case does not have the feature."""
-    return next((member for member in members if getattr(member, "feature", member).slot == slot), None)
+    return next(
+        (member for member in members if getattr(member, "feature", member).slot == slot), None
+    )
 
 
 def frames_of(owner) -> list[str]:
@@ -586,4 +602,6 @@ def frames_of(owner) -> list[str]:
 
 def coordinate_of(owner, name: str) -> Coordinate:
     """Coordinate of a part that moves along a line, of a draft or a model."""
-    return next(found for feature in owner.features if (found := feature.coordinate(name)) is not None)
+    return next(
+        found for feature in owner.features if (found := feature.coordinate(name)) is not None
+    )

@@ -65,14 +65,20 @@ class Input(NamedTuple):
     scale: float = 1.0
     offset: float = 0.0
     node: int = -1  # node, for a pressure or head
-    parts: tuple[tuple[int, float, float], ...] = ()  # schedules with the values max(0, a * value + b), and a, b
+    # schedules with the values max(0, a * value + b), and a, b
+    parts: tuple[tuple[int, float, float], ...] = ()
     scalar: int = -1  # scalar whose value flows in
-    held: tuple[int, int] | None = None  # in place of a schedule: slot of a feature, and number of its value
+    # in place of a schedule: slot of a feature, and number of its value
+    held: tuple[int, int] | None = None
 
 
 def opening_input(model, name: str) -> dict[str, Input]:
     """Input "opening" of a restriction : key -> input."""
-    return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
+    return {
+        "opening": Input(
+            OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"])
+        )
+    }
 
 
 def scalar_inputs(model, name: str) -> dict[str, Input]:
@@ -86,7 +92,8 @@ def scalar_inputs(model, name: str) -> dict[str, Input]:
 
 
 TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
-LAMINAR_REYNOLDS = 10.0  # Reynolds number below which a restriction is made laminar, to bound its slope at zero drop
+# Reynolds number below which a restriction is made laminar, to bound its slope at zero drop
+LAMINAR_REYNOLDS = 10.0
 
 
 class Lowering:
@@ -150,7 +157,9 @@ class Lowering:
         """Pressure [Pa] that node i keeps in the steady start; None if the flows determine it."""
         return None
 
-    def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+    def motion_text(
+        self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]
+    ) -> str:
         """Text of the change that a net inflow causes at the start; "" for none.
 
         inflow, flow : the net inflow [kg/s], and as volume flow [m3/s]; amount : formats numbers in the units of
@@ -226,7 +235,8 @@ class Restriction(Lowering):
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        per, step = math.sqrt(TYPICAL_DROP / (g * density_ratio)), self.stepper(start, k, g, density_ratio)
+        per = math.sqrt(TYPICAL_DROP / (g * density_ratio))
+        step = self.stepper(start, k, g, density_ratio)
 
         def newton(flow, present):
             a, s = step(flow, present * drive_ratio)
@@ -241,7 +251,9 @@ class Restriction(Lowering):
         g : conductance [kg2/s2/Pa]; density_ratio : upstream density over reference density
         """
         hook = calls.function_address(self.law.step, calls.HOOKS["step"][0])
-        return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio)
+        return lambda flow, drop: step_at(
+            hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio
+        )
 
     def follow(self, start, k: int) -> None:
         """Set the steady drop of valve k to the drop that belongs to its flow by its own law.
@@ -314,7 +326,8 @@ class Device(Restriction):
     remedy: ClassVar[str] = "give the part a time_constant"
     vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
     follows_at_once: bool = True  # False if only the rates of its states depend on its schedule
-    regular: ClassVar[bool] = False  # True if a flow law of its own is laminar near zero drop, see `regularise`
+    # True if a flow law of its own is laminar near zero drop, see `regularise`
+    regular: ClassVar[bool] = False
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
@@ -324,7 +337,9 @@ class Device(Restriction):
         """Stated pressure [Pa] of a vessel at the start; None if it has none."""
         return node.initial_pressure
 
-    def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+    def motion_text(
+        self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]
+    ) -> str:
         """Text of the rate of change of the pressure in a vessel that a net inflow causes at the start.
 
         Arguments as for `Lowering.motion_text`.
@@ -345,7 +360,9 @@ class Device(Restriction):
 
     def row_of(self, model, name: str):
         """DEVICE row of the part `name`."""
-        return model.tables.devices[[device_name for device_name, _, _ in model.devices].index(name)]
+        return model.tables.devices[
+            [device_name for device_name, _, _ in model.devices].index(name)
+        ]
 
     def probe(self, draft, name: str, probe: Any, row) -> None:
         """Fill the PROBE row of a probe of this part."""
@@ -427,7 +444,9 @@ class Device(Restriction):
         """True if drop times flow in its restriction is dissipated; otherwise it is energy supplied."""
         return True
 
-    def energy_rows(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
+    def energy_rows(
+        self, model, part: Any, row, y: np.ndarray, out: np.ndarray
+    ) -> list[dict[int, float]]:
         """Rows of the energy matrix L that this part adds, each state -> factor.
 
         |L d|^2 is the energy [J] that a small deviation d of the states from y stores in the part. For a vessel the
@@ -458,11 +477,14 @@ def lower_devices(draft) -> None:
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
         row["data"], row["opens_by_event"] = len(draft.floats), device.events_only
         row["event"] = draft.flags(name, device.events)
-        row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
+        row["controls_column"] = (
+            row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
+        )
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
             for valve in draft.valve_table[row["valve"] :][: device.rows]:
-                valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1  # it sets the opening
+                # it sets the opening
+                valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
                 valve["event"] = row["event"] if device.events else -1
                 valve["data"] = row["data"] if valve["data"] < 0 else valve["data"]
         elif name in draft.node_index:

@@ -47,7 +47,8 @@ class MeshedPart:
     first_state: int
     forms_stages: bool = False
     margin: ClassVar[int] = 0
-    full_rate: float = 0.0  # greatest possible rate of its waves where that is known, which limits steps [1/s]
+    # greatest possible rate of its waves where that is known, which limits steps [1/s]
+    full_rate: float = 0.0
 
     def deviations(self, y: np.ndarray) -> np.ndarray:
         """Deviations of quantities of cells from rest at the states y of the model : float64[quantities, n]."""

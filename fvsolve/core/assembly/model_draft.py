@@ -20,7 +20,8 @@ from fvsolve.core.kernels import tanks
 from fvsolve.core.kernels.steady_friction import signed_roughness
 from fvsolve.errors import CaseError, Fault, Notice
 
-HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685  # h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
+# h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
+HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685
 MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3), SI
 
 
@@ -29,7 +30,11 @@ class Hydraulics:
 
     def __init__(self, case) -> None:
         self.case, self.fluid = case, case.properties
-        self.rho, self.gravity, self.ambient = self.fluid.density, case.gravity, case.ambient_pressure
+        self.rho, self.gravity, self.ambient = (
+            self.fluid.density,
+            case.gravity,
+            case.ambient_pressure,
+        )
 
     def add_head(self, schedules, head, row) -> int:
         """Add a schedule of head [m] as pressure [Pa] at the elevation of a node's row; return its index.
@@ -51,24 +56,37 @@ class Hydraulics:
         from the starting flow. Adds a fault if the law needs a viscosity and the fluid has none.
         """
         area = math.pi / 4.0 * link.diameter**2
-        law, row["loss"] = link.friction, link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area
+        law, row["loss"] = (
+            link.friction,
+            link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area,
+        )
         per_factor = 1.0 / (2.0 * link.diameter * self.rho * area)
         row["friction"] = rec.FRICTION_NONE if row["loss"] == 0.0 else rec.FRICTION_FACTOR
         if law.model == "none":
             return
         if law.model == "unsteady" and not self.fluid.viscosity:
-            fault(f"links.{name}.friction", '"unsteady" needs the fluid\'s viscosity; give the key `fluid.viscosity`')
+            fault(
+                f"links.{name}.friction",
+                '"unsteady" needs the fluid\'s viscosity; give the key `fluid.viscosity`',
+            )
             return
         if law.model == "hazen-williams":
             row["friction"] = rec.FRICTION_HAZEN
             row["rough"] = (
-                area * self.rho * self.gravity * HAZEN_WILLIAMS
+                area
+                * self.rho
+                * self.gravity
+                * HAZEN_WILLIAMS
                 / (self.rho**1.852 * law.coefficient**1.852 * link.diameter**4.871)
-            )  # fmt: skip
+            )
         elif law.model == "chezy-manning":
             row["friction"] = rec.FRICTION_FACTOR
             row["loss"] += (
-                area * self.gravity * MANNING * law.coefficient**2 / (self.rho * link.diameter ** (16.0 / 3.0))
+                area
+                * self.gravity
+                * MANNING
+                * law.coefficient**2
+                / (self.rho * link.diameter ** (16.0 / 3.0))
             )
         elif law.factor is not None:
             row["friction"] = rec.FRICTION_FACTOR
@@ -99,10 +117,14 @@ class Hydraulics:
         growth = self.case.law.compliance(speed)
         if growth < -1e-9 / self.fluid.bulk_modulus:
             given, sound = (
-                self.case.amount(speed_value, "velocity", 6) for speed_value in (speed, self.fluid.sound_speed)
+                self.case.amount(speed_value, "velocity", 6)
+                for speed_value in (speed, self.fluid.sound_speed)
             )
-            fault(f"links.{name}.wave_speed", f"{given} is faster than sound in the fluid, {sound}; expected at most "
-                  'the speed of sound, or law = "linear"')  # fmt: skip
+            fault(
+                f"links.{name}.wave_speed",
+                f"{given} is faster than sound in the fluid, {sound}; expected at most "
+                'the speed of sound, or law = "linear"',
+            )
         return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
@@ -121,12 +143,16 @@ class Hydraulics:
         viscosity = self.fluid.viscosity
         if not viscosity:
             if link.laminar_reynolds is not None:
-                fault(f"links.{name}.laminar_reynolds", "needs the fluid's viscosity; give the key `fluid.viscosity`")
+                fault(
+                    f"links.{name}.laminar_reynolds",
+                    "needs the fluid's viscosity; give the key `fluid.viscosity`",
+                )
             viscosity = 1e-6 * self.rho  # water's: it only bounds the slope at zero drop
         return reynolds * math.pi / 4.0 * diameter * viscosity
 
 
-ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
+# a sum of forces of a joint below this share of their magnitudes is rounding
+ROUNDING_SHARE = 1e-12
 # likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
 EQUILIBRIUM_SHARE = 1e-9
 CACHE_LINE = 8  # floats of a cache line
@@ -205,7 +231,8 @@ class ModelDraft:
     # states
     size: int = 0
     state_names: StateNames = field(default_factory=StateNames)
-    scale: array = field(default_factory=lambda: array("d"))  # size of a small deviation of each state
+    # size of a small deviation of each state
+    scale: array = field(default_factory=lambda: array("d"))
     cells: int = 0  # cells of pipes
     tanks: int = 0
     moving: int = 0  # nodes whose pressure follows their mass by a variable stiffness
@@ -219,8 +246,10 @@ class ModelDraft:
     valve_names: list[str] = field(default_factory=list)
     wall_names: list[str] = field(default_factory=list)
     devices: list[tuple] = field(default_factory=list)  # (name, part, lowering)
-    laws: list[str] = field(default_factory=list)  # modules of compiled laws, in the order of the rows of `hooks`
-    events: list[tuple[str, str]] = field(default_factory=list)  # (name, meaning); "" if an event is not reported
+    # modules of compiled laws, in the order of the rows of `hooks`
+    laws: list[str] = field(default_factory=list)
+    # (name, meaning); "" if an event is not reported
+    events: list[tuple[str, str]] = field(default_factory=list)
     meshes: list[PipeMesh] = field(default_factory=list)
     # table -> links with rows in it, see `assembly.lowering.links_by_table`
     links: dict[str, list[tuple]] = field(default_factory=dict)
@@ -246,13 +275,15 @@ class ModelDraft:
     wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
-    start_flags: dict[int, bool] = field(default_factory=dict)  # event flags at the start that no state tells
+    # event flags at the start that no state tells
+    start_flags: dict[int, bool] = field(default_factory=dict)
 
     # results of the start
     tables: Any = None  # all tables, as kernels read them
     shapes: Any = None  # shapes of the arrays that runs write
     watched_start: np.ndarray = field(default_factory=lambda: np.zeros(0))  # see `Model`
-    profiles: dict[int, np.ndarray] = field(default_factory=dict)  # pipe -> pressure of the profile at centres [Pa]
+    # pipe -> pressure of the profile at centres [Pa]
+    profiles: dict[int, np.ndarray] = field(default_factory=dict)
     steady: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -273,8 +304,11 @@ class ModelDraft:
         """
         copy = object.__new__(ModelDraft)
         # numpy would copy records field by field, so tables are copied as bytes
-        tables = {id(source): np.ndarray(source.shape, source.dtype, bytearray(source.tobytes()))
-                  for source in self.tables if source.flags.writeable}  # fmt: skip
+        tables = {
+            id(source): np.ndarray(source.shape, source.dtype, bytearray(source.tobytes()))
+            for source in self.tables
+            if source.flags.writeable
+        }
         for name in self.__slots__:
             value = getattr(self, name)
             if isinstance(value, np.ndarray):
@@ -287,7 +321,9 @@ class ModelDraft:
         copy.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
         copy.warnings = [*case.notices, *self.warnings[len(self.case.notices) :]]
         for table, entries in self.links.items():
-            copy.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in entries]
+            copy.links[table] = [
+                (name, case.links.get(name, link), lowering) for name, link, lowering in entries
+            ]
         return copy
 
     @property
@@ -308,13 +344,17 @@ class ModelDraft:
         scale : size of a small deviation, a number for all of them or a list with one for each
         """
         self.state_names.add(names)
-        self.scale += array("d", scale) if isinstance(scale, list) else array("d", [scale]) * len(names)
+        self.scale += (
+            array("d", scale) if isinstance(scale, list) else array("d", [scale]) * len(names)
+        )
         self.size += len(names)
         return self.size - len(names)
 
     def to_plane(self, values: np.ndarray) -> int:
         """Append values to `plane`, the constant data of meshes, at the start of a cache line; return their offset."""
-        self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % CACHE_LINE)))
+        self.pieces_of_plane.append(
+            np.append(np.ravel(values), np.zeros(-values.size % CACHE_LINE))
+        )
         self.plane_size += self.pieces_of_plane[-1].size
         return self.plane_size - self.pieces_of_plane[-1].size
 
@@ -370,7 +410,9 @@ class ModelDraft:
         names = RowNames(name for name, _, lowering in parts for _ in range(lowering.rows))
         table_rows, at = np.zeros(len(names), record), 0
         if table == "valve":
-            table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
+            table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows[
+                "event"
+            ] = -1
             table_rows["command"] = table_rows["hold"] = -1
             table_rows["back"] = 1.0
         if "forcing" in record.names:
@@ -380,9 +422,15 @@ class ModelDraft:
             at += lowering.rows
         return names, table_rows
 
-    def join(self, row, ports: tuple[str, str], places: tuple[str | None, str], **line) -> tuple[float, float]:
+    def join(
+        self, row, ports: tuple[str, str], places: tuple[str | None, str], **line
+    ) -> tuple[float, float]:
         """Write to the row of a force element what it joins, see `Feature.join`."""
-        return next(found for feature in self.features if (found := feature.join(self, row, ports, places, **line)))
+        return next(
+            found
+            for feature in self.features
+            if (found := feature.join(self, row, ports, places, **line))
+        )
 
     def ends(self, link, row) -> None:
         """Write the indices of the nodes at both ends of a link to its row."""
@@ -400,4 +448,6 @@ class ModelDraft:
         """
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area(self.fluid.density) ** 2
         if link.laminar_reynolds is not None:
-            row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)
+            row["transition"] = self.hydraulics.transition_flow(
+                name, link, link.laminar_reynolds, self.fault
+            )

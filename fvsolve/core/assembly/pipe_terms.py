@@ -17,7 +17,8 @@ MAX_TERMS = 40
 # Allowed error at w: 2 (w / top)^3, at most 0.3; last w over top
 ERROR_FACTOR, MAX_ERROR, LAST_FREQUENCY = 2.0, 0.3, 0.7
 SLOWEST_DECAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4)  # slowest decay over the lowest frequency
-FLAT_FREQUENCY = 4.0  # frequency below which the transform of Zielke's function is nearly its value at zero, 1/12
+# frequency below which the transform of Zielke's function is nearly its value at zero, 1/12
+FLAT_FREQUENCY = 4.0
 MAX_ZEROS = 8  # greatest number of zeros of J_2 that are used as exact decays
 
 
@@ -63,9 +64,12 @@ def terms(
     top = max(top, 512.0) if weighting == "zielke" else top
     highest = top * (accuracy / ERROR_FACTOR) ** (1.0 / 3.0)
     if weighting == "zielke":
-        return *fit("zielke", top, max(_power_of_two(1.0 / span), FLAT_FREQUENCY), accuracy), highest
+        return *fit(
+            "zielke", top, max(_power_of_two(1.0 / span), FLAT_FREQUENCY), accuracy
+        ), highest
     a, b = vardy_brown(reynolds, roughness)
-    m, n = fit("root", top, _power_of_two(max(1.0 / span, 0.25 * b)), accuracy)  # along s = B* + i w, then shifted
+    # along s = B* + i w, then shifted
+    m, n = fit("root", top, _power_of_two(max(1.0 / span, 0.25 * b)), accuracy)
     return a * math.sqrt(math.pi) * m, n + b, highest
 
 
@@ -86,14 +90,19 @@ def fit(transform: str, top: float, low: float, accuracy: float) -> tuple[np.nda
     transform : "zielke" or "root" (`inverse_root`)
     """
     exact, heads = (zielke, _zeros()) if transform == "zielke" else (inverse_root, [np.zeros(0)])
-    w = np.geomspace(min(low, 0.01 * top), LAST_FREQUENCY * top, 32 + int(10 * math.log(max(top / low, 4.0))))
-    value, tolerance = exact(1j * w), np.maximum(accuracy, np.minimum(ERROR_FACTOR * (w / top) ** 3, MAX_ERROR))
+    w = np.geomspace(
+        min(low, 0.01 * top), LAST_FREQUENCY * top, 32 + int(10 * math.log(max(top / low, 4.0)))
+    )
+    value = exact(1j * w)
+    tolerance = np.maximum(accuracy, np.minimum(ERROR_FACTOR * (w / top) ** 3, MAX_ERROR))
     for count in range(2, MAX_TERMS + 1):
         fits = (_weights(w, value, tolerance, n) for n in _decays(heads, w[0], top, count))
         error, m, n = min(fits, key=lambda candidate: candidate[0])
         if error <= 1.0:
             return m[m > 0.0], n[m > 0.0]
-    raise ArithmeticError(f"no sum of {MAX_TERMS} exponentials reaches an accuracy of {accuracy:g}")  # pragma: no cover
+    raise ArithmeticError(
+        f"no sum of {MAX_TERMS} exponentials reaches an accuracy of {accuracy:g}"
+    )  # pragma: no cover
 
 
 def _zeros() -> list[np.ndarray]:
@@ -114,7 +123,9 @@ def _decays(starts, low: float, top: float, count: int):
             yield from (np.geomspace(bottom * low, top, count) for bottom in SLOWEST_DECAYS)
         elif given.size < count and given[-1] < top:
             first = given[-1] * (1.0 + 1.3 / (given.size + 0.5))
-            yield np.concatenate([given, np.geomspace(first, max(top, 1.01 * first), count - given.size)])
+            yield np.concatenate(
+                [given, np.geomspace(first, max(top, 1.01 * first), count - given.size)]
+            )
 
 
 def _weights(w, value, tolerance, n):
@@ -145,7 +156,9 @@ def add_terms(draft) -> dict[str, dict]:
     The rate that limits explicit steps is increased where terms need it. Adds a fault if the weighting function needs a
     flow at the start, or if no sum of exponentials is accurate enough.
     """
-    facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
+    facts = {}
+    settings = draft.tables.settings[0]
+    floats = draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid
     for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
         law = draft.case.links[name].friction
@@ -156,12 +169,17 @@ def add_terms(draft) -> dict[str, dict]:
         weighting = law.weighting or ("zielke" if reynolds < LAMINAR else "vardy-brown")
         if weighting == "vardy-brown" and reynolds == 0.0:
             reason = "vardy-brown needs the Reynolds number of the start, but there is no flow"
-            draft.fault(f"links.{name}.friction.weighting", f"{reason}; expected an initial flow, or `zielke`")
+            draft.fault(
+                f"links.{name}.friction.weighting",
+                f"{reason}; expected an initial flow, or `zielke`",
+            )
             continue
         cell, span = unit * row["dx"] / row["speed"], unit * (numerics.end - numerics.start)
         accuracy = ACCURACY if law.accuracy is None else law.accuracy
         try:
-            m, n, highest = terms(weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy)
+            m, n, highest = terms(
+                weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy
+            )
         except ArithmeticError as error:
             text = f"{error}; try a greater number for `accuracy`, or more cells"
             draft.fault(f"links.{name}.friction.accuracy", text)
@@ -176,9 +194,12 @@ def add_terms(draft) -> dict[str, dict]:
         fastest = float(max(waves, 0.5 * rate[-1]) + 0.5 * gain.sum())
         settings["rate"] = max(settings["rate"], fastest)
         facts[name] = {
-            "weighting": weighting, "terms": m.size, "accuracy": accuracy, "rate": fastest,
+            "weighting": weighting,
+            "terms": m.size,
+            "accuracy": accuracy,
+            "rate": fastest,
             "frequency": highest * unit / (2.0 * math.pi),
-        }  # fmt: skip
+        }
     return facts
 
 
@@ -197,7 +218,10 @@ def add_creep(draft, name: str, link, row) -> None:
         return
     place = f"links.{name}.wall.creep"
     if draft.case.scalars:
-        draft.fault(place, "takes up liquid, whose scalars are not computed; remove either the scalars or the creep")
+        draft.fault(
+            place,
+            "takes up liquid, whose scalars are not computed; remove either the scalars or the creep",
+        )
     if any(getattr(draft.case.places[end], "on", None) for end in link.ports.values()):
         draft.fault(place, "is not supported for a pipe on a body; remove the creep")
     numbers = np.column_stack(gains(link, draft.fluid.density, float(row["speed"])))

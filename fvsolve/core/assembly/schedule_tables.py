@@ -20,9 +20,11 @@ from fvsolve.core.kernels.schedule_pieces import (
 
 STEPS_PER_PERIOD = 8  # least number of steps in a period
 SMALL_MOVE = 1e-9  # change of a formula between two samples that is rounding, over its range
-SAMPLES_IN_HALF_WAVE, LEVELS = 4, 6  # samples that show a wave; divisions of a run in search of short waves
+# samples that show a wave; divisions of a run in search of short waves
+SAMPLES_IN_HALF_WAVE, LEVELS = 4, 6
 SAMPLED = 32  # schedules with more entries are samples of a smooth function
-SAMPLE_KINK = 0.2  # for samples, change of slope, relative to the greatest slope, at which a step must end
+# for samples, change of slope, relative to the greatest slope, at which a step must end
+SAMPLE_KINK = 0.2
 
 
 @dataclass
@@ -35,7 +37,8 @@ class Schedules:
     span: tuple[float, float] = (0.0, 0.0)
 
     blocks: dict[str, int] = field(default_factory=dict)
-    events: list[tuple[str, str]] = field(default_factory=list)  # those of the model, as for `ModelDraft`
+    # those of the model, as for `ModelDraft`
+    events: list[tuple[str, str]] = field(default_factory=list)
     stack: int = 1  # size of the work array of formulas
     records: list[tuple[int, int]] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
@@ -86,7 +89,10 @@ class Schedules:
         first, count = self.records[index]
         if schedule.kind == "harmonic":
             self.rows[first][1] = CREST
-            self.breaks |= {time: self.breaks.get(time, False) for time in wave_roots(self.rows[first], self.span)}
+            self.breaks |= {
+                time: self.breaks.get(time, False)
+                for time in wave_roots(self.rows[first], self.span)
+            }
             return index
         rows, crossings = positive_part(np.array(self.rows[first : first + count]))
         self.rows[first:], self.records[index] = rows, (first, len(rows))
@@ -112,7 +118,9 @@ class Schedules:
         self.spacing = min(self.spacing, period_of(schedule.program, *self.span) / STEPS_PER_PERIOD)
         return len(self.records) - 1
 
-    def add_program(self, program, scale: float = 1.0, offset: float = 0.0, located: bool = True) -> int:
+    def add_program(
+        self, program, scale: float = 1.0, offset: float = 0.0, located: bool = True
+    ) -> int:
         """Add the steps of a formula, and its event functions if its kinks are `located`; return its header row."""
         first, flag = len(self.rows), len(self.events)
         self.rows += program.rows(scale, offset, flag, FORMULA)
@@ -127,7 +135,9 @@ class Schedules:
         """
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
         rows[rows[:, 1] == FORMULA, FLAG] += flags
-        return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
+        return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(
+            SCHEDULE
+        ), rows
 
 
 def period_of(program, start: float, end: float) -> float:
@@ -139,7 +149,8 @@ def period_of(program, start: float, end: float) -> float:
     for _ in range(LEVELS):
         times, values = program.samples(start, end)
         change = np.diff(values)
-        moves = np.flatnonzero(np.abs(change) > SMALL_MOVE * np.ptp(values))  # the ends of plateaus are no turns
+        # the ends of plateaus are no turns
+        moves = np.flatnonzero(np.abs(change) > SMALL_MOVE * np.ptp(values))
         turns = times[moves[1:][np.diff(np.sign(change[moves])) != 0.0]]
         if turns.size < 2:
             break
@@ -194,7 +205,9 @@ def schedule_pieces(schedule) -> np.ndarray:
         return np.array([*hold, [t[0], 1, t[0], v[0], v[1], span, schedule.exponent], *last])
     if schedule.kind == "step":
         none = np.zeros(len(t) - 1)
-        return np.concatenate([hold, np.column_stack([t[1:], none, t[1:], v[1:], none, none, none])])
+        return np.concatenate(
+            [hold, np.column_stack([t[1:], none, t[1:], v[1:], none, none, none])]
+        )
     if schedule.kind == "linear":
         slope, none = np.diff(v) / np.diff(t), np.zeros(len(t) - 1)
         inner = np.column_stack([t[:-1], none, t[:-1], v[:-1], slope, none, none])
@@ -238,7 +251,11 @@ def break_times(schedule) -> list[tuple[float, bool]]:
     else:
         change = np.diff(np.concatenate(([0.0], slope, [0.0])))
     least = (SAMPLE_KINK if len(t) > SAMPLED else 1e-9) * np.max(np.abs(slope), initial=0.0)
-    return [(float(time), False) for time, slope_change in zip(t, change, strict=True) if abs(slope_change) > least]
+    return [
+        (float(time), False)
+        for time, slope_change in zip(t, change, strict=True)
+        if abs(slope_change) > least
+    ]
 
 
 def piece_slope(piece: np.ndarray, t: float) -> float:
@@ -252,7 +269,11 @@ def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
     rows, crossings = [], []
     for k, piece in enumerate(pieces):
         start, end = piece[0], pieces[k + 1, 0] if k + 1 < len(pieces) else np.inf
-        tolerance = 1e-12 * max(abs(start), abs(end), end - start) if np.isfinite([start, end]).all() else 0.0
+        tolerance = (
+            1e-12 * max(abs(start), abs(end), end - start)
+            if np.isfinite([start, end]).all()
+            else 0.0
+        )
         inside = [t for t in piece_roots(piece) if start + tolerance < t < end - tolerance]
         crossings += inside
         for low, high in zip([start, *inside], [*inside, end], strict=True):
@@ -272,7 +293,8 @@ def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
     for angle in (up, np.pi - up):
         first, last = ((frequency * t + phase - angle) / (2.0 * np.pi) for t in span)
         roots += [
-            (angle - phase + 2.0 * np.pi * k) / frequency for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
+            (angle - phase + 2.0 * np.pi * k) / frequency
+            for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
         ]
     return sorted(roots)
 
@@ -292,6 +314,10 @@ def piece_roots(piece: np.ndarray) -> list[float]:
     """
     if piece[1] == 1:
         v0, v1, duration, exponent = piece[3:]
-        return [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))] if v0 * v1 < 0.0 else []
+        return (
+            [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))]
+            if v0 * v1 < 0.0
+            else []
+        )
     roots = np.roots(piece[:2:-1]) if np.any(piece[4:]) else np.zeros(0)
     return sorted(piece[2] + float(s.real) for s in roots if abs(s.imag) <= 1e-9 * abs(s))

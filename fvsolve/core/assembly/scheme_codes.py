@@ -33,7 +33,9 @@ def code_of_limiter(limiter: str, user: str = "") -> int:
     except Exception as error:
         if not type(error).__module__.startswith("numba."):
             raise
-        reason = next((line.strip() for line in str(error).splitlines()[1:] if line.strip()), str(error))
+        reason = next(
+            (line.strip() for line in str(error).splitlines()[1:] if line.strip()), str(error)
+        )
         raise FvsolveError(
             f"numerics.limiter: the function of {limiter} cannot be compiled: {reason.rstrip('.')}; expected a "
             "function of a float that returns a float, and uses numbers, math and numpy only"
@@ -101,10 +103,17 @@ def cells_around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
     opposite direction reads the same value.
     """
     middle = x - 0.5 * (degree + 1)
-    firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE_TOLERANCE, TIE_TOLERANCE)})
+    firsts = sorted(
+        {
+            int(np.clip(round(middle + side), 0, n - degree - 1))
+            for side in (-TIE_TOLERANCE, TIE_TOLERANCE)
+        }
+    )
     weights = np.zeros(firsts[-1] - firsts[0] + degree + 1)
     for first in firsts:
-        weights[first - firsts[0] :][: degree + 1] += reading_weights(x - first, degree) / len(firsts)
+        weights[first - firsts[0] :][: degree + 1] += reading_weights(x - first, degree) / len(
+            firsts
+        )
     return firsts[0], weights
 
 

@@ -59,7 +59,11 @@ class StateNames(Sequence):
         return (name for part in self.parts for name in part)
 
     def __eq__(self, other) -> bool:
-        return isinstance(other, Sequence) and len(other) == self.count and all(map(str.__eq__, self, other))
+        return (
+            isinstance(other, Sequence)
+            and len(other) == self.count
+            and all(map(str.__eq__, self, other))
+        )
 
     __hash__ = None
 

@@ -20,7 +20,9 @@ from fvsolve.units import Kinematic
 
 __all__ = ["LAWS", "Fluid", "FluidTable", "follow_temperature", "properties", "specific_heat"]
 
-USER = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user")
+USER = dict(
+    density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user"
+)
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,15 @@ class Fluid:
 
     def plain(self) -> dict[str, Any]:
         """Name, properties in SI and their source, as a dict for JSON."""
-        keys = ("name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source")
+        keys = (
+            "name",
+            "density",
+            "bulk_modulus",
+            "sound_speed",
+            "viscosity",
+            "vapor_pressure",
+            "source",
+        )
         return {key: getattr(self, key) for key in keys}
 
 
@@ -83,7 +93,12 @@ def properties(
     equals the law `log` without them
     Raises FluidError with the key at fault.
     """
-    given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
+    given = dict(
+        density=density,
+        bulk_modulus=bulk_modulus,
+        viscosity=viscosity,
+        vapor_pressure=vapor_pressure,
+    )
     given = {key: float(value) for key, value in given.items() if value is not None}
     state = dict(temperature=float(temperature), pressure=float(pressure))
     _check_numbers(given | state, law)
@@ -120,14 +135,21 @@ def follow_temperature(fluid: Fluid, points: tuple[tuple[float, float], ...]) ->
 
     points : (temperature [K], viscosity, dynamic [Pa s] or `Kinematic` [m2/s]). Raises FluidError.
     """
-    kinematic = [(t, float(nu) if isinstance(nu, Kinematic) else nu / fluid.density) for t, nu in points]
+    kinematic = [
+        (t, float(nu) if isinstance(nu, Kinematic) else nu / fluid.density) for t, nu in points
+    ]
     found = tuple(kinematic) or walther_points(fluid.name)
     if not found:
         text = 'the law needs two points of this fluid, points = [["40 degC", "46 cSt"], ["100 degC", "6.8 cSt"]]'
         raise FluidError("viscosity", text)
     numbers = walther_numbers(found)
     viscosity = fluid.density * walther_viscosity(numbers, fluid.temperature)
-    return replace(fluid, walther=numbers, viscosity=viscosity, source=f"{fluid.source}; viscosity by ASTM D341")
+    return replace(
+        fluid,
+        walther=numbers,
+        viscosity=viscosity,
+        source=f"{fluid.source}; viscosity by ASTM D341",
+    )
 
 
 def specific_heat(name: str, temperature: float, pressure: float) -> float:
@@ -138,7 +160,11 @@ def specific_heat(name: str, temperature: float, pressure: float) -> float:
     name = oil_name(name) or name
     if name == "user":
         raise FluidError("specific_heat", 'heat without specific heat: a "user" fluid has none')
-    return oil_specific_heat(temperature) if name in OILS else cached_specific_heat(name, temperature, pressure)
+    return (
+        oil_specific_heat(temperature)
+        if name in OILS
+        else cached_specific_heat(name, temperature, pressure)
+    )
 
 
 def _look_up(name: str, law: str, temperature: float, pressure: float) -> dict:

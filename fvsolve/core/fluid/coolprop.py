@@ -56,7 +56,10 @@ class FluidTable:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FluidTable):
             return NotImplemented
-        return all(np.array_equal(a, b) for a, b in zip(vars(self).values(), vars(other).values(), strict=True))
+        return all(
+            np.array_equal(a, b)
+            for a, b in zip(vars(self).values(), vars(other).values(), strict=True)
+        )
 
     def __hash__(self) -> int:
         return hash((self.error, self.pressure.size))
@@ -85,12 +88,19 @@ class FluidTable:
 def hermite_at(grid, values, slopes, at):
     """Cubic Hermite interpolant at the abscissas `at`, from values and slopes (derivatives) on a uniform grid."""
     step = grid[1] - grid[0]
-    k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
-                len(grid) - 2)  # fmt: skip
+    k = np.clip(
+        ((at - grid[0]) / step).astype(int)
+        if hasattr(at, "astype")
+        else int((at - grid[0]) / step),
+        0,
+        len(grid) - 2,
+    )
     s = (at - grid[k]) / step
     r = 1.0 - s
     rise = values[k + 1] - values[k]
-    return values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
+    return (
+        values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
+    )
 
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
@@ -101,7 +111,9 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     name : name of the fluid for messages
     Raises FluidError if the state is not liquid, or if the table is not accurate enough.
     """
-    temperature, pressure, entropy = state.T(), state.p(), state.smass()
+    temperature = state.T()
+    pressure = state.p()
+    entropy = state.smass()
     if not 0.0 < vapor_pressure < pressure:
         text = f'"table" needs a liquid, and {name} is not liquid at this temperature and pressure'
         raise FluidError("law", f'{text}; use "linear" or "log"')
@@ -114,7 +126,8 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
             table = _tabulate(state, span, intervals, temperature, entropy)
     except ValueError as error:
         raise FluidError(
-            "law", f'"table" cannot be computed for {name} at these `temperature` and `pressure` ({error}); use "log"'
+            "law",
+            f'"table" cannot be computed for {name} at these `temperature` and `pressure` ({error}); use "log"',
         ) from None
     if table.error > MAX_ERROR or not _monotone(table):
         text = f'"table" of {name} has a relative error of {table.error:.1g}, near its critical point; use "log"'
@@ -137,7 +150,9 @@ def _reach(state: Any, temperature: float, pressure: float) -> float:
     return min(limits)
 
 
-def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature: float, entropy: float) -> FluidTable:
+def _tabulate(
+    state: Any, span: tuple[float, float], intervals: int, temperature: float, entropy: float
+) -> FluidTable:
     grid = np.linspace(*span, 2 * intervals + 1)
     log_density, compressibility = _march(state, grid, temperature, entropy)
     f, d = log_density[::2], compressibility[::2]
@@ -146,7 +161,9 @@ def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature
     return FluidTable(np.linspace(*span, intervals + 1), f, d, error)
 
 
-def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> tuple[np.ndarray, np.ndarray]:
+def _march(
+    state: Any, grid: np.ndarray, temperature: float, entropy: float
+) -> tuple[np.ndarray, np.ndarray]:
     """(ln rho, 1 / (rho a^2) [1/Pa]) on the isentrope of `entropy` at the pressures of `grid` [Pa] : two float64[n].
 
     At each pressure the temperature follows by Newton iteration from that of the previous pressure, with ds/dT = cp/T.
@@ -261,7 +278,8 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
     """Write properties to a cache file atomically; do nothing if the folder cannot be written. key : as for `_read`"""
     body = json.dumps(
-        [key, properties], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
+        [key, properties],
+        default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item),
     )
     text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
     try:
@@ -285,7 +303,8 @@ def coolprop_properties(name: str, temperature: float, pressure: float, law: str
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
         raise FluidError(
-            "name", f'"{name}" has an unknown prefix; expected a CoolProp fluid without a prefix, or "INCOMP::..."'
+            "name",
+            f'"{name}" has an unknown prefix; expected a CoolProp fluid without a prefix, or "INCOMP::..."',
         )
     if backend == "INCOMP":
         return _incompressible_properties(name, temperature, pressure)
@@ -298,7 +317,9 @@ def _pure_properties(name: str, temperature: float, pressure: float, law: str) -
     state = _pure_state(name)
     _check_range(state, name, temperature, pressure)
     vapor_pressure = _vapor_pressure(state, temperature)
-    values = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
+    values = dict(
+        density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None
+    )
     if pressure <= vapor_pressure:
         return values
     try:
@@ -337,7 +358,9 @@ def _suggestion(name: str) -> str:
         return f'; did you mean "INCOMP::{name}"?'
     if name.startswith("INCOMP::"):
         return did_you_mean(name, [f"INCOMP::{oil}" for oil in oils])
-    aliases = ",".join(CoolProp.get_fluid_param_string(fluid, "aliases") for fluid in pure).split(",")
+    aliases = ",".join(CoolProp.get_fluid_param_string(fluid, "aliases") for fluid in pure).split(
+        ","
+    )
     return did_you_mean(name, ["user", *OILS, *filter(None, aliases), *pure])
 
 
@@ -353,17 +376,23 @@ def _check_range(state: Any, name: str, temperature: float, pressure: float) -> 
 
     _check_temperature(name, temperature, state.Tmin(), state.Tmax())
     if pressure > state.pmax():
-        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, up to {state.pmax():g} Pa")
+        raise FluidError(
+            "pressure", f"{pressure:g} Pa is above the range of {name}, up to {state.pmax():g} Pa"
+        )
     melting = value_or_none(lambda: state.melting_line(CoolProp.iT, CoolProp.iP, pressure))
     if melting is not None and temperature < melting:
         where = f"{celsius(temperature)} and {pressure:g} Pa"
-        raise FluidError("temperature", f"{name} is solid at {where}; it melts at {celsius(melting)}")
+        raise FluidError(
+            "temperature", f"{name} is solid at {where}; it melts at {celsius(melting)}"
+        )
 
 
 def _check_temperature(name: str, temperature: float, least: float, greatest: float) -> None:
     if not least <= temperature <= greatest:
         span = f"{celsius(least)} to {celsius(greatest)}"
-        raise FluidError("temperature", f"{celsius(temperature)} is outside the range of {name}, {span}")
+        raise FluidError(
+            "temperature", f"{celsius(temperature)} is outside the range of {name}, {span}"
+        )
 
 
 def _vapor_pressure(state: Any, temperature: float) -> float:
@@ -386,8 +415,12 @@ def _incompressible_properties(name: str, temperature: float, pressure: float) -
 
     bare = re.sub(r"(\[[^]]*\]|-[0-9.]+%)$", "", name.removeprefix("INCOMP::"))
     if bare not in _incompressible_names():
-        raise FluidError("name", f'"{name}" is not a CoolProp fluid{_suggestion("INCOMP::" + bare)}')
-    _check_temperature(name, temperature, *(PropsSI(key, f"INCOMP::{bare}") for key in ("TMIN", "TMAX")))
+        raise FluidError(
+            "name", f'"{name}" is not a CoolProp fluid{_suggestion("INCOMP::" + bare)}'
+        )
+    _check_temperature(
+        name, temperature, *(PropsSI(key, f"INCOMP::{bare}") for key in ("TMIN", "TMAX"))
+    )
     try:
         density = PropsSI("D", "T", temperature, "P", pressure, name)
     except ValueError as error:
@@ -398,7 +431,9 @@ def _incompressible_properties(name: str, temperature: float, pressure: float) -
         raise FluidError(key, f"{name}: {reason}") from None
     viscosity = value_or_none(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
     vapor_pressure = value_or_none(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
-    values = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
+    values = dict(
+        density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None
+    )
     # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
     return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
 

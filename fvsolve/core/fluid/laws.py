@@ -54,16 +54,27 @@ def air_of(given: dict[str, float]) -> Air:
     """Free gas and cavitation from the given keys of [fluid]; raises FluidError for a value out of range."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:
-        raise FluidError("air_fraction", f"{fraction:g} is not a volume fraction; expected at least 0 and below 1")
+        raise FluidError(
+            "air_fraction",
+            f"{fraction:g} is not a volume fraction; expected at least 0 and below 1",
+        )
     if cavitation and fraction == 0.0:
         raise FluidError(
-            "cavitation", "needs free gas, from which cavities grow; try `air_fraction = 1e-7` for a degassed liquid"
+            "cavitation",
+            "needs free gas, from which cavities grow; try `air_fraction = 1e-7` for a degassed liquid",
         )
-    exponent, saturation = given.get("gas_exponent", 1.0), given.get("saturation_pressure", math.inf)
+    exponent = given.get("gas_exponent", 1.0)
+    saturation = given.get("saturation_pressure", math.inf)
     if not 1.0 <= exponent <= 2.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is out of range; expected a value between 1 (isothermal) and 2")
+        raise FluidError(
+            "gas_exponent",
+            f"{exponent:g} is out of range; expected a value between 1 (isothermal) and 2",
+        )
     if cavitation and exponent != 1.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal; expected 1")
+        raise FluidError(
+            "gas_exponent",
+            f"{exponent:g} is not 1; with cavitation the gas is isothermal; expected 1",
+        )
     if saturation <= ATMOSPHERE:
         text = f"{saturation:g} Pa is not above 1 atm, the pressure to which `air_fraction` refers"
         raise FluidError("saturation_pressure", f"{text}; expected more than {ATMOSPHERE:g} Pa")
@@ -75,7 +86,10 @@ def check_cavities(fluid) -> None:
     if fluid.air is None or not fluid.air.cavitation:
         return
     if fluid.vapor_pressure == 0.0:
-        raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give the key `vapor_pressure`')
+        raise FluidError(
+            "cavitation",
+            f'needs the vapour pressure of "{fluid.name}"; give the key `vapor_pressure`',
+        )
     if fluid.vapor_pressure >= ATMOSPHERE:
         text = f"{fluid.name} boils at 1 atm, the pressure to which `air_fraction` refers"
         raise FluidError("cavitation", f"{text}; leave out the key `cavitation`")
@@ -124,7 +138,12 @@ class Law:
     @classmethod
     def lower(cls, fluid, s, floats: list[float]) -> None:
         """Write the parameters of the law to a record `s` of the table `settings`; append its tables to `floats`."""
-        s["law"], s["rho"], s["beta"], s["reference"] = cls.code, fluid.density, fluid.bulk_modulus, fluid.pressure
+        s["law"], s["rho"], s["beta"], s["reference"] = (
+            cls.code,
+            fluid.density,
+            fluid.bulk_modulus,
+            fluid.pressure,
+        )
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
@@ -214,7 +233,9 @@ class LinearLaw(Law, name="linear"):
 
     def mass_in(self, pressure: float, volume: float) -> float:
         """Mass [kg] of the fluid in a volume [m3] at a pressure [Pa]."""
-        return self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
+        return (
+            self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
+        )
 
     def compliance(self, speed: float) -> float:
         """Wall compliance (1/A) dA/dp [1/Pa] of a pipe with the area A, from its wave speed `speed` [m/s].
@@ -227,7 +248,9 @@ class LinearLaw(Law, name="linear"):
         """Cross-section [m2] of a pipe at pressures [Pa]. row : row of the pipe in the tables of the model"""
         return row["area"]
 
-    def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    def cell_pressure(
+        self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray
+    ) -> np.ndarray:
         """Pressure [Pa] in the cells of a pipe : float64[cells].
 
         row : row of the pipe in the tables of the model; start : pressures at the start [Pa]
@@ -237,14 +260,18 @@ class LinearLaw(Law, name="linear"):
         """
         return start + waves / row["admittance"]
 
-    def cell_pressures(self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    def cell_pressures(
+        self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray
+    ) -> np.ndarray:
         """Pressure [Pa] in the cells of all pipes, one pipe after the other : float64[cells].
 
         pipes : table of pipes of the model; starts : for each pipe pressures at the start [Pa]
         waves, profile : as for `cell_pressure`, for all pipes
         """
         sizes = [len(start) for start in starts]
-        return np.concatenate([np.zeros(0), *starts]) + waves / np.repeat(pipes["admittance"], sizes)
+        return np.concatenate([np.zeros(0), *starts]) + waves / np.repeat(
+            pipes["admittance"], sizes
+        )
 
     def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         """Mass [kg] in a pipe at the steady start.
@@ -308,11 +335,15 @@ class DenseLaw(Law):
     def area(self, row, pressure):
         return self.for_each(self.kernels.wall_area, row, pressure)
 
-    def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    def cell_pressure(
+        self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray
+    ) -> np.ndarray:
         masses = profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]
         return self.for_each(self.kernels.pressure_of_mass, row, masses)
 
-    def cell_pressures(self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    def cell_pressures(
+        self, pipes, starts: list[np.ndarray], profile: np.ndarray, waves: np.ndarray
+    ) -> np.ndarray:
         parts, at = [np.zeros(0)], 0
         for row, start in zip(pipes, starts, strict=True):
             parts.append(self.cell_pressure(row, start, profile, waves[at : at + len(start)]))
@@ -372,7 +403,10 @@ class MixtureLaw(DenseLaw, name="mixture"):
             s["law"] = LogLaw.code
             return
         s["floor"] = fluid.vapor_pressure if fluid.air.cavitation else 0.0
-        s["gas_power"], s["saturation"] = 1.0 / fluid.air.exponent, fluid.air.saturation_pressure - s["floor"]
+        s["gas_power"], s["saturation"] = (
+            1.0 / fluid.air.exponent,
+            fluid.air.saturation_pressure - s["floor"],
+        )
         s["gas"] = fluid.air.gas(fluid, s["floor"])
 
     @property
@@ -393,7 +427,8 @@ class MixtureLaw(DenseLaw, name="mixture"):
         if self.cavitates:
             return ""
         return (
-            "; where much gas expands, set `cavitation = true` in [fluid] and a suitable scheme (see docs/cavitation)"
+            "; where much gas expands, set `cavitation = true` in [fluid] and "
+            "a suitable scheme (see docs/cavitation)"
         )
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:

@@ -14,7 +14,8 @@ from fvsolve.errors import FluidError
 
 ASTM_D341 = "astm-d341"  # name of Walther's equation in case files
 ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
-MIN_TEMPERATURE, MAX_TEMPERATURE, MAX_PRESSURE = 273.15, 373.15, 1e8  # range of the sources [K], [Pa]
+# range of the sources [K], [Pa]
+MIN_TEMPERATURE, MAX_TEMPERATURE, MAX_PRESSURE = 273.15, 373.15, 1e8
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ OILS = {  # ISO 3448 mid-point, viscosity index 100 by ASTM D2270, typical densi
     "ISO VG 46": Oil(46.0, 6.76, 876.0),
     "ISO VG 68": Oil(68.0, 8.73, 881.0),
 }
-EXPANSION = 0.6278  # K1 of lubricating oils, ASTM D1250-80: thermal expansion at 15 degC is K1 / density [kg/m3/K]
+# K1 of lubricating oils, ASTM D1250-80: thermal expansion at 15 degC is K1 / density [kg/m3/K]
+EXPANSION = 0.6278
 # C, b0 [bar], b1 [bar/K]: rho = rho(1 bar) / (1 - C ln((b + p) / b)), b = b0 + b1 T
 TAIT_COEFFICIENTS = 0.0732965, 1965.02, -2.96813
 HEAT_CAPACITY = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
@@ -47,7 +49,10 @@ def oil_name(name: str) -> str | None:
         return None
     grade = f"ISO VG {match[1]}"
     if grade not in OILS:
-        raise FluidError("name", f'"{name}" is an unknown oil; expected one of {", ".join(OILS)}, or a "user" fluid')
+        raise FluidError(
+            "name",
+            f'"{name}" is an unknown oil; expected one of {", ".join(OILS)}, or a "user" fluid',
+        )
     return grade
 
 
@@ -58,9 +63,13 @@ def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, 
     """
     if not MIN_TEMPERATURE <= temperature <= MAX_TEMPERATURE:
         text = f"{temperature - ZERO:.6g} degC"
-        raise FluidError("temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC")
+        raise FluidError(
+            "temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC"
+        )
     if pressure > MAX_PRESSURE:
-        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, up to {MAX_PRESSURE:g} Pa")
+        raise FluidError(
+            "pressure", f"{pressure:g} Pa is above the range of {name}, up to {MAX_PRESSURE:g} Pa"
+        )
     oil, p = OILS[name], pressure / 1e5
     expansion, rho = density_1atm(oil, temperature)
     c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature
@@ -76,7 +85,10 @@ def walther_points(name: str) -> tuple[tuple[float, float], ...]:
     """Points (temperature [K], kinematic viscosity [m2/s]) of an oil, by its grade; empty for other fluids."""
     if name not in OILS:
         return ()
-    return (ZERO + 40.0, 1e-6 * OILS[name].viscosity_40), (ZERO + 100.0, 1e-6 * OILS[name].viscosity_100)
+    return (ZERO + 40.0, 1e-6 * OILS[name].viscosity_40), (
+        ZERO + 100.0,
+        1e-6 * OILS[name].viscosity_100,
+    )
 
 
 def walther_numbers(points: tuple[tuple[float, float], ...]) -> tuple[float, float]:
@@ -85,11 +97,17 @@ def walther_numbers(points: tuple[tuple[float, float], ...]) -> tuple[float, flo
     Raises FluidError where the equation does not hold.
     """
     if min(nu for _, nu in points) <= 3e-7:
-        raise FluidError("viscosity", "a point has a viscosity of 0.3 cSt or less, where ASTM D341 does not hold")
-    (cold, first), (hot, last) = ((math.log10(t), math.log10(math.log10(1e6 * nu + 0.7))) for t, nu in points)
+        raise FluidError(
+            "viscosity", "a point has a viscosity of 0.3 cSt or less, where ASTM D341 does not hold"
+        )
+    (cold, first), (hot, last) = (
+        (math.log10(t), math.log10(math.log10(1e6 * nu + 0.7))) for t, nu in points
+    )
     slope = (first - last) / (hot - cold)
     if slope <= 0.0:
-        raise FluidError("viscosity", "the viscosity of the points rises with temperature; expected a fall")
+        raise FluidError(
+            "viscosity", "the viscosity of the points rises with temperature; expected a fall"
+        )
     return first + slope * cold, slope
 
 
@@ -100,7 +118,10 @@ def walther_viscosity(numbers: tuple[float, float], temperature: float) -> float
 
 def oil_specific_heat(temperature: float) -> float:
     """Specific heat of all oils at a temperature [K]: cp [J/kg/K], linear between 25 and 80 degC and beyond."""
-    return HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
+    return (
+        HEAT_CAPACITY[0]
+        + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
+    )
 
 
 def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:

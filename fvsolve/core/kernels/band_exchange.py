@@ -17,10 +17,13 @@ from fvsolve.jit import COMPILING, Intrinsic, njit
 # for sums, and of the system function that yields the processor; number of barriers passed; number of spans common to
 # all bands; number of runs of states read from other bands, and of flows through faces; address of the function that
 # exchanges between processes, 0 for threads. The runs follow from HEAD on: owner, first, and last + 1 of each.
-BAND, BAND_COUNT, BOARD, SUM_BUFFER, YIELD, TURNS, COMMON_SPANS, STATES, FLOWS, PROCESS_CALL = range(10)
+BAND, BAND_COUNT, BOARD, SUM_BUFFER, YIELD, TURNS, COMMON_SPANS, STATES, FLOWS, PROCESS_CALL = (
+    range(10)
+)
 SEND_STATES, SEND_FLOWS, SEND_RATES, SEND_SUMS = range(4)  # kind of exchange between processes
 HEAD = 16
-LINE = 8  # numbers in a cache line; the line of a band on the board: barriers passed, shared address, two rates
+# numbers in a cache line; the line of a band on the board: barriers passed, shared address, two rates
+LINE = 8
 SHARED_ADDRESS, SHARED_RATES = 1, 2
 SPIN_LIMIT = 2000  # polls at a barrier before the thread yields
 
@@ -131,7 +134,9 @@ def get_runs(joint, content, values):
     # All bands have written their data and addresses.
     for r in range(count):
         at = first + 3 * r
-        owner, begin, stop = joint[at], joint[at + 1], joint[at + 2]
+        owner = joint[at]
+        begin = joint[at + 1]
+        stop = joint[at + 2]
         theirs = floats_at(load_acquire(place + 8 * LINE * owner), values.size)[begin:stop]
         ours = values[begin:stop]
         for i in range(ours.size):

@@ -23,7 +23,9 @@ from fvsolve.jit import njit
 @njit
 def head_pressure(st, floats, head):
     """Pressure [Pa] under a column of `head` [m] open to ambient: h(p) = h(ambient) + g head, h : specific enthalpy."""
-    return law.pressure_of_enthalpy(st, floats, law.enthalpy(st, floats, st["ambient"]) + st["gravity"] * head)
+    return law.pressure_of_enthalpy(
+        st, floats, law.enthalpy(st, floats, st["ambient"]) + st["gravity"] * head
+    )
 
 
 @njit
@@ -33,13 +35,20 @@ def known_pressures_barotropic(t, y, dydt, out, handle):
     For chambers that contain gas, also write their stiffness dp/dm [Pa/kg], the pressure rise per stored mass.
     """
     tables = open_tables(handle)
-    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    floats = tables.floats
     for i in range(nodes.size):
         node = nodes[i]
         at, kind = layout["pressure"] + i, node["kind"]
         if kind == FIXED:
             value = schedule_value(tables, node["schedule"], t)
-            p = head_pressure(st, floats, value - node["elevation"]) if node["head_given"] == 1 else value
+            p = (
+                head_pressure(st, floats, value - node["elevation"])
+                if node["head_given"] == 1
+                else value
+            )
             out[at] = p - node["pressure"]
         elif kind == TANK:
             level = tank_level(node, floats, node["density"], y[node["y"]])
@@ -52,7 +61,9 @@ def known_pressures_barotropic(t, y, dydt, out, handle):
             q0 = np.log(node["mass"] / (st["rho"] * node["volume"]))
             out[at] = p - law.pressure_of_log(st, floats, 0.0, q0)
             if node["row"] >= 0:
-                out[layout["stiffness"] + node["row"]] = 1.0 / (law.log_density(st, floats, p)[1] * mass)
+                out[layout["stiffness"] + node["row"]] = 1.0 / (
+                    law.log_density(st, floats, p)[1] * mass
+                )
 
 
 @njit
@@ -107,7 +118,9 @@ def node_beyond(out, tables, pipe, side):
     side : 0 for the `from` end, 1 for the `to` end
     """
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
-    return tables.nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i], tables.nodes[i]["kind"] != JUNCTION
+    return tables.nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i], tables.nodes[i][
+        "kind"
+    ] != JUNCTION
 
 
 @njit(forceinline=True)
@@ -142,16 +155,23 @@ def end_inflows_barotropic(out, tables, slope, final):
     On entry out[ends] holds the forward and the backward wave at each pipe end, extrapolated from the cells [kg/s]. If
     `final` is True, they are replaced with the waves of the solved end states.
     """
-    layout, pipes, profile = tables.layout[0], tables.pipes, tables.profile
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    profile = tables.profile
     clear_inflows(out, tables, slope)
     for k in range(pipes.size):
         pipe = pipes[k]
         for side in range(2):
             at, sign = layout["ends"] + 4 * k + 2 * side, 2.0 * side - 1.0
             p, still = node_beyond(out, tables, pipe, side)
-            inside = profile[pipe["face"] + pipe["cells"] * side] + (out[at] + out[at + 1]) / pipe["speed"]
+            inside = (
+                profile[pipe["face"] + pipe["cells"] * side]
+                + (out[at] + out[at + 1]) / pipe["speed"]
+            )
             flow = sign * (pipe["flow"] + (out[at] - out[at + 1]))
-            into, rise, m = end_flow(tables.settings[0], tables.floats, pipe, inside, flow, p, still)
+            into, rise, m = end_flow(
+                tables.settings[0], tables.floats, pipe, inside, flow, p, still
+            )
             add_end_inflow(out, tables, slope, k, side, into, rise)
             if final:
                 write_end_waves(out, tables, k, side, into, m)
@@ -161,7 +181,10 @@ def end_inflows_barotropic(out, tables, slope, final):
 def outgoing_waves_barotropic(t, y, dydt, out, handle):
     """Extrapolate forward and backward wave [kg/s] from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
-    st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    work = tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
         n, o = pipe["cells"], pipe["y"]
@@ -169,7 +192,9 @@ def outgoing_waves_barotropic(t, y, dydt, out, handle):
         for side in range(2):
             for wave in range(2):
                 cells = y[o + n * wave : o + n * (wave + 1)]
-                value = end_value(cells, side, family, st["degree"], st["limiter"], pipe["noise"], work)
+                value = end_value(
+                    cells, side, family, st["degree"], st["limiter"], pipe["noise"], work
+                )
                 out[layout["ends"] + 4 * i + 2 * side + wave] = value
 
 
@@ -179,7 +204,9 @@ def given_flows(t, y, out, tables):
 
     Pressures of junctions are reset to the initial steady state.
     """
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
     junction_flows(t, out, tables)
     # Newton starts from the profile, so that its result depends on (t, y) alone.
     for i in range(nodes.size):
@@ -187,7 +214,11 @@ def given_flows(t, y, out, tables):
             out[layout["pressure"] + i] = 0.0
     for k in range(valves.size):
         i, j = valves[k]["from_node"], valves[k]["to_node"]
-        if nodes[i]["kind"] != JUNCTION and nodes[j]["kind"] != JUNCTION and valves[k]["solve"] != CLUSTER:
+        if (
+            nodes[i]["kind"] != JUNCTION
+            and nodes[j]["kind"] != JUNCTION
+            and valves[k]["solve"] != CLUSTER
+        ):
             g = conductance(tables, out, k)
             out[layout["valve"] + k] = valve_target(tables, out, k, g)[0] if g > 0.0 else 0.0
 

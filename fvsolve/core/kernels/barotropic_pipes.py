@@ -29,7 +29,9 @@ def wall_force(pipe, reference, m, flow):
 
     reference : mass per length at the reference density [kg/m]
     """
-    friction = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+    friction = drag(
+        pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow
+    )
     return friction * (reference / m)
 
 
@@ -41,7 +43,10 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
     r, l : float64[cells]  forward and backward wave [kg/s]
     ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
     """
-    n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
+    n = r.size
+    c = pipe["speed"]
+    dx = pipe["dx"]
+    flow = pipe["flow"]
     fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
     both_faces(st, pipe, r, l, ends[0], ends[1], ends[2], ends[3], scratch, fr, fl)
     face, cell = pipe["face"], pipe["center"]
@@ -54,7 +59,9 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
         m, total = profile[face + i] + dm, flow + dflow
         # Without the flux of the profile, so that rounding does not disturb a steady state.
         flux = momentum_flux(st, floats, pipe, m, total) - profile[pipe["flux"] + i]
-        least, greatest, quickest = min(least, m), max(greatest, m), max(quickest, abs(total))
+        least = min(least, m)
+        greatest = max(greatest, m)
+        quickest = max(quickest, abs(total))
         if i > 0:
             k = i - 1
             m0 = profile[cell + k]
@@ -70,7 +77,9 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             flow_rate = -(flux - left_flux) / dx + force
             dr[k] = 0.5 * (c * mass_rate + flow_rate)
             dl[k] = 0.5 * (c * mass_rate - flow_rate)
-        left_flow, left_flux, left_mass = dflow, flux, dm
+        left_flow = dflow
+        left_flux = flux
+        left_mass = dm
     # Such a pipe has `slope` 0, so its weight is not counted twice.
     if pipe["rise"] >= 0:
         add_slope_force(st, profile, pipe, r, l, dr, dl)
@@ -87,13 +96,25 @@ def rates_barotropic(t, y, dydt, out, handle):
     Nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
-    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
-        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        n = pipes[i]["cells"]
+        o = pipes[i]["y"]
+        at = layout["ends"] + 4 * i
         own = pipe_rates_barotropic(
-            st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
-            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
-        )  # fmt: skip
+            st,
+            tables.floats,
+            tables.profile,
+            pipes[i],
+            y[o : o + n],
+            y[o + n : o + 2 * n],
+            out[at : at + 4],
+            tables.scratch,
+            dydt[o : o + n],
+            dydt[o + n : o + 2 * n],
+        )
         out[rec.RATE] = max(out[rec.RATE], own)
 
 
@@ -120,14 +141,18 @@ def pressure_or_head(st, floats, probe, p):
     The head is (h(p) - h(ambient)) / g plus elevation, h : specific enthalpy.
     """
     if probe["head"] == 1:
-        return (law.enthalpy(st, floats, p) - law.enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
+        return (law.enthalpy(st, floats, p) - law.enthalpy(st, floats, st["ambient"])) / st[
+            "gravity"
+        ] + probe["offset"]
     return p + probe["offset"]
 
 
 @njit
 def valve_volume_flow(st, floats, tables, out, k):
     """Volume flow of valve k [m3/s] at the upstream density."""
-    layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valve = tables.valves[k]
     flow = out[layout["valve"] + k]
     up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
     return flow / law.density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
@@ -141,14 +166,19 @@ def observe_barotropic(t, y, out, handle, values):
     density in columns.
     """
     tables = open_tables(handle)
-    st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes
+    st = tables.settings[0]
+    floats = tables.floats
+    layout = tables.layout[0]
+    nodes = tables.nodes
     probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
         kind, i = probe["kind"], probe["index"]
         value = 0.0
         if kind == rec.PRESSURE:
-            value = pressure_or_head(st, floats, probe, nodes[i]["pressure"] + out[layout["pressure"] + i])
+            value = pressure_or_head(
+                st, floats, probe, nodes[i]["pressure"] + out[layout["pressure"] + i]
+            )
         elif kind == rec.LEVEL:
             value = tank_level(nodes[i], floats, nodes[i]["density"], y[nodes[i]["y"]])
         elif kind == rec.PIPE_PRESSURE or kind == rec.PIPE_FLOW:
@@ -165,12 +195,16 @@ def observe_barotropic(t, y, out, handle, values):
                 value /= floats[probe["weights"]]
         elif kind == rec.PRESSURE_BETWEEN:
             x, j = floats[probe["weights"]], probe["cell"]
-            p = floats[probe["weights"] + 2] + (1.0 - x) * (nodes[i]["pressure"] + out[layout["pressure"] + i])
+            p = floats[probe["weights"] + 2] + (1.0 - x) * (
+                nodes[i]["pressure"] + out[layout["pressure"] + i]
+            )
             p += x * (nodes[j]["pressure"] + out[layout["pressure"] + j])
             value = pressure_or_head(st, floats, probe, p)
         elif kind == rec.SPOOL_FLOW:
             for e in range(probe["count"]):
-                value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)
+                value += floats[probe["weights"] + e] * valve_volume_flow(
+                    st, floats, tables, out, i + e
+                )
         elif kind == rec.SCHEDULE_VALUE:
             value = schedule_value(tables, i, t)
         elif kind == rec.COLUMN_FLOW:

@@ -24,28 +24,39 @@ from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kind
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, DERIVE, DAMP, JOBS = range(10)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the functions of jobs
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)
-ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
+ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys(
+    (POWER, STORED), ENERGIES
+)
 HOOKS = {  # functions of the law of a part: types of arguments and of the result
     # out : network values (node pressures as changes since the start [Pa], mass flows [kg/s], ...), read and written at
     # the offsets in tables.layout[0] (LAYOUT of `kernels.dtypes`); tables : open handle, its attributes are the tables
     # device : row of the part in tables.devices; t, y, dydt : time [s], states and their rates (empty if not requested)
     # t, y, out, tables, device: writes conductances, speeds, pressures of vessels, from (t, y) and flags
     "set": ("tVVTD", ""),
-    "move": ("tVVVTD", ""),  # t, y, dydt, out, tables, device: rates of its states if dydt.size > 0; out[RATE]
-    "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from solved nodes
-    "value": ("tVVTDi", "t"),  # t, y, out, tables, device, quantity: value of its quantity of that number
+    # t, y, dydt, out, tables, device: rates of its states if dydt.size > 0; out[RATE]
+    "move": ("tVVVTD", ""),
+    # t, y, out, tables, device, g: its event functions, from solved nodes
+    "events": ("tVVTDV", ""),
+    # t, y, out, tables, device, quantity: value of its quantity of that number
+    "value": ("tVVTDi", "t"),
     # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
     "outside": ("VTD", "i"),
     # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
     # for the heat of the fluid the dissipation is computed with `y` in place of `dydt`, unless the law has `heat`
     "power": ("tVVVTD", "ttt"),
-    "heat": ("tVVTD", "t"),  # t, y, out, tables, device: heat into the fluid beside drop times flow [W]
+    # t, y, out, tables, device: heat into the fluid beside drop times flow [W]
+    "heat": ("tVVTD", "t"),
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
     # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`
-    "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
+    "step": (
+        "VTittttb",
+        "tt",
+    ),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
     "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
-    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d lifting pressure at constant drop
-    "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, from the drop alone
+    # out, tables, k, g, drop, denser, wide: d flow / d lifting pressure at constant drop
+    "lift": ("VTitttb", "t"),
+    # tables, k, drop, g: event functions of a restriction, from the drop alone
+    "bends": ("TitV", ""),
     # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
     # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
     "lead": ("tVTDtttb", "tt"),
@@ -73,7 +84,8 @@ def _kinds() -> dict:
     return plain_kinds() | own | {letter: make() for letter, make in FURTHER_KINDS.items()}
 
 
-FURTHER_KINDS: dict[str, Callable] = {}  # letter of an argument type of a feature -> function that returns the type
+# letter of an argument type of a feature -> function that returns the type
+FURTHER_KINDS: dict[str, Callable] = {}
 
 
 def add_kind(letter: str, make: Callable) -> None:
@@ -134,14 +146,17 @@ def call_at_address(name: str, letters: str, returned: str = "", home: str = __n
         return call_by_address(argument_types(letters), argument_types(returned))
 
     names = ["typingctx", "address", *(f"argument_{k}" for k in range(len(letters)))]
-    define.__signature__ = Signature([Parameter(label, Parameter.POSITIONAL_OR_KEYWORD) for label in names])
+    define.__signature__ = Signature(
+        [Parameter(label, Parameter.POSITIONAL_OR_KEYWORD) for label in names]
+    )
     define.__name__, define.__qualname__, define.__module__ = name, name, home
     return Intrinsic(define)
 
 
 call_rates = call_at_address("call_rates", RATES)  # of the right-hand side
 call_reader = call_at_address("call_reader", READS)  # reads a state and fills `values`
-call_energies = call_at_address("call_energies", ENERGIES)  # fills `rows` with powers [W] or stored energies [J]
+# fills `rows` with powers [W] or stored energies [J]
+call_energies = call_at_address("call_energies", ENERGIES)
 # Functions of the law of a device, or of restriction k (from `step` on).
 call_set = call_at_address("call_set", *HOOKS["set"])
 call_move = call_at_address("call_move", *HOOKS["move"])

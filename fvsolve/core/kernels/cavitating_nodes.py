@@ -25,13 +25,22 @@ from fvsolve.core.kernels.node_clusters import (
     step_clusters,
     write_clusters,
 )
-from fvsolve.core.kernels.riemann import FALL, UNBOUNDED, intermediate_pressure, sample_wave, state_at, wave_jump
+from fvsolve.core.kernels.riemann import (
+    FALL,
+    UNBOUNDED,
+    intermediate_pressure,
+    sample_wave,
+    state_at,
+    wave_jump,
+)
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
 
 ROUNDING = 1e-12  # least gas pressure of a node, relative to its pressure
-BALANCE_ERROR = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
-NARROW = 1e-9  # relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
+# greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
+BALANCE_ERROR = 1e-7
+# relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
+NARROW = 1e-9
 SHORTAGE = 0.01  # part of a demand that may be drawn from any state of the pipe ends
 EMPTY = 0.3  # fraction of liquid at a pipe end below which nothing can be drawn from it
 BISECTION_START = 30  # sweeps after which Newton steps are replaced by bisection or halved
@@ -49,13 +58,18 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     Where the flow runs into the node at more than half the speed of sound, or into a node with `still` True, the
     pressure of the end is that of the node: v^2 / 2 is lost.
     """
-    floor, target, side = st["floor"], enthalpy(st, floats, p_node), state_at(st, floats, pipe, p_node)
+    floor = st["floor"]
+    target = enthalpy(st, floats, p_node)
+    side = state_at(st, floats, pipe, p_node)
     change, rise = wave_jump(st, floats, pipe, inside, side)
     v = v_in - change
     if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
         return side, v, -rise
     # A part of the enthalpy of the node is kinetic energy at the end, so its pressure is not above p_node.
-    slope, rho, low, high = 1.0, 1.0, floor, p_node
+    slope = 1.0
+    rho = 1.0
+    low = floor
+    high = p_node
     for _ in range(60):
         p, rho = side[0], st["rho"] / relative_volume(st, side[0])[0]
         slope, over = 1.0 - v * rise * rho, enthalpy(st, floats, p) + 0.5 * v * v - target
@@ -68,7 +82,12 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
             break
         p -= step
         # The gas pressure may change by orders of magnitude, so bounds are halved in its logarithm.
-        side = state_at(st, floats, pipe, p if low < p < high else intermediate_pressure(floor, low, high, side[0]))
+        side = state_at(
+            st,
+            floats,
+            pipe,
+            p if low < p < high else intermediate_pressure(floor, low, high, side[0]),
+        )
         change, rise = wave_jump(st, floats, pipe, inside, side)
         v = v_in - change
     return side, v, -rise * rho * relative_volume(st, p_node)[0] / (slope * st["rho"])
@@ -140,8 +159,14 @@ def bound_steps(sweep, out, tables, before, low, high):
     before : float64[nodes]  pressure changes since the start, before the step [Pa]
     low, high : float64[nodes]  bounds of the pressures [Pa]
     """
-    st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
-    pressure, floor, (done, change, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_work(tables)
+    st = tables.settings[0]
+    nodes = tables.nodes
+    clusters = tables.clusters
+    pressure, floor, (done, change, _, _, sure) = (
+        tables.layout[0]["pressure"],
+        st["floor"],
+        cluster_work(tables),
+    )
     for c in range(clusters.size):
         if done[c] == 1.0 or clusters[c]["nodes"] == 0:
             continue
@@ -149,9 +174,15 @@ def bound_steps(sweep, out, tables, before, low, high):
         for k in range(clusters[c]["nodes"]):
             i = tables.integers[clusters[c]["first_node"] + k]
             base = nodes[i]["pressure"]
-            p, q, least = base + before[i], base + out[pressure + i], floor + ROUNDING * (1e5 + base)
+            p = base + before[i]
+            q = base + out[pressure + i]
+            least = floor + ROUNDING * (1e5 + base)
             if clusters[c]["nodes"] > 1:
-                q = max(p + 0.5 * (q - p) if sweep > BISECTION_START else q, floor + FALL * (p - floor), least)
+                q = max(
+                    p + 0.5 * (q - p) if sweep > BISECTION_START else q,
+                    floor + FALL * (p - floor),
+                    least,
+                )
             elif q != p:
                 if sure[c] == 1.0 or sweep > BISECTION_START:
                     low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
@@ -190,7 +221,9 @@ def solve_nodes_cavitating(t, y, dydt, out, handle):
     when its pressures do not change.
     """
     tables = open_tables(handle)
-    space, n, work = node_work(tables), tables.nodes.size, tables.scratch
+    space = node_work(tables)
+    n = tables.nodes.size
+    work = tables.scratch
     pressure, last_pressure = tables.layout[0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
     given_flows(t, y, out, tables)
@@ -220,8 +253,13 @@ def balance_junctions(t, y, dydt, out, handle):
     without bound.
     """
     tables = open_tables(handle)
-    layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
-    imbalance, content, unbalanced = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    pipes = tables.pipes
+    profile = tables.profile
+    imbalance = tables.scratch[: nodes.size]
+    content = tables.scratch[nodes.size : 2 * nodes.size]
+    unbalanced = False
     floor = tables.settings[0]["floor"]
     for i in range(nodes.size):
         imbalance[i], content[i] = 0.0, 0.0
@@ -230,7 +268,9 @@ def balance_junctions(t, y, dydt, out, handle):
             out[layout["net"] + i] -= imbalance[i]
             unbalanced = unbalanced or imbalance[i] != 0.0
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
+            if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (
+                BAR + abs(p)
+            ):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
     # The first sweep sums the mass at the ends, by which the second distributes the imbalance.
     for sweep in range(2 if unbalanced else 0):

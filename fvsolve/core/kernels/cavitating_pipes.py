@@ -11,7 +11,12 @@ beyond each end; dp, dv : their changes since the initial steady state.
 """
 
 from fvsolve.core.kernels.barotropic_pipes import wall_force
-from fvsolve.core.kernels.density import force_of_mass, local_speed, mass_of_pressure, pressure_of_mass
+from fvsolve.core.kernels.density import (
+    force_of_mass,
+    local_speed,
+    mass_of_pressure,
+    pressure_of_mass,
+)
 from fvsolve.core.kernels.density.mixture_law import relative_volume
 from fvsolve.core.kernels.density.steady_profile import add_slope_force
 from fvsolve.core.kernels.dtypes import RATE, UPWIND
@@ -108,7 +113,10 @@ def end_states(st, floats, profile, pipe, r, l, ends, scratch):
     n = r.size
     # The limiter and the extrapolation at an end need three cells; the others are not evaluated.
     n_near = min(n, 3)
-    p, v, dp, dv = scratch[: n_near + 2], scratch[5 : n_near + 7], scratch[10 : n_near + 12], scratch[15 : n_near + 17]
+    p = scratch[: n_near + 2]
+    v = scratch[5 : n_near + 7]
+    dp = scratch[10 : n_near + 12]
+    dv = scratch[15 : n_near + 17]
     for side in range(2):
         fill_cells(st, floats, profile, pipe, (n - n_near) * side, r, l, p, v, dp, dv)
         k, ahead = (n_near, 1) if side == 1 else (1, -1)
@@ -123,15 +131,23 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
     v, c : velocity and wave speed; dx : length of a cell
     ends : float64[4]  waves at the ends [kg/s]: forward and backward at `from`, then at `to`
     """
-    n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
+    n = r.size
+    c = pipe["speed"]
+    dx = pipe["dx"]
+    flow = pipe["flow"]
     p, v = scratch[: n + 2], scratch[n + 2 : 2 * n + 4]
     dp, dv = scratch[2 * n + 4 : 3 * n + 6], scratch[3 * n + 6 : 4 * n + 8]
     fill_cells(st, floats, profile, pipe, 0, r, l, p, v, dp, dv)
     reference, weight = st["rho"] * pipe["area"], st["gravity"] * pipe["slope"]
-    left_flow, left_flux, highest, quickest = 0.0, 0.0, p[1], 0.0
+    left_flow = 0.0
+    left_flux = 0.0
+    highest = p[1]
+    quickest = 0.0
     for i in range(n + 1):
         if i == 0 or i == n:
-            dflow, flux = end_flux(st, floats, profile, pipe, i, ends[0 if i == 0 else 2], ends[1 if i == 0 else 3])
+            dflow, flux = end_flux(
+                st, floats, profile, pipe, i, ends[0 if i == 0 else 2], ends[1 if i == 0 else 3]
+            )
         else:
             p_l, v_l, still_l = face_state(st, floats, profile, pipe, i, i, 1, p, v, dp, dv)
             p_r, v_r, still_r = face_state(st, floats, profile, pipe, i, i + 1, -1, p, v, dp, dv)
@@ -144,7 +160,9 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             k = i - 1
             m0 = profile[pipe["center"] + k]
             dm = (r[k] + l[k]) / c
-            friction = wall_force(pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k]))
+            friction = wall_force(
+                pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k])
+            )
             # The profile balances the weight of its own mass.
             force = -weight * dm - (friction - pipe["drag"] * (reference / m0))
             mass_rate, flow_rate = -(dflow - left_flow) / dx, -(flux - left_flux) / dx + force
@@ -176,11 +194,26 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 def outgoing_states_cavitating(t, y, dydt, out, handle):
     """Extrapolate pressure [Pa] and velocity [m/s] from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
-    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
-    floats, profile, scratch = tables.floats, tables.profile, tables.scratch
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    floats = tables.floats
+    profile = tables.profile
+    scratch = tables.scratch
     for i in range(pipes.size):
-        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
-        end_states(st, floats, profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4], scratch)
+        n = pipes[i]["cells"]
+        o = pipes[i]["y"]
+        at = layout["ends"] + 4 * i
+        end_states(
+            st,
+            floats,
+            profile,
+            pipes[i],
+            y[o : o + n],
+            y[o + n : o + 2 * n],
+            out[at : at + 4],
+            scratch,
+        )
 
 
 @njit
@@ -190,13 +223,25 @@ def rates_cavitating(t, y, dydt, out, handle):
     Nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
-    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
-        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        n = pipes[i]["cells"]
+        o = pipes[i]["y"]
+        at = layout["ends"] + 4 * i
         own = pipe_rates_cavitating(
-            st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
-            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
-        )  # fmt: skip
+            st,
+            tables.floats,
+            tables.profile,
+            pipes[i],
+            y[o : o + n],
+            y[o + n : o + 2 * n],
+            out[at : at + 4],
+            tables.scratch,
+            dydt[o : o + n],
+            dydt[o + n : o + 2 * n],
+        )
         out[RATE] = max(out[RATE], own)
 
 
@@ -207,7 +252,10 @@ def record_cavity(t, pipe, r, l, at, tables):
     The entries are: position of the first cavity (fraction of the length), greatest volume [m3], time of this volume
     [s].
     """
-    st, floats, profile, marks = tables.settings[0], tables.floats, tables.profile, tables.marks
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    marks = tables.marks
     volume, first = 0.0, -1
     for i in range(r.size):
         if r[i] + l[i] < profile[pipe["cell"] + i]:

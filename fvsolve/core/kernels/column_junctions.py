@@ -42,7 +42,9 @@ def gate_area(tables, out, i):
 
     The second sum leaves out air valves, and closed valves that only an event opens.
     """
-    node, area, full = tables.nodes[i], 0.0, 0.0
+    node = tables.nodes[i]
+    area = 0.0
+    full = 0.0
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
         area += sqrt(conductance(tables, out, k))
@@ -89,7 +91,9 @@ def pressure_at(tables, out, i, extra, solved):
     layout, node = tables.layout[0], tables.nodes[i]
     if node["kind"] != JUNCTION or solved:
         return out[layout["pressure"] + i]
-    return (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
+    return (
+        (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
+    )
 
 
 @njit
@@ -144,7 +148,9 @@ def junction_work(tables, n):
     """
     n_nodes, work = tables.nodes.size, tables.scratch
     at = 2 * n_nodes + n * n
-    right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
+    right = work[at : at + n]
+    pinned = work[at + n : at + 2 * n]
+    given = work[at + 2 * n : at + 3 * n]
     return work[:n_nodes], work[n_nodes : 2 * n_nodes], work[2 * n_nodes : at], right, pinned, given
 
 
@@ -253,7 +259,9 @@ def balance_junction_flows(tables, out):
 @njit
 def gate_inflow(tables, i):
     """Flow into node i through its valves in the initial steady state [kg/s]."""
-    node, valves, total = tables.nodes[i], tables.valves, 0.0
+    node = tables.nodes[i]
+    valves = tables.valves
+    total = 0.0
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
         total += valves[k]["flow"] if valves[k]["to_node"] == i else -valves[k]["flow"]
@@ -263,7 +271,9 @@ def gate_inflow(tables, i):
 @njit
 def add_flow_sums(tables, out, rows, right):
     """Add the sum of the flows of columns into each column junction [kg/s] to `right`; it is exactly 0 at the start."""
-    nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
+    nodes = tables.nodes
+    columns = tables.columns
+    at = tables.layout[0]["column"]
     # The valves are closed now, so their flow in the profile is taken out of `inflow`.
     for i in range(rows.size):
         if rows[i] >= 0.0:
@@ -290,7 +300,11 @@ def add_column_rates(y, tables, out, n, skip, solved):
     for k in range(columns.size):
         column = columns[k]
         i, j = column["from_node"], column["to_node"]
-        if k == skip or out[layout["valve_controlled"] + k] != 0.0 or (rows[i] < 0.0 and rows[j] < 0.0):
+        if (
+            k == skip
+            or out[layout["valve_controlled"] + k] != 0.0
+            or (rows[i] < 0.0 and rows[j] < 0.0)
+        ):
             continue
         flow = out[layout["column"] + k] if solved else column["flow"] + y[column["y"]]
         # The pressures of the junctions are the unknowns, so here they count as unchanged.

@@ -28,20 +28,31 @@ class Functions:
     def __init__(self, cast: ModelFeatures) -> None:
         self.cast, rates = cast, cast.functions(*PHASES)
         # a row for each job, ended by a zero
-        most = max(len(rates), *map(cast.count, ("observe", "record", "events", "stored", "derive_state", "damp")))
+        most = max(
+            len(rates),
+            *map(cast.count, ("observe", "record", "events", "stored", "derive_state", "damp")),
+        )
         most = max(most, cast.count("network_power") + cast.count("power"))
         self.calls = calls.empty_calls(calls.JOBS, most + 1)
         self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
-        others = "" if all(name.startswith("fvsolve.") for name in cast.packages()) else "import fvsolve.parts; "
+        others = (
+            ""
+            if all(name.startswith("fvsolve.") for name in cast.packages())
+            else "import fvsolve.parts; "
+        )
         code = f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_TIME_LOOP}"
         # A second process compiles the readers and the time loop at the same time.
         with compile_in_parallel(code, "run_steps"):
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
-            self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns, *["power", "heat"] * cast.device_heat)
+            self.store_hooks(
+                *RHS_HOOKS, *["lead"] * cast.columns, *["power", "heat"] * cast.device_heat
+            )
         self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))
         self.store_addresses(calls.DERIVE, cast.functions("derive_state"))
         self.store_addresses(calls.DAMP, cast.functions("damp"))
-        self.observe = self.compile_job(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
+        self.observe = self.compile_job(
+            calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn
+        )
         self.store_addresses(calls.RECORD, cast.functions("record"))
         self.store_addresses(calls.EVENTS, cast.functions("events"))
         self.store_hooks(*READER_HOOKS)

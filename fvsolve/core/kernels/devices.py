@@ -8,9 +8,22 @@ from fvsolve.jit import njit
 
 # columns of `hooks`
 (
-    SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, HEAT, STORED, STEP, SLOPE, LIFT, BENDS, LEAD,
-) = range(len(calls.HOOKS))  # fmt: skip
-TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
+    SET,
+    MOVE,
+    EVENTS,
+    VALUE,
+    OUTSIDE,
+    POWER,
+    HEAT,
+    STORED,
+    STEP,
+    SLOPE,
+    LIFT,
+    BENDS,
+    LEAD,
+) = range(len(calls.HOOKS))
+# result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
+TEMPORARY = 2
 
 
 @njit
@@ -87,7 +100,9 @@ def power_devices(t, y, dydt, out, handle, power):
         hook = tables.hooks[devices[k]["hooks"], POWER]
         power[at], power[at + 1], power[at + 2] = 0.0, 0.0, 0.0
         if hook != 0:
-            power[at], power[at + 1], power[at + 2] = calls.call_power(hook, t, y, dydt, out, tables, devices[k])
+            power[at], power[at + 1], power[at + 2] = calls.call_power(
+                hook, t, y, dydt, out, tables, devices[k]
+            )
         at += DEVICE_ROWS
 
 

@@ -11,12 +11,16 @@ from collections import namedtuple
 import numpy as np
 
 # Codes of kinds, for kernels.
-FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: given pressure, storage, storage, no storage
-MOVING, VESSEL = 4, 5  # storage with pressure known before nodes are solved: its volume changes; vessel of a device
+# node kinds: given pressure, storage, storage, no storage
+FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3
+# storage with pressure known before nodes are solved: its volume changes; vessel of a device
+MOVING, VESSEL = 4, 5
 PATCH = 6  # patch of a basin, which sets its pressure and receives its flow
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
-UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4  # scheme families; LINEAR: six weights, SHORT: upwind3
-MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, for scalars in linearisation
+# scheme families; LINEAR: six weights, SHORT: upwind3
+UPWIND, LINEAR, MUSCL, WENO5, SHORT = 0, 1, 2, 3, 4
+# FLAT: no slope, for scalars in linearisation
+MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
@@ -39,7 +43,8 @@ SETTINGS = record(
     scheme=i8,
     limiter=i8,
     degree=i8,  # degree of the polynomials next to an end
-    from_arriving=i8,  # 1: friction of a cell from the waves that enter it, as by the method of characteristics
+    # 1: friction of a cell from the waves that enter it, as by the method of characteristics
+    from_arriving=i8,
     w0=f8,  # weights of cells i-3 .. i+2 in the value at face i, for forward waves
     w1=f8,
     w2=f8,
@@ -48,16 +53,19 @@ SETTINGS = record(
     w5=f8,
     # Linear schemes: weights in the difference F[i] - F[i+1], nearest cell first.
     inside="(6,)f8",  # of cells i-3 .. i+2
-    enter="(3, 6)f8",  # of the datum and five cells, for the three cells at the end where the wave enters
+    # of the datum and five cells, for the three cells at the end where the wave enters
+    enter="(3, 6)f8",
     leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
-    walther_a=f8,  # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
+    # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
+    walther_a=f8,
     walther_b=f8,
     temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
-    reads_solved=i8,  # 1 if a feature reads values that only the solved nodes determine, before rates are computed
+    # 1 if a feature reads values that only the solved nodes determine, before rates are computed
+    reads_solved=i8,
     gravity=f8,
     datum=f8,  # elevation of zero height in energy studies [m]
     swept=i8,  # 1 if a feature changes volumes of nodes
@@ -103,23 +111,28 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
     noise=f8,  # square of a negligible flow [kg2/s2]
     compliance=f8,  # of the wall, d ln(area) / dp [1/Pa]
     slope=f8,  # rise per length, 0 for a pipe with an elevation profile
-    rise=i8,  # offset in `profile` of rises above its `from` end at faces and centres [m]; -1: straight
+    # offset in `profile` of rises above its `from` end at faces and centres [m]; -1: straight
+    rise=i8,
     terms=i8,  # number of exponentials of unsteady friction; 0 for none
     term=i8,  # offset in `floats` of pairs: drag per lag of the flow [1/s], rate of the lag [1/s]
     memory=i8,  # offset in y of the lagged flows, a row of cells for each term [kg/s]
     elements=i8,  # number of Kelvin-Voigt elements of the wall; 0 for none
-    element=i8,  # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
+    # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
+    element=i8,
     strain=i8,  # offset in y of the lagged w = r + l, a row of cells for each element [kg/s]
     face=i8,  # offset in `profile` of mass per length at faces
     flux=i8,  # offset in `profile` of momentum flux at faces
-    center=i8,  # offset in `profile` of mass per length at centres; with scalars under the linear law too
+    # offset in `profile` of mass per length at centres; with scalars under the linear law too
+    center=i8,
     from_base=f8,  # laws log and table: flow into the node, computed for the profile [kg/s]
     to_base=f8,
     from_mass=f8,  # mass per length at the end, computed for the profile [kg/m]
     to_mass=f8,
     forcing=i8,  # of its first cell among the forcings of stretches, see `LAYOUT`; -1 for none
-    temperature=f8,  # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
-    heat=i8,  # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
+    # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
+    temperature=f8,
+    # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
+    heat=i8,
 )
 
 COUPLING = record(  # flow at once between two nodes, in addition to that of restrictions
@@ -147,7 +160,8 @@ NODE = record(
     shapes=i8,  # number of rows of that table
     volume=f8,  # volume of a chamber [m3]; of a moving chamber at the start
     row=i8,  # row in its cluster; number of a tank or moving chamber
-    gates=i8,  # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
+    # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
+    gates=i8,
     gate_count=i8,
     columns=i8,  # number of these columns
     head_given=i8,  # laws log and table: 1 if the schedule is a head [m]
@@ -163,20 +177,28 @@ VALVE = record(
     table=i8,
     table_size=i8,
     solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
-    chained=i8,  # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
-    level_start=i8,  # 1: Newton starts from equal potentials at both ends, those of the end outside the cluster
-    flow_given=i8,  # 1: nothing else joins a junction at its end, so its flow is given there and has no rate
-    one_way=i8,  # BOTH_WAYS, or OUTWARD: only to its end `to`, a known pressure; OUTWARD_DEMAND: a demand flows so
+    # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
+    chained=i8,
+    # 1: Newton starts from equal potentials at both ends, those of the end outside the cluster
+    level_start=i8,
+    # 1: nothing else joins a junction at its end, so its flow is given there and has no rate
+    flow_given=i8,
+    # BOTH_WAYS, or OUTWARD: only to its end `to`, a known pressure; OUTWARD_DEMAND: a demand flows so
+    one_way=i8,
     begins=f8,  # drop below which an outward link has no flow [Pa]
     conductance=f8,  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
-    transition=f8,  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
-    rounding_drop=f8,  # drop below which the law is laminar at any opening [Pa]: too small for error control
+    # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
+    transition=f8,
+    # drop below which the law is laminar at any opening [Pa]: too small for error control
+    rounding_drop=f8,
     hooks=i8,  # row of `hooks`, the functions of its own law; -1 for the square-root law
     device=i8,  # device that sets its conductance; -1: its schedule sets it
     data=i8,  # offset of the numbers of its law in `floats`
     event=i8,  # offset of its flags in `armed`, for a law with kinks
-    hold=i8,  # offset in `integers` of what it may hold, see `node_clusters.hold_pressures`; -1 for nothing
-    command=i8,  # schedule of the position of a spool, from which its own schedule follows; -1 for none
+    # offset in `integers` of what it may hold, see `node_clusters.hold_pressures`; -1 for nothing
+    hold=i8,
+    # schedule of the position of a spool, from which its own schedule follows; -1 for none
+    command=i8,
     back=f8,  # square-root law: fraction of the conductance for flow from `to` to `from`
     drive=f8,  # relative speed of a pump in the profile
     open=f8,  # conductance of the profile; 0 if the flow does not obey its law
@@ -184,7 +206,8 @@ VALVE = record(
     drop=f8,  # of the profile [Pa]
 )
 BOTH_WAYS, OUTWARD, OUTWARD_DEMAND = range(3)
-TO_HELD, FROM_HELD, FLOW_HELD = range(3)  # held by a valve: pressure at its end `to`, or at `from`, or its flow
+# held by a valve: pressure at its end `to`, or at `from`, or its flow
+TO_HELD, FROM_HELD, FLOW_HELD = range(3)
 NOT_HELD = 1e300  # in out[drive] of such a valve: it holds nothing at present
 
 COLUMN = record(
@@ -214,7 +237,8 @@ DEVICE = record(
     valve=i8,  # restriction that it opens and closes, the first of several; -1 for none
     node=i8,  # vessel whose pressure it computes, or sensed node; -1 for none
     second=i8,  # second sensed node; -1 for none
-    node_weight=f8,  # weights of the pressures at both sensed nodes in the pressure that lifts its valve
+    # weights of the pressures at both sensed nodes in the pressure that lifts its valve
+    node_weight=f8,
     second_weight=f8,
     event=i8,  # its first event function
     data=i8,  # offset of its numbers in `floats`
@@ -222,12 +246,14 @@ DEVICE = record(
     row=i8,  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
     travel=i8,  # offset in y of a position and its velocity that it reads; -1 for none
     opens_by_event=i8,  # 1 if only events open it
-    controls_column=i8,  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
+    # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
+    controls_column=i8,
 )
 
 SCHEDULE = record(
     first=i8,
-    pieces=i8,  # number of its pieces; 0 for a schedule that follows a block of `controls`, -1 for a formula
+    # number of its pieces; 0 for a schedule that follows a block of `controls`, -1 for a formula
+    pieces=i8,
 )
 # Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 wave cut off below zero), origin, then
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase.
@@ -244,7 +270,8 @@ CLUSTER_RECORD = record(
     first_couple=i8,
     couples=i8,
     inverse=i8,
-    order=i8,  # offset in `integers` of the places and the elimination of its sparse matrix; -1: a full matrix
+    # offset in `integers` of the places and the elimination of its sparse matrix; -1: a full matrix
+    order=i8,
     matrix=i8,  # numbers of its matrix: those of the sparse matrix, or of a full one
     senses=i8,  # 1 if a device senses pressures for one of its valves
     held=i8,  # numbers of the balances of nodes whose pressures its valves may hold
@@ -257,7 +284,8 @@ LAYOUT = record(
     ends=i8,
     valve=i8,
     column=i8,
-    valve_controlled=i8,  # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
+    # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
+    valve_controlled=i8,
     stiffness=i8,  # of moving chambers: pressure per mass [Pa/kg]
     outflow_fraction=i8,  # of patches: fraction of the requested outflow for which there is water
     swept=i8,  # mass flow out of moving chambers by piston and leak [kg/s]
@@ -267,7 +295,8 @@ LAYOUT = record(
     drive=i8,  # present relative speeds of pumps, an entry for each valve
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
-    heat=i8,  # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
+    # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
+    heat=i8,
     extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
     source=i8,  # then rain on basins, and negative infiltration [kg/s]
     quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
@@ -275,8 +304,10 @@ LAYOUT = record(
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
     scalar_inflow=i8,  # flow of scalars from links into nodes [kg/s]
-    exchange=i8,  # of each heat exchanger: value of the scalar at the thermal node, heat out of the fluid [W]
-    forcing=i8,  # forcing of stretches of fluid: change since the start of the work that a feature does [J/kg]
+    # of each heat exchanger: value of the scalar at the thermal node, heat out of the fluid [W]
+    exchange=i8,
+    # forcing of stretches of fluid: change since the start of the work that a feature does [J/kg]
+    forcing=i8,
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
     tank=i8,  # inertia of basins on frames, see `kernels.moving_frames`
@@ -289,7 +320,8 @@ LAYOUT = record(
     shaft=i8,  # speeds of shafts that laws of devices read before the nodes are solved [rad/s]
     size=i8,
     device_mark=i8,  # offset in `marks` of those of devices
-    feature_power=i8,  # number of rows of `power` that features fill, between those of networks and of devices
+    # number of rows of `power` that features fill, between those of networks and of devices
+    feature_power=i8,
     feature_stored=i8,  # likewise of `stored`
 )
 BODY_OUT = 45  # numbers of each body in `out`
@@ -310,7 +342,8 @@ NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
 PROBE = record(
     kind=i8,
     index=i8,  # of the node, pipe, valve, column, mass, push, piston or basin
-    side=i8,  # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
+    # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
+    side=i8,
     cell=i8,  # first cell that is read; for a basin offset of the cell numbers in `integers`
     count=i8,  # number of these cells; of the edges of a spool valve
     weights=i8,  # offset of their weights in `floats`
@@ -321,7 +354,8 @@ PROBE = record(
     scalar=i8,
     mark=i8,  # pipe to be marked when this pressure is below vapour pressure; -1: none
 )
-PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
+# probe kinds
+PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
 CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
@@ -350,10 +384,12 @@ SECTION_FLOW = 33  # through a section of basin `index`, by `count` marked faces
 BASIN = record(
     kind=i8,  # code of its physics, see `basins.basin_patches`
     deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
-    given=i8,  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
+    # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
+    given=i8,
     scheme=i8,
     limiter=i8,  # on rectangles
-    kerbs=i8,  # offset in `plane` of depths of kerbs: of rows of a grid, or of cells, see `free_surface.surface_mesh`
+    # offset in `plane` of depths of kerbs: of rows of a grid, or of cells, see `free_surface.surface_mesh`
+    kerbs=i8,
     wide=f8,  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
     steepest=f8,  # bound of gradients in cells of meshes, see `basins.cell_sides.gradient_share`
     n=i8,  # number of cells
@@ -365,10 +401,12 @@ BASIN = record(
     spacing=i8,  # offset in `plane` of 1 / widths of columns, then of rows [1/m]
     plan=i8,  # offset in `plane` of constant data, rows of cells
     area=i8,  # offset in `plane` of areas of cells [m2]
-    reflect=i8,  # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
+    # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
+    reflect=i8,
     outer_given=i8,  # number of these values: 0 if the whole boundary is wall
     through=i8,  # offset in `work` of inflows through faces of the boundary; -1 if none is open
-    boundary_rates=i8,  # offset in `work` of rates that are computed only for flows through the boundary
+    # offset in `work` of rates that are computed only for flows through the boundary
+    boundary_rates=i8,
     mesh=i8,  # offset in `plane` of numbers of a mesh
     links=i8,  # offset in `integers` of numbers of a mesh
     work=i8,  # offset of its part of `work`
@@ -379,7 +417,8 @@ BASIN = record(
     small=f8,  # square of a negligible value
     carried=i8,  # first state of scalars, depth times value, scalar after scalar; -1 for none
     lost=i8,  # offset of its cells among the losses of a scalar
-    flows=i8,  # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
+    # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
+    flows=i8,
     outside=i8,  # offset in `work` of values of each scalar beyond the boundary
     scalar_work=i8,  # offset in `work` of work arrays for scalars
     fastest=f8,  # rate of a given velocity [1/s]
@@ -391,37 +430,47 @@ BASIN = record(
     unsplit=f8,  # rate of its cells for the step limit over the rate from the kernels
     rest=f8,  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
     wall=i8,  # first of its moving walls
-    walls=i8,  # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
+    # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
+    walls=i8,
     drawn=i8,  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
     stretch=i8,  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
     lines=i8,  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
     thrust=i8,  # offset in `work` of forces on boundary faces, see `free_surface.surface_grid`
     turn=i8,  # 0 if grid lines move along x, 1 if along y
     body=i8,  # body that carries it; -1 for none
-    loads_body=i8,  # 1 if its load acts on that body: forces move the body, or the joint load is an output
+    # 1 if its load acts on that body: forces move the body, or the joint load is an output
+    loads_body=i8,
     frame=i8,  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
     corners=i8,  # number of corners of a mesh
-    places=i8,  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
+    # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
+    places=i8,
     sides=i8,  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
     ends=i8,  # offset in `integers` of corners of sides and cells, see `moving_meshes`
-    driven=i8,  # offset in `work` of flows at faces of driven patches, see `free_surface.patch_closures`; -1 for none
+    # offset in `work` of flows at faces of driven patches, see `free_surface.patch_closures`; -1 for none
+    driven=i8,
     rain=i8,  # schedule of the mean rate of rain; -1 for none
     frames=i8,  # number of frames of rates of rain in cells; 0 for uniform rain
     frame_rates=i8,  # offset in `plane` of these rates, a row of cells for each frame [m/s]
     frame_position=i8,  # schedule of the position among frames, from 0 for the first
-    present=i8,  # offset in `work` of the present numbers of rain and soil, see `free_surface.water_sources`
+    # offset in `work` of the present numbers of rain and soil, see `free_surface.water_sources`
+    present=i8,
     rained=i8,  # state: height of rain since the start [m]
     soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON or GREEN_AMPT
-    soil_numbers=i8,  # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
-    soil_row=i8,  # length of each row of these numbers: the number of cells, or less for a uniform soil
+    # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
+    soil_numbers=i8,
+    # length of each row of these numbers: the number of cells, or less for a uniform soil
+    soil_row=i8,
     soil_work=i8,  # offset in `work` of rates of infiltration in cells, for probes
-    infiltrated=i8,  # first state of infiltrated heights of cells [m]; those of condensed times follow
+    # first state of infiltrated heights of cells [m]; those of condensed times follow
+    infiltrated=i8,
     source=i8,  # first of its rows in the ledger of rain and infiltration
     total_area=f8,  # of all cells [m2]
-    maxima=i8,  # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
+    # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
+    maxima=i8,
     maxima_row=i8,  # number of these for each row of cells; a mesh is one row
     wet_depth=f8,  # depth above which a cell counts as wet there [m]
-    marked=i8,  # offset in `integers` of faces with walls or in sections, see `free_surface.marked_faces`; -1 for none
+    # offset in `integers` of faces with walls or in sections, see `free_surface.marked_faces`; -1 for none
+    marked=i8,
     mark_rows=i8,  # number of rows of faces there
     marks=i8,  # number of marks; on a mesh each face has two
     marked_faces=i8,  # number of marked faces
@@ -437,19 +486,22 @@ PATCHES = record(
     first=i8,  # offset of its cells in `integers`
     count=i8,  # number of its cells
     sizes=i8,  # offset in `plane` of the present area of these [m2] and length of its faces [m]
-    ring=i8,  # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
+    # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
+    ring=i8,
     faces=i8,  # number of its faces
     # Offset in `plane` of outward normals along x, along y, and length over area of cells, for each face; with
     # moving walls also those as drawn.
     normals=i8,
     open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
     moves=i8,  # 1 if it is a moving wall
-    values=i8,  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
+    # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
+    values=i8,
     # Offset in `integers` of the cells next inside those behind its faces, a cell itself if there is none; of an
     # interior patch, its own cells at the faces around it. On a mesh the nearest cells around each cell behind.
     second=i8,
     stencil=i8,  # number of cells of `second` for each face
-    weights=i8,  # on a mesh: offset in `plane` of their weights, see `free_surface.patch_closures.read_around`
+    # on a mesh: offset in `plane` of their weights, see `free_surface.patch_closures.read_around`
+    weights=i8,
     # Offset in `integers` of the faces before and after each face along a driven patch of a mesh; -1 if not needed.
     neighbours=i8,
     closure=i8,  # NO_CLOSURE, or the closure of a driven patch
@@ -459,7 +511,8 @@ PATCHES = record(
     points=i8,  # number of these levels
     conveyance=i8,  # offset in `plane` of sqrt(slope) / n of uniform flow at its faces [m^(1/3)/s]
     valve=i8,  # restriction from the junction of its links to its cells
-    inside=i8,  # offset in `work` of the states inside its faces, see `free_surface.patch_closures.faces_of`
+    # offset in `work` of the states inside its faces, see `free_surface.patch_closures.faces_of`
+    inside=i8,
     rest=f8,  # level at rest above the elevation of the basin [m]
     lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
 )
@@ -477,7 +530,8 @@ WALL = record(
     inertia=f8,  # of what moves with it [kg]
     lightness=f8,  # 1 / inertia, 0 for a fixed wall [1/kg]
     schedule=i8,  # schedule of its travel; -1 for none
-    weights=i8,  # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
+    # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
+    weights=i8,
     faces=i8,  # offset in `integers` of its face numbers on the boundary
     count=i8,  # number of its faces
     lengths=i8,  # offset in `plane` of lengths of its faces [m]
@@ -486,9 +540,11 @@ WALL = record(
 )
 
 SCALAR = record(
-    y=i8,  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
+    # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
+    y=i8,
     places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
-    wall_masses=i8,  # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
+    # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
+    wall_masses=i8,
     diffusivity=f8,
     decay=f8,  # [1/s]
     ambient=f8,  # value to which it decays
@@ -502,7 +558,8 @@ SCALAR = record(
     molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
     specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
     zero=f8,  # absolute temperature at which its value is 0 [K]
-    by_cell=i8,  # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
+    # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
+    by_cell=i8,
 )
 
 HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
@@ -522,7 +579,8 @@ REACTION = record(
     program=i8,  # header row of the formula of its rate in `pieces`; -1 for mass action
     scalars=i8,  # offset of the numbers of its scalars in `integers`
     count=i8,  # number of these
-    data=i8,  # offset in `floats` of three numbers of each scalar: both orders, and its change in its own unit
+    # offset in `floats` of three numbers of each scalar: both orders, and its change in its own unit
+    data=i8,
     extent=i8,  # first of its rows in the ledger of reactions
     extents=i8,  # number of these rows: 1, or a row for each place, see SCALAR
     limits=i8,  # 1 if its rate limits steps
@@ -560,15 +618,32 @@ RECORDS = {
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
-RunArrays = namedtuple("RunArrays",
+RunArrays = namedtuple(
+    "RunArrays",
     (
-        "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "applied", "stack",
-        "maxima", "accepted", "features", "memory",
+        "clock",
+        "work",
+        "armed",
+        "marks",
+        "scratch",
+        "spare",
+        "seen",
+        "bands",
+        "joint",
+        "sums",
+        "envelope",
+        "extremes",
+        "applied",
+        "stack",
+        "maxima",
+        "accepted",
+        "features",
+        "memory",
     ),
-)  # fmt: skip
+)
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
-MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are not records are float64[:]
+# float64[:, :]; all others that are not records are float64[:]
+MATRICES = ("pieces", "envelope", "extremes")
 INTEGERS = (
     "integers",
     "bands",
@@ -588,7 +663,9 @@ def table_types() -> HandleTables:
 
     def of(name):
         record = {**RECORDS, "clock": CLOCK}.get(name)
-        values = from_dtype(record) if record else types.int64 if name in INTEGERS else types.float64
+        values = (
+            from_dtype(record) if record else types.int64 if name in INTEGERS else types.float64
+        )
         return types.Array(values, 2 if name in (*MATRICES, "calls", "hooks") else 1, "C")
 
     return HandleTables(*map(of, HandleTables._fields))

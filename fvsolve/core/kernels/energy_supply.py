@@ -18,21 +18,49 @@ from fvsolve.jit import COMPILING, Intrinsic, njit, plain_kinds
 # Header: count of steps at the next state; interval of states [steps], states with this interval, fraction of the next
 # interval; error bound of the supplied energy, greatest released and supplied energies [J]; greatest excess over the
 # allowed energy, that excess [J], its time [s] and account of stored energy; time of the last state [s].
-NEXT, INTERVAL, COUNT, TURN, ERROR, RELEASED, POSITIVE, RATIO, EXCESS, TIME, PLACE, T, STATES, HEADER = range(14)
+(
+    NEXT,
+    INTERVAL,
+    COUNT,
+    TURN,
+    ERROR,
+    RELEASED,
+    POSITIVE,
+    RATIO,
+    EXCESS,
+    TIME,
+    PLACE,
+    T,
+    STATES,
+    HEADER,
+) = range(14)
 ALLOWED, BASE, ROUNDING, LIMITS = range(4)  # entries of `limits`
 MOST = 6.0  # states after which the interval doubles
-MOST_EXACT = 2.0  # the same while the supplied energy has no error, so that more states add nothing to it
+# the same while the supplied energy has no error, so that more states add nothing to it
+MOST_EXACT = 2.0
 GOLDEN = 0.6180339887498949  # fraction of an interval by which successive intervals differ
 
 # Arrays of a watch : letter of the type.
 WATCH_KINDS = {
     "own": "h",  # handle of the model with arrays of its own, so that the run is not disturbed
-    "dydt": "v", "out": "v", "power": "v", "stored": "v", "held": "v", "values": "v",  # work arrays
-    "sources": "h", "signs": "v",  # number of the source and row of power of each term, in pairs, and its sign
-    "nodes": "h", "spreads": "v",  # node of each source, -1 for other sources; range of its values known before the run
-    "holders": "h", "holding_signs": "v",  # number of the account and row of stored energy of each term, and its sign
-    "limits": "v", "data": "v",
-}  # fmt: skip
+    "dydt": "v",
+    "out": "v",
+    "power": "v",
+    "stored": "v",
+    "held": "v",
+    "values": "v",  # work arrays
+    # number of the source and row of power of each term, in pairs, and its sign
+    "sources": "h",
+    "signs": "v",
+    # node of each source, -1 for other sources; range of its values known before the run
+    "nodes": "h",
+    "spreads": "v",
+    # number of the account and row of stored energy of each term, and its sign
+    "holders": "h",
+    "holding_signs": "v",
+    "limits": "v",
+    "data": "v",
+}
 WatchArrays = namedtuple("WatchArrays", WATCH_KINDS)
 
 
@@ -75,12 +103,17 @@ def watch_state(t, steps, y, ledger, handle, watch, begins):
     while histories of the run have grown (the caller of the time loop then gives those of the watch the same size).
     """
     w = open_watch(watch)
-    data, nodes, stored = w.data, w.nodes, w.stored
+    data = w.data
+    nodes = w.nodes
+    stored = w.stored
     if (np.isnan(data[T]) and not begins) or not copy_run(open_tables(handle), open_tables(w.own)):
         return data[NEXT]
     count, rows = nodes.size, stored.size
     masses, width = (data.size - HEADER - 4 * count - rows) // 2, ledger.size // 5
-    supplied, last, least, greatest = HEADER, HEADER + count, HEADER + 2 * count, HEADER + 3 * count
+    supplied = HEADER
+    last = HEADER + count
+    least = HEADER + 2 * count
+    greatest = HEADER + 3 * count
     entered = HEADER + 4 * count
     left, first = entered + masses, entered + 2 * masses
     energies_at(t, y, w)
@@ -150,7 +183,9 @@ def copy(source, target):
 @njit
 def energies_at(t, y, w):
     """Write the rows of stored energy and the value of each source at the state y; w : open handle of the watch."""
-    stored, values, nodes = w.stored, w.values, w.nodes
+    stored = w.stored
+    values = w.values
+    nodes = w.nodes
     tables, by_node = open_tables(w.own), 0
     for i in range(stored.size):
         stored[i] = 0.0
@@ -179,7 +214,9 @@ def energies_at(t, y, w):
 @njit
 def compare(t, supplied, positive, released, w):
     """Compare the change of the stored energy, in `w.stored`, with the supplied energy; keep the greatest excess."""
-    data, held, limits = w.data, w.held, w.limits
+    data = w.data
+    held = w.held
+    limits = w.limits
     if released > data[RELEASED]:
         data[RELEASED] = released
     if positive > data[POSITIVE]:

@@ -11,9 +11,33 @@ from math import atan2, cos, exp, hypot, log, sin, sqrt, tan, tanh
 from fvsolve.jit import njit
 
 (
-    CONSTANT, TIME, INPUT, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER_OF, NEGATE, SINE, COSINE, TANGENT, ARCTANGENT,
-    EXPONENTIAL, LOGARITHM, ROOT, TANH, HYPOTENUSE, WHERE, BEFORE, AFTER, ABSOLUTE, LEAST, GREATEST, LESS, MORE,
-) = range(26)  # fmt: skip
+    CONSTANT,
+    TIME,
+    INPUT,
+    ADD,
+    SUBTRACT,
+    MULTIPLY,
+    DIVIDE,
+    POWER_OF,
+    NEGATE,
+    SINE,
+    COSINE,
+    TANGENT,
+    ARCTANGENT,
+    EXPONENTIAL,
+    LOGARITHM,
+    ROOT,
+    TANH,
+    HYPOTENUSE,
+    WHERE,
+    BEFORE,
+    AFTER,
+    ABSOLUTE,
+    LEAST,
+    GREATEST,
+    LESS,
+    MORE,
+) = range(26)
 TIE = 1e-300  # value of the second event function of a kink if its sides are equal
 FIRST_KINK = ABSOLUTE  # codes from here on have flags
 STEPS, SCALE, OFFSET, FLAG = 2, 3, 4, 5  # columns of the header
@@ -38,7 +62,9 @@ def run_program(pieces, first, t, limit, base, stack, armed, g):
     first : header row in `pieces`; base : number of inputs, which stack[:base] contains; stack : work array
     armed, g : as for `is_low`
     """
-    flag, k, time = int(pieces[first, FLAG]), base, min(t, limit)
+    flag = int(pieces[first, FLAG])
+    k = base
+    time = min(t, limit)
     for i in range(first + 1, first + 1 + int(pieces[first, STEPS])):
         code, number = int(pieces[i, 1]), pieces[i, 2]
         if code == CONSTANT:
@@ -93,7 +119,9 @@ def kink(code, number, k, flag, stack, armed, g):
     The result is NaN if a value is.
     """
     if code == ABSOLUTE:
-        stack[k - 1] = -stack[k - 1] if is_low(stack[k - 1], number, flag, armed, g) else stack[k - 1]
+        stack[k - 1] = (
+            -stack[k - 1] if is_low(stack[k - 1], number, flag, armed, g) else stack[k - 1]
+        )
         return k
     k -= 1
     e = stack[k - 1] - stack[k]
@@ -170,20 +198,28 @@ def program_slopes(pieces, first, t, limit, stack):
 @njit
 def slope_of_function(code, k, stack):
     """Replace value and derivatives in stack[k - 3:k] by those of a function of a single argument."""
-    x, dx, ddx = stack[k - 3], stack[k - 2], stack[k - 1]
+    x = stack[k - 3]
+    dx = stack[k - 2]
+    ddx = stack[k - 1]
     if code == NEGATE:
         f, df, ddf = -x, -1.0, 0.0
     elif code == SINE:
-        f, df, ddf = sin(x), cos(x), -sin(x)
+        f = sin(x)
+        df = cos(x)
+        ddf = -sin(x)
     elif code == COSINE:
-        f, df, ddf = cos(x), -sin(x), -cos(x)
+        f = cos(x)
+        df = -sin(x)
+        ddf = -cos(x)
     elif code == TANGENT:
         f = tan(x)
         df, ddf = 1.0 + f * f, 2.0 * f * (1.0 + f * f)
     elif code == EXPONENTIAL:
         f = df = ddf = exp(x)
     elif code == LOGARITHM:
-        f, df, ddf = log(x), 1.0 / x, -1.0 / (x * x)
+        f = log(x)
+        df = 1.0 / x
+        ddf = -1.0 / (x * x)
     elif code == ROOT:
         f = sqrt(x)
         df, ddf = 0.5 / f, -0.25 / (f * x)
@@ -197,12 +233,21 @@ def slope_of_function(code, k, stack):
 @njit
 def slope_of_pair(code, k, stack):
     """Replace value and derivatives in stack[k - 3:k] by those of a function of this entry and the entry after it."""
-    x, dx, ddx, y, dy, ddy = stack[k - 3], stack[k - 2], stack[k - 1], stack[k], stack[k + 1], stack[k + 2]
+    x = stack[k - 3]
+    dx = stack[k - 2]
+    ddx = stack[k - 1]
+    y = stack[k]
+    dy = stack[k + 1]
+    ddy = stack[k + 2]
     if code == ADD or code == SUBTRACT:
         s = 1.0 if code == ADD else -1.0
-        f, df, ddf = x + s * y, dx + s * dy, ddx + s * ddy
+        f = x + s * y
+        df = dx + s * dy
+        ddf = ddx + s * ddy
     elif code == MULTIPLY:
-        f, df, ddf = x * y, dx * y + x * dy, ddx * y + 2.0 * dx * dy + x * ddy
+        f = x * y
+        df = dx * y + x * dy
+        ddf = ddx * y + 2.0 * dx * dy + x * ddy
     elif code == DIVIDE:
         # Quotient rule by derivatives of x = f y: x' = f' y + f y', x'' = f'' y + 2 f' y' + f y''.
         f = x / y

@@ -26,7 +26,10 @@ def fused_cells(h, k, flow, half, base, r, l, r_new, l_new, least, greatest):
     least, greatest : float64[n]  envelope of r + l [kg/s]
     NaN counts as below and above, so the search for it costs nothing.
     """
-    here, beyond, low, high = r[1:], l[1:], 0, 0
+    here = r[1:]
+    beyond = l[1:]
+    low = 0
+    high = 0
     for i in range(r_new.size):
         m = flow + (r[i] - beyond[i])
         s = half * (abs(m) * m) - base
@@ -52,7 +55,9 @@ def fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, table
     low, high = not a + b >= e[0, at + i], not a + b <= e[2, at + i]
     if not (low or high):
         return 0
-    return update_envelope(t, r_new[i : i + 1], l_new[i : i + 1], at + i, int(low), int(high), index, tables)
+    return update_envelope(
+        t, r_new[i : i + 1], l_new[i : i + 1], at + i, int(low), int(high), index, tables
+    )
 
 
 @njit(forceinline=True)
@@ -63,10 +68,15 @@ def fused_block(t, h, terms, index, at, i, j, r, l, r_new, l_new, tables):
     at : first cell of the pipe in per-cell arrays; r, l, r_new, l_new : waves in its cells before and after the step
     """
     (k, flow, half, base), e = terms, tables.envelope
-    ahead, behind, r_new, l_new = r[i - 1 : j], l[i : j + 1], r_new[i:j], l_new[i:j]
+    ahead = r[i - 1 : j]
+    behind = l[i : j + 1]
+    r_new = r_new[i:j]
+    l_new = l_new[i:j]
     least, greatest = e[0, at + i : at + j], e[2, at + i : at + j]
     low, high = fused_cells(h, k, flow, half, base, ahead, behind, r_new, l_new, least, greatest)
-    return update_envelope(t, r_new, l_new, at + i, low, high, index, tables) if low + high > 0 else 0
+    return (
+        update_envelope(t, r_new, l_new, at + i, low, high, index, tables) if low + high > 0 else 0
+    )
 
 
 @njit
@@ -81,15 +91,26 @@ def fused_step_linear(t, h, y, y_new, out, handle, values):
     pipes, bad = tables.pipes, 0
     for index in range(pipes.size):
         pipe = pipes[index]
-        n, o, at, ends = pipe["cells"], pipe["y"], pipe["cell"], tables.layout[0]["ends"] + 4 * index
-        r, l, r_new, l_new = y[o : o + n], y[o + n : o + 2 * n], y_new[o : o + n], y_new[o + n : o + 2 * n]
+        n = pipe["cells"]
+        o = pipe["y"]
+        at = pipe["cell"]
+        ends = tables.layout[0]["ends"] + 4 * index
+        r = y[o : o + n]
+        l = y[o + n : o + 2 * n]
+        r_new = y_new[o : o + n]
+        l_new = y_new[o + n : o + 2 * n]
         terms = pipe["speed"] / pipe["dx"], pipe["flow"], 0.5 * pipe["loss"], 0.5 * pipe["drag"]
         for side in range(2):  # the cells at the ends, whose neighbours are nodes
             i = side * (n - 1)
-            outer_waves = out[ends] if i == 0 else r[i - 1], out[ends + 3] if i == n - 1 else l[i + 1]
+            outer_waves = (
+                out[ends] if i == 0 else r[i - 1],
+                out[ends + 3] if i == n - 1 else l[i + 1],
+            )
             bad += fused_cell(t, h, terms, index, at, i, outer_waves, r, l, r_new, l_new, tables)
         for i in range(1, n - 1, BLOCK):
-            bad += fused_block(t, h, terms, index, at, i, min(i + BLOCK, n - 1), r, l, r_new, l_new, tables)
+            bad += fused_block(
+                t, h, terms, index, at, i, min(i + BLOCK, n - 1), r, l, r_new, l_new, tables
+            )
     # With an empty dydt only nodes are solved: the loops above have computed the rates.
     run_job(RHS, t, y_new, y_new[:0], out, handle)
     observe_linear(t, y_new, out, handle, values)

@@ -33,7 +33,10 @@ def solve_fractions(matrix, right):
             if k != i and rows[k][i] != 0:
                 rows[k] = [a - rows[k][i] * b for a, b in zip(rows[k], rows[i], strict=True)]
     inverse = [row[n:] for row in rows]
-    return [[float(sum(a * inverse[k][j] for k, a in enumerate(row))) for j in range(n)] for row in right]
+    return [
+        [float(sum(a * inverse[k][j] for k, a in enumerate(row))) for j in range(n)]
+        for row in right
+    ]
 
 
 def cell_averages(cell, degree):
@@ -78,11 +81,16 @@ def difference_rows(weights, degree):
     inside = np.append(weights, 0.0) - np.append(0.0, weights)
     unit = np.eye(6)
     beyond = np.pad(END_ENTERING[degree], ((0, 0), (0, 1)))
-    near = [*beyond[::-1], *unit[1:]]  # cells -3 .. 4 at the end where a wave enters, as sums of datum and cells 0 .. 4
+    # cells -3 .. 4 at the end where a wave enters, as sums of datum and cells 0 .. 4
+    near = [*beyond[::-1], *unit[1:]]
     face = [unit[0], *(sum(w * near[j + m] for m, w in enumerate(weights)) for j in range(1, 4))]
     enter = np.array([face[j] - face[j + 1] for j in range(3)])
-    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]  # cells at the end where it leaves, as sums of five cells
-    face = [END_VALUE[degree], *(sum(w * near[j + 5 - m] for m, w in enumerate(weights)) for j in range(1, 3))]
+    # cells at the end where it leaves, as sums of five cells
+    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]
+    face = [
+        END_VALUE[degree],
+        *(sum(w * near[j + 5 - m] for m, w in enumerate(weights)) for j in range(1, 3)),
+    ]
     leave = np.array([face[j + 1] - face[j] for j in range(2)])
     return inside, enter, leave
 
@@ -131,7 +139,9 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
                 total += END_LEAVING[d, g, k] * edge[k]
             ghosts[g] = total
         return
-    a, b, e = edge[0], edge[1], edge[2]
+    a = edge[0]
+    b = edge[1]
+    e = edge[2]
     low = 3.0 * a - 3.0 * b + e if n > 2 else 2.0 * a - b
     for g in range(3):
         ghosts[g] = low
@@ -139,8 +149,13 @@ def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
         # Two extrapolations: by a polynomial, and by a limited line near a jump, where it would overshoot.
         slope = value_muscl(limiter, b, a, low) - a
         d3, d4 = edge[3], edge[4]
-        rough = roughness(a - b, a - 2.0 * b + e, a - 3.0 * b + 3.0 * e - d3,
-                          a - 4.0 * b + 6.0 * e - 4.0 * d3 + d4, small)  # fmt: skip
+        rough = roughness(
+            a - b,
+            a - 2.0 * b + e,
+            a - 3.0 * b + 3.0 * e - d3,
+            a - 4.0 * b + 6.0 * e - 4.0 * d3 + d4,
+            small,
+        )
         for g in range(3):
             high = 0.0
             for k in range(5):
@@ -160,7 +175,10 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
                 total += END_ENTERING[d, g, k + 1] * edge[k]
             ghosts[g] = total
         return
-    a, b, e, d3 = edge[0], edge[1], edge[2], edge[3]
+    a = edge[0]
+    b = edge[1]
+    e = edge[2]
+    d3 = edge[3]
     for g in range(3):
         # The mean of ghost cell and first cell is then the datum at the face between them.
         ghosts[g] = 2.0 * datum - a
@@ -178,7 +196,9 @@ def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
 @njit
 def end_value(c, right, family, degree, limiter, small, scratch):
     """Value of a wave at the left (0) or right (1) end of a pipe, through which it leaves, from its cell averages c."""
-    n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
+    n = c.size
+    edge = scratch[:5]
+    ghosts = scratch[5:8]
     edge_cells(c, right, edge)
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)

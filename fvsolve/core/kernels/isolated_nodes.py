@@ -27,13 +27,17 @@ from fvsolve.core.kernels.dtypes import (
 from fvsolve.jit import njit
 
 DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: rounding
-OPENING = 100.0  # potential below a neighbour at which self-acting valves open, above their margins [Pa]
-RISE = 1e6  # potential of an inflow without a way out above the nodes beyond closed valves: check valves open [Pa]
+# potential below a neighbour at which self-acting valves open, above their margins [Pa]
+OPENING = 100.0
+# potential of an inflow without a way out above the nodes beyond closed valves: check valves open [Pa]
+RISE = 1e6
 # Codes of nodes in `out`: joined to a pipe or to a known pressure; isolated without demand, so that nothing determines
 # the pressure; isolated beside nodes with demand or inflow; isolated with a demand, which is not supplied.
 JOINED, UNDETERMINED, DRAINED, UNSUPPLIED = 0.0, 1.0, 2.0, 3.0
-NO_LEVEL = 1e299  # in place of a potential: no node lies beyond the closed valves, and no outward valve is open [Pa]
-FED = -1.0  # in place of `connected`: fluid flows into a group, so outward valves join it to ambient
+# in place of a potential: no node lies beyond the closed valves, and no outward valve is open [Pa]
+NO_LEVEL = 1e299
+# in place of `connected`: fluid flows into a group, so outward valves join it to ambient
+FED = -1.0
 
 
 @njit(forceinline=True)
@@ -75,7 +79,9 @@ def find_connected(cluster, tables, c, g, connected, group):
     An outward valve joins nodes to a known pressure only where fluid flows in: it cannot supply them.
     c : given inflow of the nodes [kg/s]; group : float64[nodes]  work array
     """
-    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
     for i in range(group.size):
         group[i] = i
     for e in range(g.size):
@@ -112,7 +118,9 @@ def connect_outward(cluster, tables, c, g, connected, group):
 
     The flow of a rigid column is such an inflow: it may change its sign. Arguments as for `find_connected`.
     """
-    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
     for i in range(connected.size):
         first = root_of(group, i)
         fed = c[i] > 0.0 or nodes[integers[cluster["first_node"] + i]]["gates"] >= 0
@@ -145,7 +153,9 @@ def leak_balance(cluster, tables, out, leaks, group, number, level):
     outflow counts as negative. The potentials are those of the nodes behind these valves.
     leaks : numbers in the cluster of closed valves, all those at isolated nodes
     """
-    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
     total, low, high = 0.0, 1e300, -1e300
     for k in range(leaks.size):
         valve = valves[integers[cluster["first_valve"] + int(leaks[k])]]
@@ -154,7 +164,9 @@ def leak_balance(cluster, tables, out, leaks, group, number, level):
         to_inside = j >= 0 and group[j] == number
         # A valve within the group, or between two other groups, lets nothing into this group.
         if from_inside != to_inside:
-            other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
+            other = total_pressure(
+                tables, out, valve["to_node"] if from_inside else valve["from_node"]
+            )
             low, high = min(low, other), max(high, other)
             leak = sqrt(abs(other - level))
             total += leak if other > level else -leak
@@ -164,7 +176,9 @@ def leak_balance(cluster, tables, out, leaks, group, number, level):
 @njit
 def group_by_open_valves(cluster, tables, g, group):
     """Write the same number to group[i] for all isolated nodes i that open valves join to each other."""
-    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
     for i in range(group.size):
         group[i] = i
     for e in range(g.size):
@@ -180,7 +194,10 @@ def group_by_open_valves(cluster, tables, g, group):
 @njit
 def closed_at_isolated(cluster, tables, g, connected, work):
     """Write the numbers in the cluster of the closed valves at its isolated nodes to `work`; returns their count."""
-    nodes, valves, integers, count = tables.nodes, tables.valves, tables.integers, 0
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
+    count = 0
     for e in range(g.size):
         if g[e] == 0.0:
             valve = valves[integers[cluster["first_valve"] + e]]
@@ -239,14 +256,17 @@ def mark_isolated(cluster, tables, out, g, c, connected, group, scale, work):
     c : given inflow of the nodes [kg/s]; scale : flow relative to which a demand counts as rounding [kg/s]
     work : float64[2 nodes + valves]  work array
     """
-    layout, integers, n = tables.layout[0], tables.integers, group.size
+    layout = tables.layout[0]
+    integers = tables.integers
+    n = group.size
     totals, drawn = work[:n], work[n : 2 * n]  # flow of each group; 1 if demands alone draw it
     leaks = work[2 * n :][: closed_at_isolated(cluster, tables, g, connected, work[2 * n :])]
     for i in range(n):
         totals[i], drawn[i] = 0.0, 1.0 if tables.settings[0]["law"] == LAW_LINEAR else 0.0
     for i in range(n):
         node, number = integers[cluster["first_node"] + i], int(group[i])
-        undetermined = connected[i] == 0.0 and tables.nodes[node]["gates"] < 0  # a rigid column determines a pressure
+        # a rigid column determines a pressure
+        undetermined = connected[i] == 0.0 and tables.nodes[node]["gates"] < 0
         out[layout["isolated"] + node] = UNDETERMINED if undetermined else JOINED
         totals[number] += c[i]
         # Only a demand alone may be left unsupplied; any other flow has nowhere to come from or go to.
@@ -278,7 +298,9 @@ def outlet_level(cluster, tables, out, g, group, number):
 
     The codes of nodes with an outward demand become UNSUPPLIED.
     """
-    valves, integers, level = tables.valves, tables.integers, NO_LEVEL
+    valves = tables.valves
+    integers = tables.integers
+    level = NO_LEVEL
     for e in range(g.size):
         valve = valves[integers[cluster["first_valve"] + e]]
         if valve["one_way"] == BOTH_WAYS or g[e] >= 0.0:
@@ -297,14 +319,22 @@ def potentials_beyond(cluster, tables, out, leaks, connected, group, number):
 
     leaks : as for `leak_balance`
     """
-    valves, integers, low, high = tables.valves, tables.integers, 1e300, -1e300
+    valves = tables.valves
+    integers = tables.integers
+    low = 1e300
+    high = -1e300
     for k in range(leaks.size):
         valve = valves[integers[cluster["first_valve"] + int(leaks[k])]]
-        i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
+        i = inner_row(tables.nodes, valve["from_node"])
+        j = inner_row(tables.nodes, valve["to_node"])
         from_inside = i >= 0 and group[i] == number
         to_inside = j >= 0 and group[j] == number
-        if from_inside != to_inside and (i < 0 or j < 0 or connected[j if from_inside else i] > 0.0):
-            other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
+        if from_inside != to_inside and (
+            i < 0 or j < 0 or connected[j if from_inside else i] > 0.0
+        ):
+            other = total_pressure(
+                tables, out, valve["to_node"] if from_inside else valve["from_node"]
+            )
             low, high = min(low, other), max(high, other)
     return low, high
 
@@ -315,7 +345,9 @@ def drain(cluster, tables, out, group, number, level):
 
     level : greatest value of this potential [Pa]
     """
-    layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    integers = tables.integers
     weight = tables.settings[0]["rho"] * tables.settings[0]["gravity"]
     for i in range(group.size):
         node = integers[cluster["first_node"] + i]

@@ -24,7 +24,9 @@ from fvsolve.jit import njit
 @njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
     """Write the pressure changes since the start [Pa] of fixed nodes, tanks and chambers to `out`."""
-    settings, layout, nodes = tables.settings[0], tables.layout[0], tables.nodes
+    settings = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
     # Moving chambers, vessels and patches have no branch: other functions write their pressures.
     for i in range(nodes.size):
         node = nodes[i]
@@ -105,7 +107,9 @@ def solve_single_valves(out, tables):
     These nodes join no other valve. The root has a closed form, or bounded Newton finds it if the law of the valve has
     a laminar part.
     """
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
     for k in range(valves.size):
         valve = valves[k]
         if valve["solve"] == CLUSTER:
@@ -116,8 +120,13 @@ def solve_single_valves(out, tables):
         g = conductance(tables, out, k)
         if valve["transition"] > 0.0:
             # The law may differ from the flow of the profile, at least by rounding: `base` keeps the steady state.
-            base = flow_at_drop(valve["open"], transition_of(valve, valve["open"]), valve["drop"]) - valve["flow"]
-            x = flow_change_laminar(g, transition_of(valve, g), zi + zj, valve["flow"], base, valve["drop"] + (pi - pj))
+            base = (
+                flow_at_drop(valve["open"], transition_of(valve, valve["open"]), valve["drop"])
+                - valve["flow"]
+            )
+            x = flow_change_laminar(
+                g, transition_of(valve, g), zi + zj, valve["flow"], base, valve["drop"] + (pi - pj)
+            )
         else:
             # The change of the target is summed from changes, so it is exactly zero in the steady state.
             surplus = (g - valve["open"]) * valve["drop"] + g * (pi - pj)

@@ -30,10 +30,13 @@ VELOCITY_AT_O = 39  # velocity of the body-fixed axes at o [m/s]
 BIAS_AT_O = 42  # its derivative for q'' = 0 [m/s2]
 
 # data of a basin
-MOMENTS = 0  # sums over cells of mass times 1, x, y, x^2, x y, y^2 [kg, kg m, kg m2]; x, y in axes of the basin
-EAST, NORTH, NORMAL = 6, 9, 12  # unit vectors of the x, y and z axes of the basin, in axes of the world
+# sums over cells of mass times 1, x, y, x^2, x y, y^2 [kg, kg m, kg m2]; x, y in axes of the basin
+MOMENTS = 0
+# unit vectors of the x, y and z axes of the basin, in axes of the world
+EAST, NORTH, NORMAL = 6, 9, 12
 BASIN_ARM = 15  # position of the origin of the basin from o, in axes of the world [m]
-BASIN_LOAD = 18  # force [N] and torque about its origin [N m] of the water for q'' = 0, in axes of the basin
+# force [N] and torque about its origin [N m] of the water for q'' = 0, in axes of the basin
+BASIN_LOAD = 18
 
 
 @njit(forceinline=True)

@@ -19,7 +19,12 @@ from fvsolve.core.kernels.dtypes import (
     TANK,
     WHERE,
 )
-from fvsolve.core.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
+from fvsolve.core.kernels.restrictions import (
+    conductance,
+    head_drop,
+    open_scheduled,
+    restriction_slope,
+)
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.tanks import BOTTOM, EVENTS, RIM
 from fvsolve.jit import njit
@@ -58,7 +63,9 @@ def begin_basins(t, y, dydt, out, handle):
 @njit(forceinline=True)
 def net_flows(out, tables):
     """Write the net flow into every node from its links [kg/s] to out[net]: total flow, not change since the start."""
-    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    nodes = tables.nodes
     valves, columns = tables.valves, tables.columns
     net = layout["net"]
     # The flows of the profile enter once, with `inflow`; below, each link adds the change of its flow.
@@ -96,7 +103,9 @@ def stiffness_of(nodes, layout, out, i):
 def node_impedance(tables, i):
     """Pressure rise at junction i per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
     node = tables.nodes[i]
-    return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
+    return (
+        1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
+    )
 
 
 @njit
@@ -106,15 +115,23 @@ def chain_impedance(tables, out, i, k):
     The flow leaves through pipes and the other restrictions, whose other ends keep their pressures. Where a single
     restriction leaves a junction, it is followed to its other end.
     """
-    valves, nodes, impedance = tables.valves, tables.nodes, 0.0
+    valves = tables.valves
+    nodes = tables.nodes
+    impedance = 0.0
     # A chain visits each node at most once; the bound ends the loop where restrictions form a ring.
     for _ in range(nodes.size):
         if nodes[i]["kind"] != JUNCTION:
             return impedance
-        total, count, last = nodes[i]["admittance"], 0, k
+        total = nodes[i]["admittance"]
+        count = 0
+        last = k
         for e in range(valves.size):
             valve = valves[e]
-            if e != k and (valve["from_node"] == i or valve["to_node"] == i) and conductance(tables, out, e) > 0.0:
+            if (
+                e != k
+                and (valve["from_node"] == i or valve["to_node"] == i)
+                and conductance(tables, out, e) > 0.0
+            ):
                 total += restriction_slope(tables, out, e, head_drop(tables, out, e)[1])
                 count, last = count + 1, e
         impedance += 1.0 / total if total > 0.0 else NO_WAY_OUT
@@ -132,7 +149,9 @@ def stored_rates(y, dydt, out, tables):
 
     A supply is the outflow of a reservoir, the spill of a full tank (negative), or the missing outflow of a dry tank.
     """
-    layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    armed = tables.armed
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
         # The supply of a junction is its demand, written before. A patch gives its flow to its basin.
@@ -183,7 +202,9 @@ def valve_rate_limit(t, y, dydt, out, handle):
     devices set a rate, and valves with a given flow, which no pressure changes.
     """
     tables = open_tables(handle)
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
     rate = out[RATE]
     if rate == RATE_UNWANTED:
         return
@@ -198,7 +219,9 @@ def valve_rate_limit(t, y, dydt, out, handle):
             stiff_j *= out[layout["outflow_fraction"] + nodes[j]["row"]]
         # A flow lowers the pressure upstream and raises it downstream, so both stiffnesses add.
         stiff = stiff_i + stiff_j
-        if valve["flow_given"] == 1 or (valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0):
+        if valve["flow_given"] == 1 or (
+            valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0
+        ):
             continue  # the device of a vessel sets its own rate
         if stiff > 0.0:
             g = conductance(tables, out, k)
@@ -213,6 +236,7 @@ def valve_rate_limit(t, y, dydt, out, handle):
                 change -= stiff_j * out[layout["net"] + j]
                 # Below this drop the law is nearly linear: a smaller distance to zero needs no shorter step.
                 width = max(valve["transition"] ** 2 / g, valve["rounding_drop"])
-                if change * drop < 0.0:  # at least two steps to a drop of zero: a longer step would pass it
+                # at least two steps to a drop of zero: a longer step would pass it
+                if change * drop < 0.0:
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
     out[RATE] = rate

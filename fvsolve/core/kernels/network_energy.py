@@ -75,7 +75,9 @@ def energy_head(st, floats, node, p):
 def total_head(tables, out, i):
     """Energy per mass at node i, H = h(p) - h(p_ambient) + g z [J/kg]: specific enthalpy h, elevation z above datum."""
     st, node = tables.settings[0], tables.nodes[i]
-    h = relative_enthalpy(st, tables.floats, node["pressure"] + out[tables.layout[0]["pressure"] + i])
+    h = relative_enthalpy(
+        st, tables.floats, node["pressure"] + out[tables.layout[0]["pressure"] + i]
+    )
     return h + st["gravity"] * (node["elevation"] - st["datum"])
 
 
@@ -156,7 +158,10 @@ def chamber_energy(y, out, tables, i):
 @njit
 def chamber_energy_barotropic(y, out, tables, i):
     """Change since the start of the energy of chamber i under the density laws `log` and `table` [J]."""
-    st, floats, node, p0 = tables.settings[0], tables.floats, tables.nodes[i], tables.nodes[i]["pressure"]
+    st = tables.settings[0]
+    floats = tables.floats
+    node = tables.nodes[i]
+    p0 = tables.nodes[i]["pressure"]
     mass, volume = node["mass"] + y[node["y"]], node["volume"]
     now = vessel_energy(st, floats, node, mass, volume, p0 + out[tables.layout[0]["pressure"] + i])
     return now - vessel_energy(st, floats, node, node["mass"], volume, p0)
@@ -169,8 +174,13 @@ BAROTROPIC = POTENTIAL = PIPE_POWER = PIPE_ENERGY = CHAMBER_ENERGY = None
 def _fill_power(t, y, dydt, out, handle, power):
     """Fill `power` [W] for nodes and links from a state, its rates and `out`, in the order at the top of this file."""
     tables = open_tables(handle)
-    st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
-    valves, columns, at = tables.valves, tables.columns, 0
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    pipes = tables.pipes
+    valves = tables.valves
+    columns = tables.columns
+    at = 0
     per = 1.0 if BAROTROPIC else 1.0 / st["rho"]
     for i in range(nodes.size):
         # Power from outside is the energy per mass at the node times the supplied flow.
@@ -183,21 +193,29 @@ def _fill_power(t, y, dydt, out, handle, power):
     for k in range(pipes.size):
         pipe, end = pipes[k], layout["ends"] + 4 * k
         # Mass flows at both ends, from the four waves there.
-        into = POTENTIAL(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
-        into -= POTENTIAL(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
+        into = POTENTIAL(tables, out, pipe["from_node"]) * (
+            pipe["flow"] + (out[end] - out[end + 1])
+        )
+        into -= POTENTIAL(tables, out, pipe["to_node"]) * (
+            pipe["flow"] + (out[end + 2] - out[end + 3])
+        )
         # Creep adds to its entries later.
         power[at], power[at + CREEP : at + PIPE] = into * per, 0.0
         PIPE_POWER(t, y, dydt, out, tables, k, power[at : at + PIPE])
         at += PIPE
     for k in range(valves.size):
-        drop = POTENTIAL(tables, out, valves[k]["from_node"]) - POTENTIAL(tables, out, valves[k]["to_node"])
+        drop = POTENTIAL(tables, out, valves[k]["from_node"]) - POTENTIAL(
+            tables, out, valves[k]["to_node"]
+        )
         power[at] = per * drop * out[layout["valve"] + k]
         at += VALVE
     for k in range(columns.size):
         column, size = columns[k], column_inertia(st, columns[k])
         # While valves control a column, its flow in `out` differs from that of the state, which has the energy.
         flow, own = out[layout["column"] + k], column["flow"] + y[column["y"]]
-        drop = POTENTIAL(tables, out, column["from_node"]) - POTENTIAL(tables, out, column["to_node"])
+        drop = POTENTIAL(tables, out, column["from_node"]) - POTENTIAL(
+            tables, out, column["to_node"]
+        )
         power[at], power[at + 1] = per * drop * flow, size * flow * column_drag(column, flow)
         power[at + 2] = size * own * dydt[column["y"]]
         at += COLUMN
@@ -209,7 +227,10 @@ def _fill_stored(t, y, dydt, out, handle, stored):
     Masses, devices, basins, bodies and bushings have functions of their own.
     """
     tables = open_tables(handle)
-    st, nodes, pipes, columns = tables.settings[0], tables.nodes, tables.pipes, tables.columns
+    st = tables.settings[0]
+    nodes = tables.nodes
+    pipes = tables.pipes
+    columns = tables.columns
     for i in range(nodes.size):
         node = nodes[i]
         stored[i] = 0.0
@@ -230,13 +251,19 @@ def _fill_stored(t, y, dydt, out, handle, stored):
 
 
 LINEAR = {
-    "BAROTROPIC": False, "POTENTIAL": total_pressure, "PIPE_POWER": pipe_power,
-    "PIPE_ENERGY": pipe_energy, "CHAMBER_ENERGY": chamber_energy,
-}  # fmt: skip
+    "BAROTROPIC": False,
+    "POTENTIAL": total_pressure,
+    "PIPE_POWER": pipe_power,
+    "PIPE_ENERGY": pipe_energy,
+    "CHAMBER_ENERGY": chamber_energy,
+}
 OTHERS = {
-    "BAROTROPIC": True, "POTENTIAL": total_head, "PIPE_POWER": pipe_power_barotropic,
-    "PIPE_ENERGY": pipe_energy_barotropic, "CHAMBER_ENERGY": chamber_energy_barotropic,
-}  # fmt: skip
+    "BAROTROPIC": True,
+    "POTENTIAL": total_head,
+    "PIPE_POWER": pipe_power_barotropic,
+    "PIPE_ENERGY": pipe_energy_barotropic,
+    "CHAMBER_ENERGY": chamber_energy_barotropic,
+}
 power_linear = specialise(_fill_power, "power_linear", **LINEAR)
 power_barotropic = specialise(_fill_power, "power_barotropic", **OTHERS)
 stored_linear = specialise(_fill_stored, "stored_linear", **LINEAR)

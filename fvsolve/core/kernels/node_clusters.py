@@ -63,15 +63,19 @@ from fvsolve.jit import njit, specialise
 BAR = 1e5
 ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
 NEARLY_CONVERGED = 1e-9  # relative change of Newton below which it may be rounding
-SMALL_CHANGE = 1e-7  # relative change of Newton after which the second-order rest is 1e-6 of a difference of 1e-8
-QUADRATIC, STAGNANT = 1e-4, 1e-7  # ratio of quadratic steps; relative change below which a constant one is rounding
+# relative change of Newton after which the second-order rest is 1e-6 of a difference of 1e-8
+SMALL_CHANGE = 1e-7
+# ratio of quadratic steps; relative change below which a constant one is rounding
+QUADRATIC, STAGNANT = 1e-4, 1e-7
 FIRST_RISE = 1e4  # greatest change of a pressure in the first limited step of Newton [Pa]
 NOT_BALANCED = 1e300  # in place of a change of Newton: the step was limited
 LEAST_RISE = 1e-9  # least limit of such a step [Pa]
-MOST_RISE = 1e8  # greatest step of a pressure without such limits: a trickle may leave levels nearly undetermined [Pa]
+# greatest step of a pressure without such limits: a trickle may leave levels nearly undetermined [Pa]
+MOST_RISE = 1e8
 BRACKETED = 3e-8  # limits of all nodes at which their pressures are known but for rounding [Pa]
 STEEP_CHANGE = 1e-3  # relative change of flow by this rounding where a law is steep, at most
-FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
+# relative change of flow above which Newton has failed; smaller changes may be rounding
+FAILED_CHANGE = 1e-5
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
 FLOW_ERROR = 0.01
 BALANCE = DRIVING = ASSEMBLE = BAROTROPIC = None  # constants of the templates
@@ -167,7 +171,12 @@ def places_of(cluster, tables, e, i, j, sparse):
     n = cluster["nodes"]
     if sparse:
         at = cluster["order"] + n + 4 * e
-        return tables.integers[at], tables.integers[at + 1], tables.integers[at + 2], tables.integers[at + 3]
+        return (
+            tables.integers[at],
+            tables.integers[at + 1],
+            tables.integers[at + 2],
+            tables.integers[at + 3],
+        )
     return n * i + i, n * j + j, n * i + j, n * j + i
 
 
@@ -202,7 +211,9 @@ def has_settled(change, last_change):
     """
     if change <= NEARLY_CONVERGED and change <= QUADRATIC * last_change:
         return True
-    return has_converged(change, last_change) or (change <= STAGNANT and change >= 0.999 * last_change)
+    return has_converged(change, last_change) or (
+        change <= STAGNANT and change >= 0.999 * last_change
+    )
 
 
 @njit(forceinline=True)
@@ -223,7 +234,10 @@ def add_sensed(cluster, tables, k, i, j, lift, n, matrix):
     n, matrix : number of nodes, and full matrix; nodes outside the cluster have known pressures
     """
     device = tables.devices[tables.valves[k]["device"]]
-    for node, weight in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+    for node, weight in (
+        (device["node"], device["node_weight"]),
+        (device["second"], device["second_weight"]),
+    ):
         row = row_in_cluster(cluster, tables, node) if node >= 0 else -1
         if row >= 0 and i >= 0:
             matrix[n * i + row] += weight * lift
@@ -235,7 +249,10 @@ def add_sensed(cluster, tables, k, i, j, lift, n, matrix):
 def sensed_step(cluster, tables, k, right):
     """Step of the lifting pressure [Pa] of valve k, by the steps `right` of the pressures in a cluster."""
     device, step = tables.devices[tables.valves[k]["device"]], 0.0
-    for node, weight in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+    for node, weight in (
+        (device["node"], device["node_weight"]),
+        (device["second"], device["second_weight"]),
+    ):
         row = row_in_cluster(cluster, tables, node) if node >= 0 else -1
         step += weight * right[row] if row >= 0 else 0.0
     return step
@@ -247,18 +264,22 @@ def add_couplings(cluster, tables, out, matrix, right, sparse):
 
     matrix, right : equations, as for `add_valve`; sparse : as for `places_of`
     """
-    layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    integers = tables.integers
     for k in range(cluster["couples"]):
         link = tables.couplings[integers[cluster["first_couple"] + k]]
         g = link["conductance"]
         i, j = inner_row(nodes, link["from_node"]), inner_row(nodes, link["to_node"])
-        p, q = out[layout["pressure"] + link["from_node"]], out[layout["pressure"] + link["to_node"]]
+        p = out[layout["pressure"] + link["from_node"]]
+        q = out[layout["pressure"] + link["to_node"]]
         places = places_of(cluster, tables, cluster["valves"] + k, i, j, sparse)
         # The flow is linear in the pressures, so that its Newton step is exact (a = 0).
         add_valve(i, j, places, g * (p - q), 0.0, g, 0.0, matrix, right)
 
 
-LOOSE = 1e-9  # slope of a held flow over that of an open valve at 1 Pa: it keeps the equations regular
+# slope of a held flow over that of an open valve at 1 Pa: it keeps the equations regular
+LOOSE = 1e-9
 
 
 @njit(forceinline=True)
@@ -274,13 +295,21 @@ def hold_pressures(cluster, tables, out, g, matrix, right, kept):
     The flow of the valve then follows from the balance of its held node, see `put_held_flows`.
     matrix, right : sparse equations, as for `add_valve`; kept : receives these balances
     """
-    integers, layout, at = tables.integers, tables.layout[0], 0
+    integers = tables.integers
+    layout = tables.layout[0]
+    at = 0
     for e in range(g.size):
         k = integers[cluster["first_valve"] + e]
-        if g[e] <= 0.0 or not is_held(tables, out, k) or integers[tables.valves[k]["hold"]] == FLOW_HELD:
+        if (
+            g[e] <= 0.0
+            or not is_held(tables, out, k)
+            or integers[tables.valves[k]["hold"]] == FLOW_HELD
+        ):
             continue
         h = tables.valves[k]["hold"]
-        held, other, count = integers[h + 1], integers[h + 2], integers[h + 3]
+        held = integers[h + 1]
+        other = integers[h + 2]
+        count = integers[h + 3]
         kept[at] = right[held]
         for c in range(count):
             own, place = integers[h + 5 + 3 * c], integers[h + 6 + 3 * c]
@@ -306,7 +335,11 @@ def put_held_flows(cluster, tables, out, g, right, kept, a):
     integers, at = tables.integers, 0
     for e in range(g.size):
         k = integers[cluster["first_valve"] + e]
-        if g[e] <= 0.0 or not is_held(tables, out, k) or integers[tables.valves[k]["hold"]] == FLOW_HELD:
+        if (
+            g[e] <= 0.0
+            or not is_held(tables, out, k)
+            or integers[tables.valves[k]["hold"]] == FLOW_HELD
+        ):
             continue
         h = tables.valves[k]["hold"]
         count, change = integers[h + 3], -kept[at]
@@ -338,7 +371,9 @@ def barotropic_balance(cluster, tables, out, c, slope, row):
 def linear_drop(tables, out, k):
     """(drop over valve k [Pa], 1.0) under the density law `linear`; else `restrictions.valve_driving_pressure`."""
     valve, pressure = tables.valves[k], tables.layout[0]["pressure"]
-    return valve["drop"] + (out[pressure + valve["from_node"]] - out[pressure + valve["to_node"]]), 1.0
+    return valve["drop"] + (
+        out[pressure + valve["from_node"]] - out[pressure + valve["to_node"]]
+    ), 1.0
 
 
 @njit
@@ -352,7 +387,14 @@ def step_arrays(cluster, work):
     size, k = cluster["matrix"], cluster["valves"]
     at = size + cluster["nodes"]
     end = at + 3 * k
-    return work[:size], work[size:at], work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : end], work[end:]
+    return (
+        work[:size],
+        work[size:at],
+        work[at : at + k],
+        work[at + k : at + 2 * k],
+        work[at + 2 * k : end],
+        work[end:],
+    )
 
 
 def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, sparse):
@@ -362,7 +404,10 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
     sparse : True for the sparse matrix of `solve_in_order`
     """
     matrix, right, a, s, lift, kept = step_arrays(cluster, work)
-    nodes, valves, integers, n = tables.nodes, tables.valves, tables.integers, c.size
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
+    n = c.size
     senses = cluster["senses"] == 1
     for i in range(integers[cluster["order"] - 1] if sparse else n * n):
         matrix[i] = 0.0
@@ -389,7 +434,17 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
             add_sensed(cluster, tables, k, i, j, upstream, n, matrix)
             # The lift follows the sensed pressures, to which it has been added, and not the upstream pressure.
             upstream = 0.0
-        add_valve(i, j, places_of(cluster, tables, e, i, j, sparse), m[e], a[e], s[e], upstream, matrix, right)
+        add_valve(
+            i,
+            j,
+            places_of(cluster, tables, e, i, j, sparse),
+            m[e],
+            a[e],
+            s[e],
+            upstream,
+            matrix,
+            right,
+        )
     add_couplings(cluster, tables, out, matrix, right, sparse)
     for i in range(n):
         # No equation determines the pressure of an isolated node; this row keeps the matrix regular.
@@ -400,7 +455,9 @@ def _assemble(cluster, tables, out, g, m, c, connected, slope, wide, work, spars
         hold_pressures(cluster, tables, out, g, matrix, right, kept)
 
 
-assemble_linear = specialise(_assemble, "assemble_linear", BALANCE=linear_balance, DRIVING=linear_drop)
+assemble_linear = specialise(
+    _assemble, "assemble_linear", BALANCE=linear_balance, DRIVING=linear_drop
+)
 assemble_barotropic = specialise(
     _assemble, "assemble_barotropic", BALANCE=barotropic_balance, DRIVING=valve_driving_pressure
 )
@@ -484,12 +541,21 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
     a, s, lift : terms of the changes of flow, see `add_valve`
     A change of flow by the rounding of pressures does not count. Flows are compared with at least the flow at 1 Pa.
     """
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
-    integers, scale, rounded, change, most = tables.integers, 1e-300, 0.0, 0.0, 0.0
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
+    integers = tables.integers
+    scale = 1e-300
+    rounded = 0.0
+    change = 0.0
+    most = 0.0
     for i in range(right.size):
         node = integers[cluster["first_node"] + i]
         out[layout["pressure"] + node] += right[i]
-        most = max(most, abs(right[i]) / (BAR + abs(nodes[node]["pressure"] + out[layout["pressure"] + node])))
+        most = max(
+            most,
+            abs(right[i]) / (BAR + abs(nodes[node]["pressure"] + out[layout["pressure"] + node])),
+        )
     for e in range(m.size):
         k = integers[cluster["first_valve"] + e]
         valve = valves[k]
@@ -506,7 +572,8 @@ def apply_step(cluster, tables, out, m, a, s, lift, right):
         rounding = s[e] * ROUNDING * (BAR + abs(p))
         change, rounded = max(change, max(abs(step), abs(a[e])) - rounding), max(rounded, rounding)
     relative = change / scale
-    if relative > FAILED_CHANGE and change <= rounded:  # perhaps rounding: no failure, but iterate further
+    # perhaps rounding: no failure, but iterate further
+    if relative > FAILED_CHANGE and change <= rounded:
         relative = FAILED_CHANGE
     return most, relative
 
@@ -521,7 +588,9 @@ def close_unstable(cluster, tables, g, m):
     """
     closed = False
     for e in range(m.size):
-        if g[e] > 0.0 and has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
+        if g[e] > 0.0 and has_lifted_backflow(
+            tables, tables.integers[cluster["first_valve"] + e], m[e]
+        ):
             g[e], closed = 0.0, True
     return closed
 
@@ -552,7 +621,10 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
         imbalance = largest_magnitude(right) if BAROTROPIC else 0.0
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:
-        out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + int(right[0])]
+        out[STATUS], out[WHERE] = (
+            NO_SOLUTION,
+            tables.integers[cluster["first_node"] + int(right[0])],
+        )
         return 0.0, 0.0, True
     flow_error = 0.0
     if BAROTROPIC:
@@ -573,14 +645,17 @@ def _newton_step(cluster, tables, out, g, m, c, connected, slope, wide, limits, 
     return max(flows, pressures), flows, flow_error <= FLOW_ERROR * imbalance
 
 
-newton_step_linear = specialise(_newton_step, "newton_step_linear", ASSEMBLE=assemble_linear, BAROTROPIC=False)
+newton_step_linear = specialise(
+    _newton_step, "newton_step_linear", ASSEMBLE=assemble_linear, BAROTROPIC=False
+)
 newton_step_barotropic = specialise(
     _newton_step, "newton_step_barotropic", ASSEMBLE=assemble_barotropic, BAROTROPIC=True
 )
 
 
 MAX_SWEEPS = 100
-LIMITED_SWEEPS = 400  # a step of 2e7 Pa is halved to 1e-6 Pa in 45 of them, one node after the other
+# a step of 2e7 Pa is halved to 1e-6 Pa in 45 of them, one node after the other
+LIMITED_SWEEPS = 400
 
 
 @njit
@@ -592,8 +667,12 @@ def node_work(tables):
     pipe or to a known pressure, else 0; group number of isolated nodes.
     Two arrays float64[valves]: conductance [kg2/s2/Pa]; flow [kg/s]. Last, the remaining scratch array.
     """
-    n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
-    g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
+    n = tables.nodes.size
+    v = tables.valves.size
+    work = tables.scratch
+    g = work[4 * n : 4 * n + v]
+    m = work[4 * n + v : 4 * n + 2 * v]
+    rest = work[4 * n + 2 * v :]
     rest = rest[5 * tables.clusters.size :]
     return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n], g, m, rest
 
@@ -617,7 +696,9 @@ def total_inflows(cluster, tables, out, c):
 
     The demand of a node is subtracted. Returns True if these inflows have not changed since the start.
     """
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
     integers, unchanged = tables.integers, True
     for i in range(c.size):
         node = integers[cluster["first_node"] + i]
@@ -628,7 +709,8 @@ def total_inflows(cluster, tables, out, c):
     # Where pipes join, out[net] already contains the changes of column flows.
     for k in range(tables.columns.size):
         column = tables.columns[k]
-        i, j = row_in_cluster(cluster, tables, column["from_node"]), row_in_cluster(cluster, tables, column["to_node"])
+        i = row_in_cluster(cluster, tables, column["from_node"])
+        j = row_in_cluster(cluster, tables, column["to_node"])
         if i >= 0 and nodes[column["from_node"]]["admittance"] == 0.0:
             c[i] -= out[layout["column"] + k]
         if j >= 0 and nodes[column["to_node"]]["admittance"] == 0.0:
@@ -660,7 +742,9 @@ def prepare_cluster(cluster, tables, out, g, m):
     Returns True if all conductances, pump speeds and pressures at the valves are those of the initial steady state.
     """
     layout, valves = tables.layout[0], tables.valves
-    integers, unchanged, senses = tables.integers, True, cluster["senses"] == 1
+    integers = tables.integers
+    unchanged = True
+    senses = cluster["senses"] == 1
     # Newton starts from the profile, so that its result depends on (t, y) alone.
     for i in range(cluster["nodes"]):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
@@ -669,9 +753,12 @@ def prepare_cluster(cluster, tables, out, g, m):
         valve = valves[k]
         g[e], m[e] = conductance(tables, out, k), valve["flow"]
         if valve["hooks"] < 0 and 0.0 < g[e] < valve["open"]:
-            m[e] *= sqrt(g[e] / valve["open"])  # flow at the drop of the profile: its own flow needs a huge drop
+            # flow at the drop of the profile: its own flow needs a huge drop
+            m[e] *= sqrt(g[e] / valve["open"])
         # Exact comparison: a start in the steady state must stay there without rounding.
-        unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
+        unchanged = (
+            unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
+        )
         for i in (valve["from_node"], valve["to_node"]):
             unchanged = unchanged and out[layout["pressure"] + i] == 0.0
         if senses and valve["hooks"] >= 0 and is_sensing(tables, k):
@@ -688,7 +775,9 @@ def prepare_cluster(cluster, tables, out, g, m):
 @njit
 def begin_accepted(cluster, tables, out, g, m):
     """Set the pressures of a cluster and the flows m of its open valves to those of the last accepted state, if any."""
-    accepted, integers, pressure = tables.accepted, tables.integers, tables.layout[0]["pressure"]
+    accepted = tables.accepted
+    integers = tables.integers
+    pressure = tables.layout[0]["pressure"]
     # No state has been accepted so far: the iteration starts from the profile.
     if accepted[0] == 0.0:
         return
@@ -708,7 +797,9 @@ def record_clusters(t, y, out, handle, values):
     The values before, from which the iterations of this state began, move to the second half of the array.
     """
     tables = open_tables(handle)
-    accepted, layout, n = tables.accepted, tables.layout[0], tables.nodes.size
+    accepted = tables.accepted
+    layout = tables.layout[0]
+    n = tables.nodes.size
     if accepted.size == 0:
         return
     half = accepted.size // 2
@@ -807,8 +898,10 @@ def step_clusters(sweep, out, tables, space):
     sweep : number of the step, from 1
     """
     clusters, (slope, c, connected, _, g, m, rest), (done, change, last_change, wide, sure) = (
-        tables.clusters, space, cluster_work(tables),
-    )  # fmt: skip
+        tables.clusters,
+        space,
+        cluster_work(tables),
+    )
     a, b = 0, 0
     for k in range(clusters.size):
         cluster = clusters[k]
@@ -822,7 +915,17 @@ def step_clusters(sweep, out, tables, space):
         if done[k] == 0.0:
             last_change[k] = change[k]
             step, _, near = newton_step_barotropic(
-                cluster, tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, rest[:0], rest
+                cluster,
+                tables,
+                out,
+                g[b:j],
+                m[b:j],
+                c[a:i],
+                connected[a:i],
+                slope,
+                wide[k] == 1.0,
+                rest[:0],
+                rest,
             )
             change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
             sure[k] = 1.0 if near else 0.0
@@ -836,8 +939,12 @@ def check_clusters(out, tables, space):
     Returns True if any cluster has not converged.
     """
     clusters, m, (done, change, last_change, wide, _), b, active = (
-        tables.clusters, space[5], cluster_work(tables), 0, False,
-    )  # fmt: skip
+        tables.clusters,
+        space[5],
+        cluster_work(tables),
+        0,
+        False,
+    )
     for k in range(clusters.size):
         j = b + clusters[k]["valves"]
         if done[k] == 0.0 and has_converged(change[k], last_change[k]):
@@ -884,11 +991,27 @@ def write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst
 @njit
 def write_clusters(out, tables, space):
     """Write the valve flows of all clusters to `out`, and pressures of isolated nodes."""
-    clusters, (_, c, connected, group, g, m, rest), change = tables.clusters, space, cluster_work(tables)[1]
+    clusters, (_, c, connected, group, g, m, rest), change = (
+        tables.clusters,
+        space,
+        cluster_work(tables)[1],
+    )
     a, b = 0, 0
     for k in range(clusters.size):
         i, j = a + clusters[k]["nodes"], b + clusters[k]["valves"]
-        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k], 0, rest)
+        write_cluster(
+            clusters[k],
+            tables,
+            out,
+            g[b:j],
+            m[b:j],
+            c[a:i],
+            connected[a:i],
+            group[a:i],
+            change[k],
+            0,
+            rest,
+        )
         a, b = i, j
 
 
@@ -898,7 +1021,9 @@ def put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, work):
 
     A valve with a level start keeps the flow that its node needs: its law takes a chord to it where it has no slope.
     """
-    assemble_linear(cluster, tables, out, g, m, c, connected, slope, wide, work, cluster["order"] >= 0)
+    assemble_linear(
+        cluster, tables, out, g, m, c, connected, slope, wide, work, cluster["order"] >= 0
+    )
     a = step_arrays(cluster, work)[2]
     for e in range(m.size):
         if tables.valves[tables.integers[cluster["first_valve"] + e]]["level_start"] == 0:
@@ -924,8 +1049,13 @@ def solve_cluster(out, tables, index):
     """
     cluster, work = tables.clusters[index], tables.scratch
     n, k = cluster["nodes"], cluster["valves"]
-    c, connected, group, at = work[:n], work[n : 2 * n], work[2 * n : 3 * n], 3 * n
-    g, m, rest = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k :]
+    c = work[:n]
+    connected = work[n : 2 * n]
+    group = work[2 * n : 3 * n]
+    at = 3 * n
+    g = work[at : at + k]
+    m = work[at + k : at + 2 * k]
+    rest = work[at + 2 * k :]
     unchanged = prepare_cluster(cluster, tables, out, g, m)
     undisturbed = total_inflows(cluster, tables, out, c) and unchanged
     from_accepted = tables.accepted.size > 0 and cluster["order"] >= 0
@@ -949,8 +1079,11 @@ def solve_cluster(out, tables, index):
         bracketed = limits.size > 0 and have_bracketed(limits)
         if limits.size > 0:
             put_law_flows(cluster, tables, out, g, m, c, connected, slope, wide, rest)
-        change, flows, _ = newton_step_linear(cluster, tables, out, g, m, c, connected, slope, wide, limits, rest)
-        if bracketed and flows <= STEEP_CHANGE:  # at a drop of zero a flow changes with the last digits of a pressure
+        change, flows, _ = newton_step_linear(
+            cluster, tables, out, g, m, c, connected, slope, wide, limits, rest
+        )
+        # at a drop of zero a flow changes with the last digits of a pressure
+        if bracketed and flows <= STEEP_CHANGE:
             change, flows = 0.0, 0.0
         settled = has_settled(change, last_change) or has_followed(out, change)
         if settled if from_accepted else has_converged(change, last_change):
@@ -960,7 +1093,8 @@ def solve_cluster(out, tables, index):
             change, flows, wide = 1e300, 1e300, False
     out[FIRM] = 0.0
     failed = flows != flows  # not a number; under other laws the rates show this fault
-    worst, change = place_of_greatest(step_arrays(cluster, rest)[1]), NOT_BALANCED if failed else flows
+    worst = place_of_greatest(step_arrays(cluster, rest)[1])
+    change = NOT_BALANCED if failed else flows
     write_cluster(cluster, tables, out, g, m, c, connected, group, change, worst, rest)
 
 
@@ -984,7 +1118,9 @@ def solve_coupled_clusters(t, y, dydt, out, handle):
     flow of couplings from nodes of known pressure.
     """
     tables = open_tables(handle)
-    layout, integers, work = tables.layout[0], tables.integers, tables.scratch
+    layout = tables.layout[0]
+    integers = tables.integers
+    work = tables.scratch
     for number in range(tables.clusters.size):
         cluster = tables.clusters[number]
         if cluster["inverse"] < 0:
@@ -994,7 +1130,8 @@ def solve_coupled_clusters(t, y, dydt, out, handle):
             work[i] = out[layout["net"] + integers[first + i]]
         for c in range(cluster["couples"]):
             link = tables.couplings[integers[cluster["first_couple"] + c]]
-            i, j = row_in_cluster(cluster, tables, link["from_node"]), row_in_cluster(cluster, tables, link["to_node"])
+            i = row_in_cluster(cluster, tables, link["from_node"])
+            j = row_in_cluster(cluster, tables, link["to_node"])
             # The inverse contains couplings within the group only; a known pressure acts as an inflow.
             if i >= 0 and j < 0:
                 work[i] += link["conductance"] * out[layout["pressure"] + link["to_node"]]

@@ -6,15 +6,30 @@ pressure change; t : present time [s].
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.calls import CLOSE, run_job
-from fvsolve.core.kernels.isolated_nodes import DRAINED, JOINED, UNDETERMINED, UNSUPPLIED, marks_of_islands
+from fvsolve.core.kernels.isolated_nodes import (
+    DRAINED,
+    JOINED,
+    UNDETERMINED,
+    UNSUPPLIED,
+    marks_of_islands,
+)
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.core.kernels.tanks import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre, tank_level
+from fvsolve.core.kernels.tanks import (
+    BOTTOM,
+    EVENTS,
+    RIM,
+    is_near,
+    limit_events,
+    mass_per_metre,
+    tank_level,
+)
 from fvsolve.jit import njit, specialise
 
 HUGE = 1e100  # waves beyond it count as not finite, although their squares may be finite
 BLOCK = 64  # cells compared with the envelope at a time
-SUPPLY_ROUNDING = 1e-9  # speed of a level [m/s]: a smaller supply of a tank is rounding and is not recorded
+# speed of a level [m/s]: a smaller supply of a tank is rounding and is not recorded
+SUPPLY_ROUNDING = 1e-9
 STOP_HERE = -2.0  # in out[WHERE]: the run must end
 
 
@@ -62,7 +77,9 @@ def observe_linear(t, y, out, handle, values):
             value = out[layout["valve"] + i]
         elif kind == rec.PRESSURE_BETWEEN:
             x = tables.floats[probe["weights"]]
-            value = (1.0 - x) * out[layout["pressure"] + i] + x * out[layout["pressure"] + probe["cell"]]
+            value = (1.0 - x) * out[layout["pressure"] + i] + x * out[
+                layout["pressure"] + probe["cell"]
+            ]
         elif kind == rec.COLUMN_FLOW:
             value = out[layout["column"] + i]
         elif kind == rec.SPOOL_FLOW:
@@ -138,7 +155,9 @@ def update_envelope(t, r, l, at, low, high, index, tables):
     low, high : numbers of cells below and above the envelope so far
     Returns 0 if all values are finite.
     """
-    e, profile, marks = tables.envelope, tables.profile, tables.marks
+    e = tables.envelope
+    profile = tables.profile
+    marks = tables.marks
     b, bad = at + r.size, 0
     if low > 0:
         bad += update_minima(t, r, l, e[0, at:b], e[1, at:b])
@@ -154,12 +173,16 @@ def update_envelope(t, r, l, at, low, high, index, tables):
 @njit
 def record_pipe(t, r, l, pipe, index, tables):
     """Update the envelope of r + l of pipe number `index`; blocks of cells without a new extreme are only compared."""
-    start, at, envelope = 0, pipe["cell"], tables.envelope
+    start = 0
+    at = pipe["cell"]
+    envelope = tables.envelope
     # Few blocks contain a new extreme; comparing is cheaper than updating.
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
-        low, high = count_new_extremes(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b])
+        low, high = count_new_extremes(
+            r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b]
+        )
         if low + high > 0:
             update_envelope(t, r[start:stop], l[start:stop], a, low, high, index, tables)
         start = stop
@@ -182,13 +205,17 @@ def is_undetermined(tables, out, probe):
     A probe of a head counts as one of pressure.
     """
     at, kind = tables.layout[0]["isolated"], probe["kind"]
-    return (kind == rec.PRESSURE or kind == rec.PRESSURE_BETWEEN) and out[at + probe["index"]] == UNDETERMINED
+    return (kind == rec.PRESSURE or kind == rec.PRESSURE_BETWEEN) and out[
+        at + probe["index"]
+    ] == UNDETERMINED
 
 
 @njit
 def record_unsupplied(t, out, tables, i):
     """Record in `marks` that the demand of node i is not supplied: first time, last time, valves shut at the first."""
-    marks, layout, first = tables.marks, tables.layout[0], marks_of_islands(tables)
+    marks = tables.marks
+    layout = tables.layout[0]
+    first = marks_of_islands(tables)
     at = first + tables.valves.size + i
     marks[at + tables.nodes.size] = t
     # Only valves that are shut at the first time are the cause.
@@ -212,8 +239,13 @@ def record_nodes(t, y, out, handle, values):
     the run: out[WHERE] is set. Pressures of isolated nodes give no mark, and no extremes where nothing determines them.
     """
     tables = open_tables(handle)
-    pipes, nodes, extremes, has_codes = tables.pipes, tables.nodes, tables.extremes, tables.clusters.size > 0
-    marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
+    pipes = tables.pipes
+    nodes = tables.nodes
+    extremes = tables.extremes
+    has_codes = tables.clusters.size > 0
+    marks = tables.marks
+    layout = tables.layout[0]
+    vapor = tables.settings[0]["vapor"]
     lowest = tables.settings[0]["unmarked"]
     for k in range(values.size):
         if has_codes and is_undetermined(tables, out, tables.probes[k]):
@@ -232,9 +264,14 @@ def record_nodes(t, y, out, handle, values):
             elif out[layout["isolated"] + i] == UNDETERMINED and marks[last] != marks[last]:
                 marks[last] = t
             continue
-        if lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
+        if (
+            lowest < nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor
+            and marks[at] != marks[at]
+        ):
             marks[at] = t
-        if nodes[i]["kind"] == rec.TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
+        if nodes[i]["kind"] == rec.TANK and abs(
+            out[layout["supply"] + i]
+        ) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
             # A positive supply holds a dry tank at its bottom, a negative one is the spill of a full tank.
             at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
             if marks[at] != marks[at]:
@@ -253,7 +290,9 @@ def tank_events(t, y, out, handle, g):
     """
     tables = open_tables(handle)
     # event functions of devices have solved the nodes
-    nodes, armed, solved = tables.nodes, tables.armed, tables.devices.size > 0
+    nodes = tables.nodes
+    armed = tables.armed
+    solved = tables.devices.size > 0
     for i in range(nodes.size):
         if nodes[i]["kind"] == rec.TANK:
             node, k = nodes[i], EVENTS * nodes[i]["row"]

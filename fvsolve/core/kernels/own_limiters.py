@@ -17,7 +17,8 @@ import numpy as np
 from fvsolve.core.kernels import calls
 from fvsolve.jit import COMPILING, Intrinsic, compile_once, njit
 
-CLOSEST = 1e-15  # least difference ahead relative to the difference behind: rounding; bounds the ratio r
+# least difference ahead relative to the difference behind: rounding; bounds the ratio r
+CLOSEST = 1e-15
 LEAST = 1e-300  # least difference ahead, so that equal values have the ratio 0
 FIRST_ADDRESS = 4096  # codes from here on are addresses of tables
 RECONSTRUCTION = "fvsolve.core.kernels.reconstruction"
@@ -29,7 +30,8 @@ LOOPS = {
     "muscl_backward": (RECONSTRUCTION, "VV", ""),
     "inner_slopes": (RECONSTRUCTION, "VV", ""),
 }
-FEATURE = re.compile(r"fvsolve\.features\.\w+")  # package of a feature; its own loops follow in its tables
+# package of a feature; its own loops follow in its tables
+FEATURE = re.compile(r"fvsolve\.features\.\w+")
 PLAIN: list[Callable] = []  # limiter functions without JIT; code FIRST_ADDRESS + k is entry k
 RATIO = None  # of the template: phi(r) of the user
 
@@ -77,9 +79,15 @@ def uncached(function, **constants):
     """
     plain = getattr(function, "py_func", function)
     seen = plain.__globals__
-    inner = {name: copied(seen[name]) for name in plain.__code__.co_names if name in seen} | constants
+    inner = {
+        name: copied(seen[name]) for name in plain.__code__.co_names if name in seen
+    } | constants
     cells = tuple(CellType(copied(cell.cell_contents)) for cell in plain.__closure__ or ())
-    copy = njit(FunctionType(plain.__code__, seen | inner, plain.__name__, plain.__defaults__, cells or None))
+    copy = njit(
+        FunctionType(
+            plain.__code__, seen | inner, plain.__name__, plain.__defaults__, cells or None
+        )
+    )
     # Not stored by itself: the loop that contains this copy is stored as a whole.
     copy.folder = None
     return copy
@@ -143,7 +151,9 @@ if COMPILING:
         function = loop.dispatcher.py_func
         name, loops = function.__name__, loops_of(function.__module__)
         if name not in loops:
-            raise errors.TypingError(f"{name} has no entry in LOOPS of kernels.own_limiters or of its feature")
+            raise errors.TypingError(
+                f"{name} has no entry in LOOPS of kernels.own_limiters or of its feature"
+            )
         _, letters, returned = loops[name]
         result = calls.argument_types(returned)
         return call_in_table(loop, given, list(loops).index(name), argument_kinds(letters), result)

@@ -40,7 +40,9 @@ def point_weights():
             # Averages of powers of x over the cells: the weights give the value of each power at the points.
             edges = np.arange(w + 1) - i - 0.5
             powers = np.arange(w)
-            means = (edges[1:, None] ** (powers + 1) - edges[:-1, None] ** (powers + 1)) / (powers + 1)
+            means = (edges[1:, None] ** (powers + 1) - edges[:-1, None] ** (powers + 1)) / (
+                powers + 1
+            )
             weights[w, i, :, :w] = np.linalg.solve(means.T, (GAUSS_POINTS[:, None] ** powers).T).T
     return weights
 
@@ -93,8 +95,13 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
     st, pipe = tables.settings[0], tables.pipes[k]
     if pipe["cells"] == 0:  # a feature writes its rows
         return
-    n, o, start = pipe["cells"], pipe["y"], steady_potential(st, tables.nodes[pipe["from_node"]])
-    r, l, dr, dl = y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n], dydt[o + n : o + 2 * n]
+    n = pipe["cells"]
+    o = pipe["y"]
+    start = steady_potential(st, tables.nodes[pipe["from_node"]])
+    r = y[o : o + n]
+    l = y[o + n : o + 2 * n]
+    dr = dydt[o : o + n]
+    dl = dydt[o + n : o + 2 * n]
     width, per = polynomial_width(st, n), 1.0 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     friction, rate = 0.0, 0.0
@@ -106,10 +113,14 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
             total = flow + (a - b)
             # The drag of the profile is constant along the pipe, so its potential falls linearly.
             p = pipe["admittance"] * (start - fall * (i + 0.5 + GAUSS_POINTS[g]) * pipe["dx"])
-            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, total)
+            force = drag(
+                pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, total
+            )
             friction += GAUSS_WEIGHTS[g] * (total * force)
             # The derivative of a cross term with the profile and of a square, as for `pipe_energy`.
-            rate += GAUSS_WEIGHTS[g] * ((p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db))
+            rate += GAUSS_WEIGHTS[g] * (
+                (p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db)
+            )
     rows[1], rows[2], rows[3] = per * pipe["dx"] * friction, 0.0, per * pipe["dx"] * rate
 
 
@@ -119,8 +130,13 @@ def pipe_energy(t, y, out, tables, k, rows):
     st, pipe = tables.settings[0], tables.pipes[k]
     if pipe["cells"] == 0:
         return
-    n, o, start = pipe["cells"], pipe["y"], steady_potential(st, tables.nodes[pipe["from_node"]])
-    r, l, width, per = y[o : o + n], y[o + n : o + 2 * n], polynomial_width(st, n), 0.5 / (st["rho"] * pipe["area"])
+    n = pipe["cells"]
+    o = pipe["y"]
+    start = steady_potential(st, tables.nodes[pipe["from_node"]])
+    r = y[o : o + n]
+    l = y[o + n : o + 2 * n]
+    width = polynomial_width(st, n)
+    per = 0.5 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     kinetic, elastic = 0.0, 0.0
     for i in range(n):
@@ -139,7 +155,9 @@ def profile_mass(profile, pipe, i, point):
 
     It is the value of a parabola through the values in `profile` at both faces and at the centre of the cell.
     """
-    left, right, middle = profile[pipe["face"] + i], profile[pipe["face"] + i + 1], profile[pipe["center"] + i]
+    left = profile[pipe["face"] + i]
+    right = profile[pipe["face"] + i + 1]
+    middle = profile[pipe["center"] + i]
     s = GAUSS_POINTS[point]
     return middle + s * ((right - left) + 2.0 * s * ((left - middle) + (right - middle)))
 
@@ -150,16 +168,28 @@ def mass_at_point(st, profile, pipe, i, point, change):
 
     It is at least the fraction MIN_CONTENT of the mass per length of a full pipe. profile : initial steady values
     """
-    return max(profile_mass(profile, pipe, i, point) + change, MIN_CONTENT * st["rho"] * pipe["area"])
+    return max(
+        profile_mass(profile, pipe, i, point) + change, MIN_CONTENT * st["rho"] * pipe["area"]
+    )
 
 
 @njit
 def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
     """Write the powers of pipe k except the inflow [W] to its entries in `power`, under the laws `log` and `table`."""
-    st, floats, profile, pipe = tables.settings[0], tables.floats, tables.profile, tables.pipes[k]
-    n, o, z = pipe["cells"], pipe["y"], tables.nodes[pipe["from_node"]]["elevation"] - st["datum"]
-    r, l, dr, dl = y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n], dydt[o + n : o + 2 * n]
-    c, width, dx = pipe["speed"], polynomial_width(st, n), pipe["dx"]
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    pipe = tables.pipes[k]
+    n = pipe["cells"]
+    o = pipe["y"]
+    z = tables.nodes[pipe["from_node"]]["elevation"] - st["datum"]
+    r = y[o : o + n]
+    l = y[o + n : o + 2 * n]
+    dr = dydt[o : o + n]
+    dl = dydt[o + n : o + 2 * n]
+    c = pipe["speed"]
+    width = polynomial_width(st, n)
+    dx = pipe["dx"]
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
     friction, rate = 0.0, 0.0
     for i in range(n):
@@ -171,7 +201,9 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
             v = flow / m
             h = enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - base
             h += st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * dx))
-            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
+            force = drag(
+                pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow
+            )
             friction += GAUSS_WEIGHTS[g] * v * force * (reference / m)
             # Derivative of M^2 / (2 m) + W(m) + m g z: h + g z - v^2 / 2 per dm/dt, and v per dM/dt.
             rate += GAUSS_WEIGHTS[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
@@ -181,9 +213,18 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
 @njit
 def pipe_energy_barotropic(t, y, out, tables, k, rows):
     """Write the energy changes of pipe k since the start to its entries in `stored`, under `log` and `table` [J]."""
-    st, floats, profile, pipe = tables.settings[0], tables.floats, tables.profile, tables.pipes[k]
-    n, o, z = pipe["cells"], pipe["y"], tables.nodes[pipe["from_node"]]["elevation"] - st["datum"]
-    r, l, c, width, dx = y[o : o + n], y[o + n : o + 2 * n], pipe["speed"], polynomial_width(st, n), pipe["dx"]
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    pipe = tables.pipes[k]
+    n = pipe["cells"]
+    o = pipe["y"]
+    z = tables.nodes[pipe["from_node"]]["elevation"] - st["datum"]
+    r = y[o : o + n]
+    l = y[o + n : o + 2 * n]
+    c = pipe["speed"]
+    width = polynomial_width(st, n)
+    dx = pipe["dx"]
     base = enthalpy(st, floats, st["ambient"])
     kinetic, elastic = 0.0, 0.0
     for i in range(n):
@@ -194,8 +235,12 @@ def pipe_energy_barotropic(t, y, out, tables, k, rows):
             p0, p = pressure_of_mass(st, floats, pipe, m0), pressure_of_mass(st, floats, pipe, m)
             h0, h = enthalpy(st, floats, p0) - base, enthalpy(st, floats, p) - base
             height = st["gravity"] * (z + rise_at(profile, pipe, (i + 0.5 + GAUSS_POINTS[g]) * dx))
-            kinetic += GAUSS_WEIGHTS[g] * (0.5 * flow * flow / m - 0.5 * pipe["flow"] * pipe["flow"] / m0)
-            squeezed = (m * h - m0 * h0) - (thrust(st, floats, pipe, p) - thrust(st, floats, pipe, p0))
+            kinetic += GAUSS_WEIGHTS[g] * (
+                0.5 * flow * flow / m - 0.5 * pipe["flow"] * pipe["flow"] / m0
+            )
+            squeezed = (m * h - m0 * h0) - (
+                thrust(st, floats, pipe, p) - thrust(st, floats, pipe, p0)
+            )
             elastic += GAUSS_WEIGHTS[g] * (squeezed + height * (m - m0))
     rows[0], rows[1] = dx * kinetic, dx * elastic
 
@@ -206,7 +251,10 @@ def jet_losses(out, tables, k):
 
     M, v : mass flow and velocity of a jet
     """
-    lost, pipe, nodes, end = 0.0, tables.pipes[k], tables.nodes, tables.layout[0]["ends"] + 4 * k
+    lost = 0.0
+    pipe = tables.pipes[k]
+    nodes = tables.nodes
+    end = tables.layout[0]["ends"] + 4 * k
     for side in range(2):
         i = pipe["to_node"] if side == 1 else pipe["from_node"]
         r, l = out[end + 2 * side], out[end + 2 * side + 1]

@@ -48,8 +48,14 @@ observe_forces_linear = specialise(
     _observe_forces, "observe_forces_linear", RATES=wave_rates, FRICTION=add_unsteady_friction
 )
 observe_forces_barotropic = specialise(
-    _observe_forces, "observe_forces_barotropic", RATES=rates_barotropic, FRICTION=add_unsteady_friction_barotropic
+    _observe_forces,
+    "observe_forces_barotropic",
+    RATES=rates_barotropic,
+    FRICTION=add_unsteady_friction_barotropic,
 )
 observe_forces_cavitating = specialise(
-    _observe_forces, "observe_forces_cavitating", RATES=rates_cavitating, FRICTION=add_unsteady_friction_barotropic
+    _observe_forces,
+    "observe_forces_cavitating",
+    RATES=rates_cavitating,
+    FRICTION=add_unsteady_friction_barotropic,
 )

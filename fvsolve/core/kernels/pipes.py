@@ -17,14 +17,23 @@ family, backward : scheme family; 1 for the backward wave
 small : square of a negligible value
 """
 
-from fvsolve.core.kernels.dtypes import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
+from fvsolve.core.kernels.dtypes import (
+    FRICTION_HAZEN,
+    FRICTION_ROUGH,
+    LINEAR,
+    MUSCL,
+    SHORT,
+    UPWIND,
+    WENO5,
+)
 from fvsolve.core.kernels.ghost_cells import edge_cells, end_value, entering_ghosts, leaving_ghosts
 from fvsolve.core.kernels.reconstruction import faces
 from fvsolve.core.kernels.steady_friction import EXPONENT, drag, power_of_square
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
 
-GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
+# 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
+GAUSS = 0.28867513459481287
 
 
 @njit
@@ -72,8 +81,12 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
 def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
     """Write the face values of forward wave (fr) and backward wave (fl), all [kg/s]."""
     n, small = r.size, pipe["noise"]
-    family, degree, limiter = scheme_family(settings, n), settings["degree"], settings["limiter"]
-    edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
+    family = scheme_family(settings, n)
+    degree = settings["degree"]
+    limiter = settings["limiter"]
+    edge = scratch[16:21]
+    ghosts = scratch[21:24]
+    beyond = scratch[24:27]
     for backward in range(2):
         c = l if backward == 1 else r
         # Edge cells are listed from the end inwards, so a backward wave is computed as the mirror image.
@@ -82,7 +95,9 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
         edge_cells(c, 1 - backward, edge)
         leaving_ghosts(edge, n, family, degree, limiter, small, beyond)
         left, right = (beyond, ghosts) if backward == 1 else (ghosts, beyond)
-        wave_faces(settings, family, small, backward, c, left, right, scratch, fl if backward == 1 else fr)
+        wave_faces(
+            settings, family, small, backward, c, left, right, scratch, fl if backward == 1 else fr
+        )
     # The end faces keep the waves of the solved nodes: what leaves a pipe is what enters its node.
     fr[0], fr[n] = r_in, r_out
     fl[0], fl[n] = l_out, l_in
@@ -103,7 +118,11 @@ def convolve(e0, e1, e2, e3, e4, e5, c, d):
 
     Terms are added in pairs from the outside in, so that mirrored arguments give the mirrored result to the bit.
     """
-    c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
+    c1 = c[1:]
+    c2 = c[2:]
+    c3 = c[3:]
+    c4 = c[4:]
+    c5 = c[5:]
     for i in range(d.size):
         d[i] = (e0 * c[i] + e5 * c5[i]) + ((e1 * c1[i] + e4 * c4[i]) + (e2 * c2[i] + e3 * c3[i]))
 
@@ -115,9 +134,17 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
     c must have at least five cells.
     datum : value of the wave at the end where it enters [kg/s]; edge : float64[5]  work array
     """
-    n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
+    n = c.size
+    inside = settings["inside"]
+    enter = settings["enter"]
+    leave = settings["leave"]
     # The factor k enters six weights once instead of every cell.
-    e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
+    e0 = k * inside[0]
+    e1 = k * inside[1]
+    e2 = k * inside[2]
+    e3 = k * inside[3]
+    e4 = k * inside[4]
+    e5 = k * inside[5]
     # A forward wave reads cells i-3 .. i+2, a backward wave i-2 .. i+3: their first full stencils differ by a cell.
     if backward == 1:
         convolve(e5, e4, e3, e2, e1, e0, c, d[2 : n - 3])
@@ -162,7 +189,10 @@ def subtract_friction(k, flow, loss, base, r, l, dr, dl):
 def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
     """Subtract friction as `subtract_friction` does, with a friction factor that follows from the wall roughness."""
     loss, rough = pipe["loss"], pipe["rough"]
-    e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
+    e = pipe["roughness"]
+    reynolds = pipe["reynolds"]
+    flow = pipe["flow"]
+    spread = GAUSS / k
     for i in range(r.size):
         m = flow + (r[i] - l[i])
         d = spread * (dr[i] + dl[i])
@@ -181,7 +211,9 @@ def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
     is the mass flow at the centre of a cell, M - d and M + d are its values at the Gauss points.
     rough : coefficient of |M|^0.852 M
     """
-    spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
+    spread = GAUSS / k
+    half = 0.5 * rough
+    quarter = 0.25 * loss
     for i in range(r.size):
         m = flow + (r[i] - l[i])
         d = spread * (dr[i] + dl[i])
@@ -203,12 +235,16 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
     half = 0.5 * loss
     m = flow + (r[0] - l[0])
     dr[0] = -k * (r[0] - r_in) - (half * (abs(m) * m) - base)
-    head, body, out = r[: n - 1], r[1:], dr[1:]
+    head = r[: n - 1]
+    body = r[1:]
+    out = dr[1:]
     opposite = l[1:]
     for i in range(n - 1):
         m = flow + (body[i] - opposite[i])
         out[i] = -k * (body[i] - head[i]) - (half * (abs(m) * m) - base)
-    head, body, out = l[1:], l[: n - 1], dl[: n - 1]
+    head = l[1:]
+    body = l[: n - 1]
+    out = dl[: n - 1]
     opposite = r[: n - 1]
     for i in range(n - 1):
         m = flow + (opposite[i] - body[i])
@@ -239,8 +275,13 @@ def rates_arriving(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
     # In a pipe of a single cell both waves enter from nodes.
     dr[0], dl[0] = arriving_cell(k, flow, loss, base, r_in, l[1] if n > 1 else l_in, r[0], l[0])
     if n > 1:
-        dr[n - 1], dl[n - 1] = arriving_cell(k, flow, loss, base, r[n - 2], l_in, r[n - 1], l[n - 1])
-    before, behind, here, own = r[: n - 1], l[2:], r[1:], l[1:]
+        dr[n - 1], dl[n - 1] = arriving_cell(
+            k, flow, loss, base, r[n - 2], l_in, r[n - 1], l[n - 1]
+        )
+    before = r[: n - 1]
+    behind = l[2:]
+    here = r[1:]
+    own = l[1:]
     forward, backward = dr[1:], dl[1:]
     for i in range(n - 2):
         m = flow + (before[i] - behind[i])
@@ -252,8 +293,13 @@ def rates_arriving(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 @njit
 def subtract_friction_arriving(pipe, base, r, l, r_in, l_in, dr, dl):
     """Subtract friction as `subtract_friction` does, that of the waves that enter a cell, see `rates_arriving`."""
-    kind, loss, rough, n = pipe["friction"], pipe["loss"], pipe["rough"], r.size
-    e, reynolds, flow = pipe["roughness"], pipe["reynolds"], pipe["flow"]
+    kind = pipe["friction"]
+    loss = pipe["loss"]
+    rough = pipe["rough"]
+    n = r.size
+    e = pipe["roughness"]
+    reynolds = pipe["reynolds"]
+    flow = pipe["flow"]
     for i in range(n):
         before, behind = r[i - 1] if i > 0 else r_in, l[i + 1] if i < n - 1 else l_in
         s = 0.5 * drag(kind, loss, rough, e, reynolds, flow + (before - behind)) - base
@@ -302,7 +348,9 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
 def outgoing_waves_linear(t, y, dydt, out, handle):
     """Write the outgoing waves of pipes to out[ends]; add their flow into nodes at unchanged pressure to out[net]."""
     tables = open_tables(handle)
-    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    settings = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
     scratch = tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
@@ -311,7 +359,9 @@ def outgoing_waves_linear(t, y, dydt, out, handle):
         n, at = pipe["cells"], layout["ends"] + 4 * i
         r, l = y[pipe["y"] : pipe["y"] + n], y[pipe["y"] + n : pipe["y"] + 2 * n]
         family = scheme_family(settings, n)
-        degree, limiter, small = settings["degree"], settings["limiter"], pipe["noise"]
+        degree = settings["degree"]
+        limiter = settings["limiter"]
+        small = pipe["noise"]
         for right in range(2):
             wave = end_value(r if right == 1 else l, right, family, degree, limiter, small, scratch)
             out[at + 1 + right] = wave
@@ -343,15 +393,28 @@ def incoming_waves_linear(t, y, dydt, out, handle):
 def wave_rates(t, y, dydt, out, handle):
     """Write d/dt of the waves in all pipe cells [kg/s2] to `dydt`, unless it is empty."""
     tables = open_tables(handle)
-    settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    settings = tables.settings[0]
+    layout = tables.layout[0]
+    pipes = tables.pipes
     if dydt.size == 0:
         return
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe["cells"] == 0:  # a feature computes its waves
             continue
-        n, o, at = pipe["cells"], pipe["y"], layout["ends"] + 4 * i
+        n = pipe["cells"]
+        o = pipe["y"]
+        at = layout["ends"] + 4 * i
         pipe_rates(
-            settings, pipe, y[o : o + n], y[o + n : o + 2 * n], out[at], out[at + 1], out[at + 2], out[at + 3],
-            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
-        )  # fmt: skip
+            settings,
+            pipe,
+            y[o : o + n],
+            y[o + n : o + 2 * n],
+            out[at],
+            out[at + 1],
+            out[at + 2],
+            out[at + 3],
+            tables.scratch,
+            dydt[o : o + n],
+            dydt[o + n : o + 2 * n],
+        )

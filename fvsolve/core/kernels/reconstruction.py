@@ -65,7 +65,9 @@ def inner_slopes(limiter, c, d):
 
     limiter : limiter function of two differences; c : float64[cells]  values
     """
-    here, next, inside = c[1:], c[2:], d[1:]
+    here = c[1:]
+    next = c[2:]
+    inside = d[1:]
     for i in range(c.size - 2):
         inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
 
@@ -142,7 +144,11 @@ def value_muscl(limiter, b, c, d):
 def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
     """Write face values of a linear scheme: f[j] = sum of w_k p[j+k]."""
     for j in range(f.size):
-        f[j] = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
+        f[j] = (
+            (w0 * p[j] + w1 * p[j + 1])
+            + (w2 * p[j + 2] + w3 * p[j + 3])
+            + (w4 * p[j + 4] + w5 * p[j + 5])
+        )
 
 
 @inline
@@ -191,7 +197,9 @@ def faces(settings, scheme, small, backward, p, f):
             faces_linear(s["w0"], s["w1"], s["w2"], s["w3"], s["w4"], s["w5"], p, f)
     elif scheme == rec.SHORT:
         # Third order: the value at the face of the parabola through three cell averages.
-        b, c, d = -1.0 / 6.0, 5.0 / 6.0, 1.0 / 3.0
+        b = -1.0 / 6.0
+        c = 5.0 / 6.0
+        d = 1.0 / 3.0
         if backward == 1:
             faces_linear(0.0, 0.0, d, c, b, 0.0, p, f)
         else:
@@ -215,7 +223,9 @@ def rhs_periodic(t, y, dydt, out, handle):
     `noise` of the pipe : square of a negligible value, as `small` of `faces`
     """
     tables = open_tables(handle)
-    settings, scratch, n = tables.settings[0], tables.scratch, y.size
+    settings = tables.settings[0]
+    scratch = tables.scratch
+    n = y.size
     out[rec.RATE], out[rec.STATUS], out[rec.WHERE] = 1.0, rec.OK, -1.0
     if dydt.size == 0:
         return

@@ -83,12 +83,17 @@ def velocity_change(st, floats, profile, pipe, r, l, w):
 
     The values are cell averages by two Gauss points; M : mass flow, m : mass per length
     """
-    n, c, flow, reference = r.size, pipe["speed"], pipe["flow"], st["rho"] * pipe["area"]
+    n = r.size
+    c = pipe["speed"]
+    flow = pipe["flow"]
+    reference = st["rho"] * pipe["area"]
     for i in range(n):
         # Central slopes, one-sided in the end cells.
         low, high = max(i - 1, 0), min(i + 1, n - 1)
         gauss = GAUSS / max(high - low, 1)
-        m0, dm, dflow = profile[pipe["center"] + i], (r[i] + l[i]) / c, r[i] - l[i]
+        m0 = profile[pipe["center"] + i]
+        dm = (r[i] + l[i]) / c
+        dflow = r[i] - l[i]
         a = gauss * ((r[high] - l[high]) - (r[low] - l[low]))
         b = gauss * ((r[high] + l[high]) - (r[low] + l[low])) / c
         # M / m at both Gauss points: a quotient of averages would be of second order only.
@@ -103,7 +108,9 @@ def wall_pressure(st, floats, profile, pipe, r, l, w):
 
     A, a : reference area and wave speed; p, p0 : present and initial steady pressure
     """
-    n, c, least = r.size, pipe["speed"], DRY * st["rho"] * pipe["area"]
+    n = r.size
+    c = pipe["speed"]
+    least = DRY * st["rho"] * pipe["area"]
     for i in range(n):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
         dm_gauss = GAUSS / max(high - low, 1) * ((r[high] + l[high]) - (r[low] + l[low])) / c
@@ -155,13 +162,17 @@ def _add_relaxation(t, y, dydt, out, handle):
     Nothing is done if `dydt` is empty.
     """
     tables = open_tables(handle)
-    st, floats, profile, pipes, scratch = (
-        tables.settings[0], tables.floats, tables.profile, tables.pipes, tables.scratch,
-    )  # fmt: skip
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    pipes = tables.pipes
+    scratch = tables.scratch
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
         if pipe[COUNT] > 0:
-            n, o, at = pipe["cells"], pipe["y"], pipe[VARIABLES]
+            n = pipe["cells"]
+            o = pipe["y"]
+            at = pipe[VARIABLES]
             # The terms of all exponentials are summed first, so the waves are changed in a single pass.
             w, loss = scratch[:n], scratch[n : 2 * n]
             INPUT(st, floats, profile, pipe, y[o : o + n], y[o + n : o + 2 * n], w)
@@ -177,7 +188,11 @@ def _add_relaxation(t, y, dydt, out, handle):
 FRICTION_COLUMNS = {"COUNT": "terms", "TERMS": "term", "VARIABLES": "memory"}  # columns of pipes
 CREEP_COLUMNS = {"COUNT": "elements", "TERMS": "element", "VARIABLES": "strain"}
 add_unsteady_friction = specialise(
-    _add_relaxation, "add_unsteady_friction", **FRICTION_COLUMNS, INPUT=wave_difference, SUBTRACT=subtract_drag
+    _add_relaxation,
+    "add_unsteady_friction",
+    **FRICTION_COLUMNS,
+    INPUT=wave_difference,
+    SUBTRACT=subtract_drag,
 )
 add_unsteady_friction_barotropic = specialise(
     _add_relaxation,
@@ -190,11 +205,16 @@ add_wall_creep = specialise(
     _add_relaxation, "add_wall_creep", **CREEP_COLUMNS, INPUT=wave_sum, SUBTRACT=subtract_storage
 )
 add_wall_creep_barotropic = specialise(
-    _add_relaxation, "add_wall_creep_barotropic", **CREEP_COLUMNS, INPUT=wall_pressure, SUBTRACT=subtract_storage
+    _add_relaxation,
+    "add_wall_creep_barotropic",
+    **CREEP_COLUMNS,
+    INPUT=wall_pressure,
+    SUBTRACT=subtract_storage,
 )
 
 
-FRICTION, STORAGE = 1, 3  # rows of friction and of stored energy among the rows of a pipe in `power`
+# rows of friction and of stored energy among the rows of a pipe in `power`
+FRICTION, STORAGE = 1, 3
 KINETIC, ELASTIC = 0, 1  # rows of a pipe in `stored`
 # Constants of the templates:
 START = PRESSURE = POWER = ENERGY = WORK = RESIDUAL = ROW = KIND = None
@@ -237,7 +257,10 @@ def no_power(*arguments):
 
 def _relaxation_power(st, floats, profile, pipe, w, y, dydt):
     """(dissipation, rate of stored energy) of the relaxation variables of a pipe [W]."""
-    n, width, taken, rate = w.size, polynomial_width(st, w.size), 0.0, 0.0
+    n = w.size
+    width = polynomial_width(st, w.size)
+    taken = 0.0
+    rate = 0.0
     for k in range(pipe[COUNT]):
         gain, at = floats[pipe[TERMS] + 2 * k], pipe[VARIABLES] + k * n
         # A variable stores g z^2 / (2 n), which changes at the rate (g / n) z dz/dt.
@@ -254,14 +277,18 @@ def _relaxation_power(st, floats, profile, pipe, w, y, dydt):
     return per * taken, per * rate
 
 
-friction_power = specialise(_relaxation_power, "friction_power", **FRICTION_COLUMNS, START=steady_flow)
+friction_power = specialise(
+    _relaxation_power, "friction_power", **FRICTION_COLUMNS, START=steady_flow
+)
 creep_power = specialise(_relaxation_power, "creep_power", **CREEP_COLUMNS, START=no_flow)
 
 
 @njit
 def friction_energy(st, floats, profile, pipe, y):
     """Change since the start of the energy stored in all exponential terms of unsteady friction in a pipe [J]."""
-    n, width, total = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
+    n = pipe["cells"]
+    width = polynomial_width(st, pipe["cells"])
+    total = 0.0
     for k in range(pipe["terms"]):
         at = pipe["memory"] + k * n
         share = floats[pipe["term"] + 2 * k] / floats[pipe["term"] + 2 * k + 1]
@@ -277,7 +304,9 @@ def friction_energy(st, floats, profile, pipe, y):
 @njit
 def creep_energy(st, floats, profile, pipe, y):
     """Change of the energy in all wall elements of a pipe since the start [J], without `work_against_profile`."""
-    n, width, total = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
+    n = pipe["cells"]
+    width = polynomial_width(st, pipe["cells"])
+    total = 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
         share = floats[pipe["element"] + 2 * k] / floats[pipe["element"] + 2 * k + 1]
@@ -294,7 +323,9 @@ def bore_growth(st, floats, pipe, i, g, y):
     Multiplied by dx / speed it is the mass of reference density in the additional volume of the bore of a cell. With
     rates of states in place of y the result is its time derivative.
     """
-    n, width, total = pipe["cells"], polynomial_width(st, pipe["cells"]), 0.0
+    n = pipe["cells"]
+    width = polynomial_width(st, pipe["cells"])
+    total = 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
         share = floats[pipe["element"] + 2 * k] / floats[pipe["element"] + 2 * k + 1]
@@ -333,7 +364,9 @@ def _work_against_profile(st, floats, profile, pipe, node, y):
     return total * pipe["dx"] / (st["rho"] * pipe["speed"])
 
 
-work_against_profile = specialise(_work_against_profile, "work_against_profile", PRESSURE=potential_along)
+work_against_profile = specialise(
+    _work_against_profile, "work_against_profile", PRESSURE=potential_along
+)
 work_against_profile_barotropic = specialise(
     _work_against_profile, "work_against_profile_barotropic", PRESSURE=potential_along_barotropic
 )
@@ -342,19 +375,28 @@ work_against_profile_barotropic = specialise(
 @njit
 def density_law_power(st, floats, profile, pipe, node, w, y, dydt):
     """Energy flow of the mass that leaves the cells of a pipe into the additional bore, minus its energy there [W]."""
-    n, o, width, total = w.size, pipe["y"], polynomial_width(st, w.size), 0.0
+    n = w.size
+    o = pipe["y"]
+    width = polynomial_width(st, w.size)
+    total = 0.0
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     for i in range(n):
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             m = mass_at_point(st, profile, pipe, i, g, (a + b) / pipe["speed"])
             v = (pipe["flow"] + (a - b)) / m
-            carried = relative_enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - 0.5 * v * v
+            carried = (
+                relative_enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - 0.5 * v * v
+            )
             carried += gravity_potential(st, profile, pipe, node, i, g)
             P = potential_along_barotropic(st, floats, profile, pipe, node, i, g)
             # w is the change of pressure in units of the admittance: this gives the present potential.
             P += at_point(w, width, i, g) / pipe["admittance"]
-            total += GAUSS_WEIGHTS[g] * (carried - P / st["rho"]) * bore_growth(st, floats, pipe, i, g, dydt)
+            total += (
+                GAUSS_WEIGHTS[g]
+                * (carried - P / st["rho"])
+                * bore_growth(st, floats, pipe, i, g, dydt)
+            )
     return total * pipe["dx"] / pipe["speed"]
 
 
@@ -364,12 +406,17 @@ def _add_power(t, y, dydt, out, handle, power):
     It consists of dissipation, rate of stored energy, and the residual of the density law.
     """
     tables = open_tables(handle)
-    st, floats, profile, pipes = tables.settings[0], tables.floats, tables.profile, tables.pipes
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    pipes = tables.pipes
     at = NODE * tables.nodes.size
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe[COUNT] > 0:
-            n, o, node = pipe["cells"], pipe["y"], tables.nodes[pipe["from_node"]]
+            n = pipe["cells"]
+            o = pipe["y"]
+            node = tables.nodes[pipe["from_node"]]
             w = tables.scratch[:n]
             INPUT(st, floats, profile, pipe, y[o : o + n], y[o + n : o + 2 * n], w)
             taken, rate = POWER(st, floats, profile, pipe, w, y, dydt)
@@ -383,9 +430,11 @@ def _add_power(t, y, dydt, out, handle, power):
 def _add_stored(t, y, dydt, out, handle, stored):
     """Add the change of energy in relaxation variables since the start to the entries of pipes in `stored` [J]."""
     tables = open_tables(handle)
-    st, floats, profile, pipes, nodes = (
-        tables.settings[0], tables.floats, tables.profile, tables.pipes, tables.nodes,
-    )  # fmt: skip
+    st = tables.settings[0]
+    floats = tables.floats
+    profile = tables.profile
+    pipes = tables.pipes
+    nodes = tables.nodes
     for i in range(pipes.size):
         pipe = pipes[i]
         if pipe[COUNT] > 0:
@@ -394,19 +443,35 @@ def _add_stored(t, y, dydt, out, handle, stored):
 
 
 UNSTEADY_FRICTION = FRICTION_COLUMNS | {
-    "INPUT": input_flow, "POWER": friction_power, "ENERGY": friction_energy, "WORK": no_power, "RESIDUAL": no_power,
-    "ROW": FRICTION, "KIND": KINETIC,
-}  # fmt: skip
+    "INPUT": input_flow,
+    "POWER": friction_power,
+    "ENERGY": friction_energy,
+    "WORK": no_power,
+    "RESIDUAL": no_power,
+    "ROW": FRICTION,
+    "KIND": KINETIC,
+}
 WALL_CREEP = CREEP_COLUMNS | {
-    "INPUT": wave_sum, "POWER": creep_power, "ENERGY": creep_energy, "WORK": work_against_profile,
-    "RESIDUAL": no_power, "ROW": CREEP, "KIND": ELASTIC,
-}  # fmt: skip
+    "INPUT": wave_sum,
+    "POWER": creep_power,
+    "ENERGY": creep_energy,
+    "WORK": work_against_profile,
+    "RESIDUAL": no_power,
+    "ROW": CREEP,
+    "KIND": ELASTIC,
+}
 WALL_CREEP_BAROTROPIC = WALL_CREEP | {
-    "INPUT": wall_pressure, "WORK": work_against_profile_barotropic, "RESIDUAL": density_law_power,
-}  # fmt: skip
+    "INPUT": wall_pressure,
+    "WORK": work_against_profile_barotropic,
+    "RESIDUAL": density_law_power,
+}
 add_friction_power = specialise(_add_power, "add_friction_power", **UNSTEADY_FRICTION)
 add_friction_stored = specialise(_add_stored, "add_friction_stored", **UNSTEADY_FRICTION)
 add_creep_power = specialise(_add_power, "add_creep_power", **WALL_CREEP)
 add_creep_stored = specialise(_add_stored, "add_creep_stored", **WALL_CREEP)
-add_creep_power_barotropic = specialise(_add_power, "add_creep_power_barotropic", **WALL_CREEP_BAROTROPIC)
-add_creep_stored_barotropic = specialise(_add_stored, "add_creep_stored_barotropic", **WALL_CREEP_BAROTROPIC)
+add_creep_power_barotropic = specialise(
+    _add_power, "add_creep_power_barotropic", **WALL_CREEP_BAROTROPIC
+)
+add_creep_stored_barotropic = specialise(
+    _add_stored, "add_creep_stored_barotropic", **WALL_CREEP_BAROTROPIC
+)

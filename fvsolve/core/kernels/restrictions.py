@@ -15,7 +15,8 @@ from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
 
-LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+# chords are not steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+LEAST = 1e-4
 
 
 @njit(forceinline=True)
@@ -44,14 +45,18 @@ def relative_area(kind, floats, table, size, opening):
 @njit(forceinline=True)
 def valve_conductance(tables, index, t):
     """Conductance G = 2 rho (Cd A)^2 of valve `index` at time t [kg2/s2/Pa]."""
-    return conductance_of(tables, index, schedule_value(tables, tables.valves[index]["schedule"], t))
+    return conductance_of(
+        tables, index, schedule_value(tables, tables.valves[index]["schedule"], t)
+    )
 
 
 @njit(forceinline=True)
 def conductance_of(tables, index, opening):
     """Conductance G = 2 rho (Cd A)^2 of valve `index` at an opening [kg2/s2/Pa]."""
     valve = tables.valves[index]
-    area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
+    area = relative_area(
+        valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening
+    )
     return valve["conductance"] * area * area
 
 
@@ -191,7 +196,11 @@ def conductance_at(t, tables, out, k):
 
     For a restriction with a device it is the present value.
     """
-    return valve_conductance(tables, k, t) if tables.valves[k]["device"] < 0 else conductance(tables, out, k)
+    return (
+        valve_conductance(tables, k, t)
+        if tables.valves[k]["device"] < 0
+        else conductance(tables, out, k)
+    )
 
 
 @njit
@@ -206,7 +215,9 @@ def restriction_step(tables, out, k, g, m, drop, denser, wide):
     """
     valve = tables.valves[k]
     if valve["hooks"] >= 0:
-        return call_step(tables.hooks[valve["hooks"], STEP], out, tables, k, g, m, drop, denser, wide)
+        return call_step(
+            tables.hooks[valve["hooks"], STEP], out, tables, k, g, m, drop, denser, wide
+        )
     return root_step(tables, k, g, m, drop, denser)
 
 
@@ -236,7 +247,10 @@ def head_drop(tables, out, k):
 
     Under the density law `linear` the second result is the drop of P = p + rho g z.
     """
-    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    floats = tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
     p_i, p_j = out[layout["pressure"] + i], out[layout["pressure"] + j]
@@ -277,7 +291,10 @@ def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
 @njit
 def valve_driving_pressure(tables, out, k):
     """(driving pressure of valve k [Pa], upstream density over reference density [-]), from the present pressures."""
-    st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    floats = tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
     p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
@@ -344,7 +361,9 @@ def restriction_lift(tables, out, k, g, drop, denser, wide):
     """
     if not is_lifted(tables, k):
         return 0.0
-    return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
+    return call_lift(
+        tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide
+    )
 
 
 @njit(forceinline=True)
@@ -365,12 +384,18 @@ def has_lifted_backflow(tables, k, m):
 def restriction_events(t, y, out, handle, g):
     """Write the event functions of restrictions with kinks in their law to g, from solved nodes."""
     tables = open_tables(handle)
-    nodes, valves, pressure = tables.nodes, tables.valves, tables.layout[0]["pressure"]
+    nodes = tables.nodes
+    valves = tables.valves
+    pressure = tables.layout[0]["pressure"]
     for k in range(valves.size):
         i, j = valves[k]["from_node"], valves[k]["to_node"]
         if valves[k]["hooks"] >= 0 and tables.hooks[valves[k]["hooks"], BENDS] != 0:
             # Profile pressures are subtracted first, so the difference of small changes keeps its digits.
-            drop = nodes[i]["pressure"] - nodes[j]["pressure"] + (out[pressure + i] - out[pressure + j])
+            drop = (
+                nodes[i]["pressure"]
+                - nodes[j]["pressure"]
+                + (out[pressure + i] - out[pressure + j])
+            )
             call_bends(tables.hooks[valves[k]["hooks"], BENDS], tables, k, drop, g)
 
 

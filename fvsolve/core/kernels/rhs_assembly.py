@@ -24,8 +24,10 @@ class RhsTerms(NamedTuple):
     exchange: str = ""  # exchange of states between bands
     prepare: str = ""  # from (t, y) alone: conductances, speeds, pressures of vessels
     outgoing_waves: str = ""  # outgoing waves at pipe ends
-    known_pressures: str = ""  # pressures of nodes with storage or given pressure, flows from outside
-    decide: str = ""  # outputs of blocks that drive restrictions, devices and nodes, from states alone
+    # pressures of nodes with storage or given pressure, flows from outside
+    known_pressures: str = ""
+    # outputs of blocks that drive restrictions, devices and nodes, from states alone
+    decide: str = ""
     inflow: str = ""  # flows of rigid columns into nodes
     solve_nodes: str = ""  # pressures of other nodes, flows of restrictions
     column_nodes: str = ""  # pressures of nodes that only columns determine
@@ -42,7 +44,8 @@ class RhsTerms(NamedTuple):
     mix: str = ""  # values of scalars at nodes
     scalar_rates: str = ""  # rates of scalars in cells
     control_rates: str = ""  # rates of states of blocks, from all values of the state
-    stretching: str = ""  # conversion of rates of scalars in stretching cells to rates of their content
+    # conversion of rates of scalars in stretching cells to rates of their content
+    stretching: str = ""
     reduce_rate: str = ""  # greatest rate of all bands
     # jobs other than the right-hand side
     observe: str = ""  # probe values
@@ -52,7 +55,8 @@ class RhsTerms(NamedTuple):
     power: str = ""  # all other powers
     stored: str = ""
     derive_state: str = ""  # values that these jobs read instead of the state, written to dydt
-    damp: str = ""  # divides rates dydt of a stage by 1 + h r; step h passed as t, h r written to out
+    # divides rates dydt of a stage by 1 + h r; step h passed as t, h r written to out
+    damp: str = ""
     package: str = KERNELS
 
 
@@ -66,12 +70,17 @@ BAROTROPIC = {
 }
 NODES = {  # nodes, by the family of the density law
     "linear": RhsTerms(
-        known_pressures="linear_nodes: known_pressures_linear", solve_nodes="linear_nodes: solve_nodes_linear"
+        known_pressures="linear_nodes: known_pressures_linear",
+        solve_nodes="linear_nodes: solve_nodes_linear",
     ),
     "barotropic": RhsTerms(**BAROTROPIC),
-    "cavitating": RhsTerms(**BAROTROPIC | {"solve_nodes": "cavitating_nodes: solve_nodes_cavitating"}),
+    "cavitating": RhsTerms(
+        **BAROTROPIC | {"solve_nodes": "cavitating_nodes: solve_nodes_cavitating"}
+    ),
 }
-NETWORK = RhsTerms(prepare="network_balance: begin_network", balance="network_balance: balance_network")
+NETWORK = RhsTerms(
+    prepare="network_balance: begin_network", balance="network_balance: balance_network"
+)
 LUMPED = RhsTerms(
     prepare="linear_nodes: begin_lumped",
     solve_nodes="linear_nodes: solve_nodes_linear",
@@ -85,7 +94,8 @@ PIPES = {
         rates="pipes: wave_rates",
     ),
     "barotropic": RhsTerms(
-        outgoing_waves="barotropic_nodes: outgoing_waves_barotropic", rates="barotropic_pipes: rates_barotropic"
+        outgoing_waves="barotropic_nodes: outgoing_waves_barotropic",
+        rates="barotropic_pipes: rates_barotropic",
     ),
     "cavitating": RhsTerms(
         outgoing_waves="cavitating_pipes: outgoing_states_cavitating",
@@ -106,16 +116,28 @@ READ = {
         stored="network_energy: stored_barotropic",
     ),
 }
-UNSTEADY_FRICTION = {"power": "relaxation: add_friction_power", "stored": "relaxation: add_friction_stored"}
-COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
+UNSTEADY_FRICTION = {
+    "power": "relaxation: add_friction_power",
+    "stored": "relaxation: add_friction_stored",
+}
+COLUMNS = {
+    "inflow": "rigid_columns: column_inflows",
+    "rate_limits": "rigid_columns: column_rate_limit",
+}
 COMPONENTS = {
     "formulas": RhsTerms(events="schedule_pieces: formula_events"),
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
     "bends": RhsTerms(events="restrictions: restriction_events"),
     "closed": RhsTerms(events="calls: solve_nodes_in_turn"),
-    "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters", record="node_clusters: record_clusters"),
-    "columns": RhsTerms(column_nodes="rigid_columns: column_pressures", move="rigid_columns: column_rates", **COLUMNS),
+    "clusters": RhsTerms(
+        solve_nodes="node_clusters: solve_clusters", record="node_clusters: record_clusters"
+    ),
+    "columns": RhsTerms(
+        column_nodes="rigid_columns: column_pressures",
+        move="rigid_columns: column_rates",
+        **COLUMNS,
+    ),
     "columns, barotropic": RhsTerms(
         column_nodes="rigid_columns: column_pressures_barotropic",
         move="rigid_columns: column_rates_barotropic",
@@ -134,18 +156,24 @@ COMPONENTS = {
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
     "memory": RhsTerms(rates="relaxation: add_unsteady_friction", **UNSTEADY_FRICTION),
-    "memory, barotropic": RhsTerms(rates="relaxation: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION),
+    "memory, barotropic": RhsTerms(
+        rates="relaxation: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION
+    ),
     "creep, barotropic": RhsTerms(
         rates="relaxation: add_wall_creep_barotropic",
         power="relaxation: add_creep_power_barotropic",
         stored="relaxation: add_creep_stored_barotropic",
     ),
     "creep": RhsTerms(
-        rates="relaxation: add_wall_creep", power="relaxation: add_creep_power", stored="relaxation: add_creep_stored"
+        rates="relaxation: add_wall_creep",
+        power="relaxation: add_creep_power",
+        stored="relaxation: add_creep_stored",
     ),
 }
 COUPLED = RhsTerms(solve_nodes="node_clusters: solve_coupled_clusters")
-BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
+BANDS = RhsTerms(
+    exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate"
+)
 ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
 
 
@@ -191,7 +219,11 @@ class ModelFeatures(NamedTuple):
         family = self.family if linear or self.pipes else "barotropic"
         yield from self.terms_at("first")
         # Without pipes, and waves of features, no waves reach the nodes, which then have simpler functions.
-        lumped = linear and not self.pipes and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
+        lumped = (
+            linear
+            and not self.pipes
+            and not any(terms.outgoing_waves for terms in self.terms_at("pipes"))
+        )
         yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
         yield READ["linear" if linear else "barotropic"]
         if self.pipes:
@@ -200,7 +232,11 @@ class ModelFeatures(NamedTuple):
         if self.valves:
             yield COMPONENTS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends or any(terms.events for place, terms in self.features if place != "links"):
+        if (
+            self.devices
+            or bends
+            or any(terms.events for place, terms in self.features if place != "links")
+        ):
             yield COMPONENTS["closed"]  # their event functions need solved nodes
         yield from self.terms_at("closed")
         yield from self.terms_at("given")
@@ -233,7 +269,8 @@ class ModelFeatures(NamedTuple):
             yield COMPONENTS["memory" if linear else "memory, barotropic"]
         if self.viscoelastic_walls:
             yield COMPONENTS["creep" if linear else "creep, barotropic"]
-        for place in ("flow", "carried", "cells", "last"):  # what is carried needs the rates of the flow
+        # what is carried needs the rates of the flow
+        for place in ("flow", "carried", "cells", "last"):
             yield from self.terms_at(place)
         if self.forces:
             yield COMPONENTS[f"forces, {family}"]
@@ -251,7 +288,11 @@ class ModelFeatures(NamedTuple):
 
     def packages(self) -> list[str]:
         """Names of the modules of laws, and of the packages with functions of features, that the model needs."""
-        return [*self.laws, *self.further_packages, *(member.package for _, member in self.features)]
+        return [
+            *self.laws,
+            *self.further_packages,
+            *(member.package for _, member in self.features),
+        ]
 
     def count(self, job: str) -> int:
         """Number of the functions of a job, which are not loaded."""
@@ -265,7 +306,10 @@ class ModelFeatures(NamedTuple):
         members = dict.fromkeys(self.components())  # components that several members need, once
         jobs = [job for job in jobs if job != "boundary_exchange" or self.boundary_exchange]
         return [
-            load_function(member.package, name) for job in jobs for member in members if (name := getattr(member, job))
+            load_function(member.package, name)
+            for job in jobs
+            for member in members
+            if (name := getattr(member, job))
         ]
 
 

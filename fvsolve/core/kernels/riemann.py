@@ -9,10 +9,16 @@ mass per length m [kg/m], F [N], m c [kg/s] with sound speed c, and the integral
 
 from math import exp, log, sqrt
 
-from fvsolve.core.kernels.density.mixture_law import area_ratio, impedance, mass_of_pressure, velocity_change
+from fvsolve.core.kernels.density.mixture_law import (
+    area_ratio,
+    impedance,
+    mass_of_pressure,
+    velocity_change,
+)
 from fvsolve.jit import njit
 
-NEAR = 1e-3  # fraction of the gas pressure; smaller jumps use the mean of 1 / (m c), because differences would cancel
+# fraction of the gas pressure; smaller jumps use the mean of 1 / (m c), because differences would cancel
+NEAR = 1e-3
 LEAST = 1e-10  # gas pressure of a vacuum [Pa]
 FALL = 0.03  # factor on the gas pressure for a step of Newton that would pass the floor
 UNBOUNDED = 1e300
@@ -27,7 +33,9 @@ def isothermal_integral(st, compliance, x):
     """
     a, gas = 1.0 / st["beta"] + compliance, st["gas"]
     b = compliance * gas
-    root, side, base = sqrt((a * x + b) * x + gas), sqrt(a), sqrt(gas)
+    root = sqrt((a * x + b) * x + gas)
+    side = sqrt(a)
+    base = sqrt(gas)
     value = root + 0.5 * b / side * log(2.0 * (side * root + a * x) + b)
     return (value - base * log((2.0 * (gas + base * root) + b * x) / x)) / sqrt(st["rho"])
 
@@ -43,7 +51,9 @@ def state_at(st, floats, pipe, p):
     over = p - st["reference"]
     force = pipe["area"] * over * (1.0 + 0.5 * pipe["compliance"] * over)
     area = pipe["area"] * area_ratio(st, pipe["compliance"], p)
-    integral = isothermal_integral(st, pipe["compliance"], p - st["floor"]) if is_isothermal(st) else 0.0
+    integral = (
+        isothermal_integral(st, pipe["compliance"], p - st["floor"]) if is_isothermal(st) else 0.0
+    )
     return p, m, force, m * sqrt(area / dm), integral
 
 
@@ -104,7 +114,9 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
     The solution is found by Newton. Both resulting velocities [m/s] are equal, except where the states part so fast
     that a vacuum remains between them.
     """
-    floor, low, high = st["floor"], st["floor"], UNBOUNDED
+    floor = st["floor"]
+    low = st["floor"]
+    high = UNBOUNDED
     # The acoustic solution, with constant impedances, is the first value.
     both = right[3] * left[0] + left[3] * right[0] + left[3] * right[3] * (v_l - v_r) / pipe["area"]
     p = both / (left[3] + right[3])
@@ -121,7 +133,9 @@ def star_state(st, floats, pipe, left, v_l, right, v_r):
         else:
             high = p
         p += gap / (rise_l + rise_r)
-        if abs(p - before) <= 1e-11 * (before - floor) + 1e-16 * before or (gap <= 0.0 and before - floor <= LEAST):
+        if abs(p - before) <= 1e-11 * (before - floor) + 1e-16 * before or (
+            gap <= 0.0 and before - floor <= LEAST
+        ):
             return middle, v_l - change_l, v_r + change_r
         if p <= low or p >= high:
             p = intermediate_pressure(floor, low, high, before)
@@ -196,7 +210,9 @@ def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
     left, right = state_at(st, floats, pipe, p_l), state_at(st, floats, pipe, p_r)
     middle, after, ahead = star_state(st, floats, pipe, left, v_l, right, v_r)
     # Both velocities agree but for the error of Newton, except at a vacuum.
-    m, v, force = middle[1], 0.5 * (after + ahead), middle[2]
+    m = middle[1]
+    v = 0.5 * (after + ahead)
+    force = middle[2]
     if after >= 0.0 and v >= 0.0:
         m, v, force = sample_wave(st, floats, pipe, left, v_l, middle, after)
     elif ahead <= 0.0 and v <= 0.0:

@@ -43,7 +43,8 @@ from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit, specialise
 
 NEARLY_CLOSED = 1e-3  # fraction of their full area below which valves control their column
-SWITCH_LOSS = 0.05  # fraction of the flow at the switch to valve control; larger than the error made there
+# fraction of the flow at the switch to valve control; larger than the error made there
+SWITCH_LOSS = 0.05
 PRESSURE_TOLERANCE = 1e-13  # relative tolerance of a pressure in Newton
 RATE_INTERVAL = 1e-7  # interval over which the rate of an area is measured [s]
 
@@ -130,7 +131,9 @@ def stationary_pressure(y, tables, out, k, end, solved):
     p, softness = junctions.far_end_pressure(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
     # At rest there is no friction: the pressure loss of the profile is added back.
-    return p + end * (junctions.driving_offset(tables, out, column) + column["drag"] * inertia), inertia + softness
+    return p + end * (
+        junctions.driving_offset(tables, out, column) + column["drag"] * inertia
+    ), inertia + softness
 
 
 @njit
@@ -150,7 +153,9 @@ def lift_drop(drop, still, slope, heavy):
         r *= 2.0
     for _ in range(100):
         speed = still + slope * (r * r - drop)
-        step = (r * r - drop + heavy * r * speed) / (2.0 * r + heavy * (speed + 2.0 * slope * r * r))
+        step = (r * r - drop + heavy * r * speed) / (
+            2.0 * r + heavy * (speed + 2.0 * slope * r * r)
+        )
         r -= step
         if abs(step) <= 1e-14 * r:
             break
@@ -176,12 +181,18 @@ def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
     # True if the column lies at the `from` end of the valve.
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
     before, behind = (stationary, other) if ahead else (other, stationary)
-    still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
+    still, slope = call_lead(
+        tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead
+    )
     driving, speed = lift_drop(drop, still, slope, heavy)
     # Steps under error control (step 0) resolve the exchange of lift and flow, so need no correction.
     if driving <= 0.0 or conductance(tables, out, index) == 0.0 or tables.clock[0]["step"] == 0.0:
         return driving, speed
-    way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
+    way = (
+        1.0
+        if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"]
+        else -1.0
+    )
     root = relaxed_root(y, tables, out, k, index, way, sqrt(driving), slope, heavy)
     return root * abs(root), still + slope * (root * abs(root) - drop)
 
@@ -209,9 +220,15 @@ def seating_flow(t, y, tables, out, k, end, index, solved):
     """Results of `controlled_flow` for column k, which valve `index` controls near its seat."""
     valve, column = tables.valves[index], tables.columns[k]
     # 1 if the column lies at the `from` end of the valve, so that outflow is positive.
-    side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
+    side = (
+        1.0
+        if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"])
+        else -1.0
+    )
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
-    other = junctions.pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    other = junctions.pressure_at(
+        tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved
+    )
     still = valve["drop"] + side * (stationary - other)
     drop, speed = seating_drop(t, y, tables, out, k, index, stationary, inertia, other, still)
     # Orifice law: flow = sqrt(G) x sign(dP) sqrt(|dP|), and its rate by dx/dt.
@@ -247,7 +264,9 @@ def zero_flow_pressure(tables, out, x, index, solved):
     """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
     valve = tables.valves[index]
     side = 1.0 if valve["from_node"] == x else -1.0
-    other = junctions.pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    other = junctions.pressure_at(
+        tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved
+    )
     return other - side * valve["drop"]
 
 
@@ -256,7 +275,9 @@ def zero_flow_range(tables, out, x, solved):
     """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
-        level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
+        level = zero_flow_pressure(
+            tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved
+        )
         least, most = min(least, level), max(most, level)
     return least, most
 
@@ -269,7 +290,9 @@ def opening_pressure(t, tables, out, x, stationary, inertia, solved):
     """
     # An opening valve moves the pressure from its stationary value towards that without flow.
     low, high = zero_flow_range(tables, out, x, solved)
-    low, high, p = min(low, stationary), max(high, stationary), stationary
+    low = min(low, stationary)
+    high = max(high, stationary)
+    p = stationary
     for _ in range(200):
         _, rate, rise = gate_flow(t, tables, out, x, p, solved)
         residual = p - stationary + inertia * rate
@@ -348,8 +371,12 @@ def controlled_rate(t, y, tables, out, k, end):
     # A flow that grows does not change its sign.
     if rate * flow >= 0.0:
         return rate
-    area, full = junctions.gate_area(tables, out, column["to_node"] if end == 1 else column["from_node"])
-    least = -SWITCH_LOSS * NEARLY_CLOSED * full * column["length"] / column["area"] * rate / flow * area
+    area, full = junctions.gate_area(
+        tables, out, column["to_node"] if end == 1 else column["from_node"]
+    )
+    least = (
+        -SWITCH_LOSS * NEARLY_CLOSED * full * column["length"] / column["area"] * rate / flow * area
+    )
     return rate * min(1.0, abs(column["flow"] + y[column["y"]]) / least)
 
 
@@ -363,7 +390,8 @@ def controlled_flow(t, y, tables, out, k, end, solved):
     x = column["to_node"] if end == 1 else column["from_node"]
     if seating_valve(tables, x) >= 0:
         return seating_flow(t, y, tables, out, k, end, seating_valve(tables, x), solved)
-    early = t if t + 2.0 * RATE_INTERVAL <= limit else t - RATE_INTERVAL  # the rate before a kink at `limit`
+    # the rate before a kink at `limit`
+    early = t if t + 2.0 * RATE_INTERVAL <= limit else t - RATE_INTERVAL
     stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
     own = end * (column["flow"] + y[column["y"]])
     p = controlled_pressure(early, tables, out, x, own, stationary, inertia, solved)
@@ -433,7 +461,9 @@ def column_pressures(t, y, dydt, out, handle):
     for k in range(tables.columns.size):
         end = control_end(tables, out, k)
         if end != 0:
-            controlled = tables.columns[k]["to_node"] if end == 1 else tables.columns[k]["from_node"]
+            controlled = (
+                tables.columns[k]["to_node"] if end == 1 else tables.columns[k]["from_node"]
+            )
             out[pressure + controlled] = controlled_flow(t, y, tables, out, k, end, True)[2]
 
 
@@ -443,10 +473,16 @@ def driving_pressure_change(tables, out, k):
 
     The driving pressure contains the pressures at both ends, gravity and the forcing of the column.
     """
-    st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
-    i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
+    st = tables.settings[0]
+    nodes = tables.nodes
+    column = tables.columns[k]
+    i = column["from_node"]
+    j = column["to_node"]
+    at = tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
-    now = driving_pressure(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+    now = driving_pressure(
+        st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"]
+    )[0]
     if column["forcing"] >= 0:
         now += mean_density(st, tables.floats, p_i, p_j) * junctions.forcing_of(tables, out, column)
     return now - column["base"]
@@ -472,10 +508,14 @@ def column_rate(t, y, tables, out, k, change):
     column, end = tables.columns[k], control_end(tables, out, k)
     node = column["to_node"] if end == 1 else column["from_node"]
     # At a seat that is closed the general formula would accelerate a column that cannot move.
-    if end != 0 and (seating_valve(tables, node) < 0 or junctions.gate_area(tables, out, node)[0] == 0.0):
+    if end != 0 and (
+        seating_valve(tables, node) < 0 or junctions.gate_area(tables, out, node)[0] == 0.0
+    ):
         return end * controlled_rate(t, y, tables, out, k, end)
     friction = column_drag(column, out[tables.layout[0]["column"] + k])
-    return column["area"] / column["length"] * (change + column["offset"]) - (friction - column["drag"])
+    return column["area"] / column["length"] * (change + column["offset"]) - (
+        friction - column["drag"]
+    )
 
 
 CHANGE = None  # constant of the template
@@ -490,7 +530,9 @@ def _column_rates(t, y, dydt, out, handle):
 
 
 column_rates = specialise(_column_rates, "column_rates", CHANGE=driving_pressure_change_linear)
-column_rates_barotropic = specialise(_column_rates, "column_rates_barotropic", CHANGE=driving_pressure_change)
+column_rates_barotropic = specialise(
+    _column_rates, "column_rates_barotropic", CHANGE=driving_pressure_change
+)
 
 
 @njit
@@ -556,7 +598,9 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
     L, area A and flow M, is then subtracted; for a valve near its seat `apply_seating_drop` subtracts it.
     """
     tables = open_tables(handle)
-    st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
+    st = tables.settings[0]
+    nodes = tables.nodes
+    floats = tables.floats
     pressure = tables.layout[0]["pressure"]
     junction_pressures_barotropic(t, y, tables, out)
     for k in range(tables.columns.size):
@@ -569,7 +613,9 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
         rise = st["gravity"] * (nodes[controlled]["elevation"] - nodes[i]["elevation"])
         rise -= end * junctions.forcing_of(tables, out, column)
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
-        out[pressure + controlled] = pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
+        out[pressure + controlled] = (
+            pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
+        )
         if seating_valve(tables, controlled) >= 0:
             apply_seating_drop(t, y, tables, out, k, controlled, seating_valve(tables, controlled))
         elif junctions.gate_area(tables, out, controlled)[0] > 0.0:
@@ -604,7 +650,9 @@ def column_rate_limit(t, y, dydt, out, handle):
     out[CLOSING] = 0.0
     if out[RATE] == RATE_UNWANTED:
         return
-    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
     for k in range(tables.columns.size):
         column = tables.columns[k]
         for side in range(2):

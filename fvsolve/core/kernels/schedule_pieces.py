@@ -7,8 +7,10 @@ from fvsolve.core.kernels.formula_programs import program_slopes, run_program
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
 
-POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: wave cut off below zero
-BLOCK, BLOCK_PART = 4.0, 5.0  # scale times output of a block plus offset, and the positive part of this value
+# kinds of pieces; CREST: wave cut off below zero
+POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0
+# scale times output of a block plus offset, and the positive part of this value
+BLOCK, BLOCK_PART = 4.0, 5.0
 FORMULA = 6.0  # header of the steps of a formula, see `formula_programs`
 
 
@@ -59,7 +61,9 @@ def piece_slopes(pieces, row, t):
         c, d = pieces[row, 5], pieces[row, 6]
         return pieces[row, 4] + s * (2.0 * c + s * 3.0 * d), 2.0 * c + 6.0 * d * s
     if pieces[row, 1] == POWER:
-        span, n, rest = pieces[row, 5], pieces[row, 6], 1.0 - s / pieces[row, 5]
+        span = pieces[row, 5]
+        n = pieces[row, 6]
+        rest = 1.0 - s / pieces[row, 5]
         fall = (pieces[row, 4] - pieces[row, 3]) * n / span
         # At its end only a linear piece still has a slope.
         if rest <= 0.0:
@@ -107,8 +111,12 @@ def piecewise_value(tables, index, t):
     if count == 0:
         return block_value(tables.pieces, first, tables.applied[int(tables.pieces[first, 2])])
     if count < 0:
-        return run_program(tables.pieces, first, t, limit, 0, tables.stack, tables.armed, tables.armed[:0])
-    return piece_value(tables.pieces, piece_at(tables.pieces, first, count, t, limit), min(t, limit))
+        return run_program(
+            tables.pieces, first, t, limit, 0, tables.stack, tables.armed, tables.armed[:0]
+        )
+    return piece_value(
+        tables.pieces, piece_at(tables.pieces, first, count, t, limit), min(t, limit)
+    )
 
 
 @njit
@@ -118,7 +126,9 @@ def formula_events(t, y, out, handle, g):
     limit, schedules = tables.clock[0]["limit"], tables.schedules
     for k in range(schedules.size):
         if schedules[k]["pieces"] < 0:
-            run_program(tables.pieces, schedules[k]["first"], t, limit, 0, tables.stack, tables.armed, g)
+            run_program(
+                tables.pieces, schedules[k]["first"], t, limit, 0, tables.stack, tables.armed, g
+            )
 
 
 @njit(forceinline=True)

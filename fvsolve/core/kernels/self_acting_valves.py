@@ -41,9 +41,15 @@ def loop_rate(out, tables, k, i, speed):
     drop = head_drop(tables, out, k)[1]
     # Fall of the drop per flow, by the pressures of both nodes.
     soft = node_impedance(tables, valve["from_node"]) + node_impedance(tables, valve["to_node"])
-    gain = speed * sqrt(valve["conductance"] * abs(drop)) / (1.0 + soft * restriction_slope(tables, out, k, drop))
+    gain = (
+        speed
+        * sqrt(valve["conductance"] * abs(drop))
+        / (1.0 + soft * restriction_slope(tables, out, k, drop))
+    )
     # A stored mass adds an integration to the loop, which then oscillates: its rate is a square root.
-    stiff = stiffness_of(tables.nodes, layout, out, i) if tables.nodes[i]["kind"] != JUNCTION else 0.0
+    stiff = (
+        stiffness_of(tables.nodes, layout, out, i) if tables.nodes[i]["kind"] != JUNCTION else 0.0
+    )
     return max(gain * node_impedance(tables, i), sqrt(gain * stiff))
 
 
@@ -52,7 +58,9 @@ def sensed_pressure(tables, out, device):
     """Weighted sum of the pressure changes since the start at the nodes that a device senses [Pa]."""
     at = tables.layout[0]["pressure"]
     total = device["node_weight"] * out[at + device["node"]]
-    return total + (device["second_weight"] * out[at + device["second"]] if device["second"] >= 0 else 0.0)
+    return total + (
+        device["second_weight"] * out[at + device["second"]] if device["second"] >= 0 else 0.0
+    )
 
 
 @njit
@@ -80,14 +88,19 @@ def control_limit(out, tables, device, speed):
 
     speed : derivative of dx/dt with respect to the drop [1/s/Pa], x : lift
     """
-    valve, columns, limit = tables.valves[device["valve"]], tables.columns, 0.0
+    valve = tables.valves[device["valve"]]
+    columns = tables.columns
+    limit = 0.0
     for k in range(columns.size):
         for i in (columns[k]["from_node"], columns[k]["to_node"]):
             at_end, node = i == valve["from_node"] or i == valve["to_node"], tables.nodes[i]
             # Only the sole valve at the end of a single column can control it.
             if at_end and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
                 limit = max(
-                    limit, column_control_limit(out, tables, device, columns[k]["area"] / columns[k]["length"], speed)
+                    limit,
+                    column_control_limit(
+                        out, tables, device, columns[k]["area"] / columns[k]["length"], speed
+                    ),
                 )
     return limit
 
@@ -101,7 +114,9 @@ def column_control_limit(out, tables, device, mobility, speed):
     device : row of the device of the valve; speed : derivative of dx/dt with respect to the drop [1/s/Pa]
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
-    rate = 2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
+    rate = (
+        2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
+    )
     return max(CONTROL_LIFT, 2.0 * tables.clock[0]["step"] * rate)
 
 

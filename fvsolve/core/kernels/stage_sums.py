@@ -16,7 +16,24 @@ HUGE = 1e100  # greater values count as not finite
 # of all stages; step size, a float; address of the weights at the end of the step; numbers of runs that the step itself
 # forms: states in no such basin, cells that all bands read, rows at the edges of bands; number of basins; cells of a
 # block. From HEAD on 1 for each basin whose rows are formed in blocks, else 0; then the runs, first and last + 1.
-MODE, BAD, NOW, TO, RATES, WEIGHTS, SIZE, COUNT, STAGES, STEP, LAST, OTHERS, CHECKED, EDGES, BASINS, CELLS = range(16)
+(
+    MODE,
+    BAD,
+    NOW,
+    TO,
+    RATES,
+    WEIGHTS,
+    SIZE,
+    COUNT,
+    STAGES,
+    STEP,
+    LAST,
+    OTHERS,
+    CHECKED,
+    EDGES,
+    BASINS,
+    CELLS,
+) = range(16)
 HEAD = 16
 # MODE: nothing; check that all is finite; form the stage before rates; and the end after them
 OFF, CHECK, STAGE, STAGE_AND_END = range(4)
@@ -48,13 +65,23 @@ def combine(begin, end, y, h, weights, count, k, out):
         elif second < 0:
             second = j
         else:
-            c0, c1, c2 = h * weights[first], h * weights[second], h * weights[j]
-            k0, k1, k2 = k[first, begin:end], k[second, begin:end], k[j, begin:end]
+            c0 = h * weights[first]
+            c1 = h * weights[second]
+            c2 = h * weights[j]
+            k0 = k[first, begin:end]
+            k1 = k[second, begin:end]
+            k2 = k[j, begin:end]
             for i in range(out.size):
                 out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
-            base, copied, first, second = out, True, -1, -1
+            base = out
+            copied = True
+            first = -1
+            second = -1
     if second >= 0:
-        c0, c1, k0, k1 = h * weights[first], h * weights[second], k[first, begin:end], k[second, begin:end]
+        c0 = h * weights[first]
+        c1 = h * weights[second]
+        k0 = k[first, begin:end]
+        k1 = k[second, begin:end]
         for i in range(out.size):
             out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
     elif first >= 0:
@@ -83,7 +110,12 @@ def request_sums(sums, mode, y, h, weights, count, k, to, last):
     y, h : state and step; weights, count, k : weights and number of earlier stages, and their rates
     last : weights of all stages at the end of the step
     """
-    sums[MODE], sums[NOW], sums[TO], sums[RATES] = mode, address_of(y), address_of(to), address_of(k)
+    sums[MODE], sums[NOW], sums[TO], sums[RATES] = (
+        mode,
+        address_of(y),
+        address_of(to),
+        address_of(k),
+    )
     sums[WEIGHTS], sums[LAST] = address_of(weights), address_of(last)
     sums[SIZE], sums[COUNT], sums[STAGES] = y.size, count, k.shape[0]
     # The step is a float in an array of integers, so it is written through its address.
@@ -118,9 +150,12 @@ def form_rows(sums, behind, at, width, begin, stop, left, right):
     at, width : offset of the quantity in the state, and number of cells in a row
     """
     size, stages = sums[SIZE], sums[STAGES]
-    y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
+    y = floats_at(sums[NOW], size)
+    to = floats_at(sums[TO], size)
+    h = floats_at(address_of(sums) + 8 * STEP, 1)[0]
     k = floats_at(sums[RATES], stages * size).reshape((stages, size))
-    weights, count = floats_at(sums[LAST if behind else WEIGHTS], stages), stages if behind else sums[COUNT]
+    weights = floats_at(sums[LAST if behind else WEIGHTS], stages)
+    count = stages if behind else sums[COUNT]
     # Whole rows follow each other in memory: a single long loop.
     if left == 0 and right == width:
         combine(at + width * begin, at + width * stop, y, h, weights, count, k, to)
@@ -149,6 +184,9 @@ def form_checked_runs(sums):
     A band is a part of the states, which one thread or process steps. sums : see `request_sums`
     """
     size, stages = sums[SIZE], sums[STAGES]
-    y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
-    k, weights = floats_at(sums[RATES], stages * size).reshape((stages, size)), floats_at(sums[WEIGHTS], stages)
+    y = floats_at(sums[NOW], size)
+    to = floats_at(sums[TO], size)
+    h = floats_at(address_of(sums) + 8 * STEP, 1)[0]
+    k = floats_at(sums[RATES], stages * size).reshape((stages, size))
+    weights = floats_at(sums[WEIGHTS], stages)
     sum_runs(sums, sums[OTHERS], sums[OTHERS] + sums[CHECKED], y, h, weights, sums[COUNT], k, to)

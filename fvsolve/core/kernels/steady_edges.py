@@ -33,7 +33,11 @@ def friction_drop(law, flow):
     `from` and the `to` end
     """
     jet = law[10] if flow > 0.0 else law[9]
-    return law[1] * drag(law[2], law[3], law[4], law[5], law[6], flow) + law[8] + jet * abs(flow) * flow
+    return (
+        law[1] * drag(law[2], law[3], law[4], law[5], law[6], flow)
+        + law[8]
+        + jet * abs(flow) * flow
+    )
 
 
 @njit
@@ -62,7 +66,9 @@ def edge_row(law, flow, drop):
 
 
 @njit
-def fill_systems(numbers, rows, laws, terms, places, drawn, scales, flow, potential, values, right, matrices):
+def fill_systems(
+    numbers, rows, laws, terms, places, drawn, scales, flow, potential, values, right, matrices
+):
     """Write Newton systems of problems of equal structure: values of rows with laws, balances, and dense matrices.
 
     numbers : int64[m]  numbers of the problems, of n
@@ -77,8 +83,12 @@ def fill_systems(numbers, rows, laws, terms, places, drawn, scales, flow, potent
     for k in numbers:
         pressure, typical = scales[k, 0], scales[k, 1]
         for r in range(rows.shape[0]):
-            at, i, j = rows[r, 1], rows[r, 3], rows[r, 4]
-            alpha, beta, gamma = edge_row(laws[k, r], flow[k, rows[r, 2]], potential[k, i] - potential[k, j])
+            at = rows[r, 1]
+            i = rows[r, 3]
+            j = rows[r, 4]
+            alpha, beta, gamma = edge_row(
+                laws[k, r], flow[k, rows[r, 2]], potential[k, i] - potential[k, j]
+            )
             values[k, at] = alpha * typical / pressure
             if rows[r, 5] == 1:
                 values[k, at + 1] = -beta
@@ -122,6 +132,7 @@ def take_changes(numbers, changes, active, unknown, scales, flow, potential, siz
             largest = max(largest, abs(value))
         if size <= 1e-15 * (1.0 + largest / scales[k, 1]) or (sweep > 20 and size < 1e-12):
             ended[k] = 1
-        if sizes[k] <= 2.0 * size and 2.0 * size < ROUNDING:  # no further decrease: only rounding is left
+        # no further decrease: only rounding is left
+        if sizes[k] <= 2.0 * size and 2.0 * size < ROUNDING:
             ended[k] = 1
         sizes[k] = size

@@ -9,15 +9,26 @@ from fvsolve.jit import njit
 
 TWO_OVER_LN10 = 2.0 / log(10.0)
 EXPONENT = 0.852  # Hazen-Williams: drop as flow to 1.852
-MANTISSA, BITS_OF_ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000  # bits of a float64: the mantissa, the number 1
-QUOTIENT, REMAINDER = np.divmod(213 * (np.arange(2048) - 1023), 500)  # 0.426 e for every exponent e of a float64
+# bits of a float64: the mantissa, the number 1
+MANTISSA, BITS_OF_ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000
+# 0.426 e for every exponent e of a float64
+QUOTIENT, REMAINDER = np.divmod(213 * (np.arange(2048) - 1023), 500)
 SCALES = np.ldexp(2.0 ** (REMAINDER / 500.0), QUOTIENT)  # 2^(0.426 e)
 SCALES[2047] = np.nan  # exponent of inf and NaN
 # Chebyshev interpolation polynomial of m^0.426 for a mantissa m = 1.5 + u in [1, 2), in powers of u
 C0, C1, C2, C3 = 1.1885429391841094, 0.33754619472829295, -0.06458383859594458, 0.02258999154267194
-C4, C5, C6, C7 = -0.009691106002097438, 0.004618135156910341, -0.002347050217323954, 0.0012459456986562145
-C8, C9, C10, C11 = -0.0006824009481078974, 0.0003828835870081093, -0.00022023842211638112, 0.00012760184472426772
-C12, C13, C14, C15 = -6.871804362162948e-05, 4.135631024837494e-05, -3.944523632526398e-05, 2.3126602172851562e-05
+C4 = -0.009691106002097438
+C5 = 0.004618135156910341
+C6 = -0.002347050217323954
+C7 = 0.0012459456986562145
+C8 = -0.0006824009481078974
+C9 = 0.0003828835870081093
+C10 = -0.00022023842211638112
+C11 = 0.00012760184472426772
+C12 = -6.871804362162948e-05
+C13 = 4.135631024837494e-05
+C14 = -3.944523632526398e-05
+C15 = 2.3126602172851562e-05
 SMOOTHEST = 1e-12  # relative roughness of a smooth wall with a sign
 LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended between them
 
@@ -148,5 +159,7 @@ def drag_slope(kind, loss, rough, roughness, reynolds, flow):
 @njit
 def column_drag(column, flow):
     """Friction term of a rigid column [kg/s2] at a mass flow [kg/s]."""
-    kind, loss, rough = column["friction"], column["loss"], column["rough"]
+    kind = column["friction"]
+    loss = column["loss"]
+    rough = column["rough"]
     return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)

@@ -24,7 +24,8 @@ NEAR = 1e-6  # relative difference of flows below which the tangent replaces the
 CHORD_ERROR = 1e-2  # error of the fall at the present flow, over the length of the chord
 SWEEPS = 40
 LEAST_SLOPE, TINY_SLOPE = 1e-6, 1e-60  # least slope over the flow [1/m], and without flow [m2/s]
-FACE_SHARE = 1e-3  # firm slope of faces of water over that of structures, so that structures set a level at rest
+# firm slope of faces of water over that of structures, so that structures set a level at rest
+FACE_SHARE = 1e-3
 FARTHEST = 1e6  # greatest fall of the search for a flow [m]
 RULE = FLOW = SLOPES = CHORD = LINE = None  # constants of the templates
 
@@ -57,7 +58,9 @@ def slopes_template(floats, at, setting, ahead, z, fall):
     """Derivatives [m2/s] of the flow by the fall at a constant higher level, and by this level at a constant fall."""
     # A fall is never negative, so the difference is one-sided at equal levels.
     low, high = max(fall - CHANGE, 0.0), fall + CHANGE
-    by_fall = FLOW(floats, at, setting, ahead, z, high)[0] - FLOW(floats, at, setting, ahead, z, low)[0]
+    by_fall = (
+        FLOW(floats, at, setting, ahead, z, high)[0] - FLOW(floats, at, setting, ahead, z, low)[0]
+    )
     by_level = FLOW(floats, at, setting, ahead, z + CHANGE, fall)[0]
     by_level -= FLOW(floats, at, setting, ahead, z - CHANGE, fall)[0]
     return by_fall / (high - low), by_level / (2.0 * CHANGE)
@@ -80,8 +83,12 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     The slope is 0 if the present flow is greater than any flow of the law.
     """
     sought = max(present, 0.0) if by_level else abs(present)
-    begin, reach, x = z if by_level else fall, max(fall, LINEAR_FALL), 0.0
-    low, high, found = begin if by_level else 0.0, begin, flow
+    begin = z if by_level else fall
+    reach = max(fall, LINEAR_FALL)
+    x = 0.0
+    low = begin if by_level else 0.0
+    high = begin
+    found = flow
     # The law gives more than the present flow, so a level with this flow lies below.
     while by_level and found > sought and reach < FARTHEST:
         low, reach = low - reach, 2.0 * reach
@@ -89,8 +96,12 @@ def chord_template(floats, at, setting, ahead, z, fall, flow, present, by_level)
     found = flow
     # The law gives less than the present flow, so it is sought above.
     while found < sought and reach < FARTHEST:
-        low, high, reach = high, high + reach, 2.0 * reach
-        found = FLOW(floats, at, setting, ahead, high if by_level else z, fall if by_level else high)[0]
+        low = high
+        high = high + reach
+        reach = 2.0 * reach
+        found = FLOW(
+            floats, at, setting, ahead, high if by_level else z, fall if by_level else high
+        )[0]
     if found < sought:
         return 0.0
     for _ in range(SWEEPS):
@@ -111,7 +122,9 @@ def line_template(floats, at, setting, z, fall, present, firm):
     Laws are concave in the fall and partly in the level, so that tangents might alternate. Therefore the slope over the
     fall is that of the chord, plus the excess of the chord over the level above the tangent.
     """
-    ahead, size, m = fall >= 0.0, abs(fall), present if fall >= 0.0 else -present
+    ahead = fall >= 0.0
+    size = abs(fall)
+    m = present if fall >= 0.0 else -present
     high = z if ahead else z - fall
     flow = FLOW(floats, at, setting, ahead, high, size)[0]
     by_fall, by_level = SLOPES(floats, at, setting, ahead, high, size)
@@ -158,7 +171,11 @@ def higher_level(tables, out, k, drop):
     drop : drop of potential [Pa]
     """
     z, fall = level_and_fall(tables, out, k, drop)
-    return fall >= 0.0, z if fall >= 0.0 else level_at(tables, out, tables.valves[k]["to_node"]), abs(fall)
+    return (
+        fall >= 0.0,
+        z if fall >= 0.0 else level_at(tables, out, tables.valves[k]["to_node"]),
+        abs(fall),
+    )
 
 
 @njit
@@ -185,7 +202,10 @@ def set_structure(t, y, out, tables, device):
 
 def step_template(out, tables, k, g, m, drop, denser, wide):
     """(a [kg/s], s [kg/s/Pa]) of the next Newton step dM = a + s d(drop); arguments as for `restriction_step`."""
-    st, floats, at, setting = tables.settings[0], tables.floats, tables.valves[k]["data"], setting_of(tables, out, k)
+    st = tables.settings[0]
+    floats = tables.floats
+    at = tables.valves[k]["data"]
+    setting = setting_of(tables, out, k)
     rho = st["rho"] * denser
     # Both levels are known, so the flow is too, and Newton needs no slope.
     if not ends_at_junction(tables, k):
@@ -205,7 +225,9 @@ def lift_template(out, tables, k, g, drop, denser, wide):
     if not ends_at_junction(tables, k):
         return 0.0
     ahead, z, fall = higher_level(tables, out, k, drop)
-    by_level = SLOPES(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)[1]
+    by_level = SLOPES(
+        tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall
+    )[1]
     by_level = denser * max(by_level, 0.0) / tables.settings[0]["gravity"]
     return by_level if ahead else -by_level
 
@@ -213,7 +235,9 @@ def lift_template(out, tables, k, g, drop, denser, wide):
 def slope_template(out, tables, k, g, drop):
     """Greatest derivative [kg/s/Pa] of the mass flow of structure k by a pressure at its ends; drop : [Pa]"""
     ahead, z, fall = higher_level(tables, out, k, drop)
-    slopes = SLOPES(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)
+    slopes = SLOPES(
+        tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall
+    )
     return (max(slopes[0], 0.0) + max(slopes[1], 0.0)) / tables.settings[0]["gravity"]
 
 
@@ -221,5 +245,7 @@ def regime_template(t, y, out, tables, device, quantity):
     """Regime of a structure: NONE without flow, FREE if the lower level does not change its flow, else DROWNED."""
     k = device["valve"]
     ahead, z, fall = higher_level(tables, out, k, head_drop(tables, out, k)[1])
-    found = FLOW(tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall)
+    found = FLOW(
+        tables.floats, tables.valves[k]["data"], setting_of(tables, out, k), ahead, z, fall
+    )
     return float(found[1])

@@ -111,14 +111,18 @@ class View(NamedTuple):
     features: list
 
 
-def linked_handles(shared: tuple, views: list[View], written: tuple, called: tuple, features: list, kept: list):
+def linked_handles(
+    shared: tuple, views: list[View], written: tuple, called: tuple, features: list, kept: list
+):
     """Handle of the tables of a model, the arrays of a run, the addresses of functions, and the handles of features.
 
     shared : addresses of the tables of the model; written, called : arrays that the run writes, addresses of functions
     features : tables of each feature by slot, None for none; kept : receives the arrays behind the handles
     """
     for view in views:
-        within = handle_of((*view.tables, *addresses_of((*with_features(written, view.features, kept), *called))))
+        within = handle_of(
+            (*view.tables, *addresses_of((*with_features(written, view.features, kept), *called)))
+        )
         # In place, because tables of the model refer to this array.
         view.array[:] = within if COMPILING else boxed(within)
     return handle_of((*shared, *addresses_of((*with_features(written, features, kept), *called))))
@@ -151,4 +155,6 @@ def with_features(written: tuple, features: list, kept: list) -> tuple:
 
 def places_in_memory(arrays: list[np.ndarray]) -> np.ndarray:
     """Address and size of each array of float64, one after another : int64[2 n]."""
-    return np.array([number for array in arrays for number in (array.ctypes.data, array.size)], dtype=np.int64)
+    return np.array(
+        [number for array in arrays for number in (array.ctypes.data, array.size)], dtype=np.int64
+    )

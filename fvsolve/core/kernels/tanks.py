@@ -11,7 +11,8 @@ from fvsolve.jit import njit
 EVENTS = 4  # events of a tank: held at its bottom, left again; held at its rim, left again
 BOTTOM, RIM = 0, 2  # offsets of these events
 NEAR = 1e-10  # distance at which a tank is at its limit [m]
-RETURN_SPEED = 1e-11  # speed of the level below which a tank does not leave its limit; above rounding [m/s]
+# speed of the level below which a tank does not leave its limit; above rounding [m/s]
+RETURN_SPEED = 1e-11
 MIN_AREA = 1e-4  # least area [m2]
 LEAST = 1e-300
 

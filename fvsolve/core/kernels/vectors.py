@@ -72,7 +72,9 @@ def cross(a, i, x, y, z):
 @njit(forceinline=True)
 def rotate(out, r, v, k):
     """Transform the vector v[k:k+3] from axes of a body to axes of the world; out[r] : its rotation matrix, by rows."""
-    x, y, z = v[k], v[k + 1], v[k + 2]
+    x = v[k]
+    y = v[k + 1]
+    z = v[k + 2]
     return dot(out, r, x, y, z), dot(out, r + 3, x, y, z), dot(out, r + 6, x, y, z)
 
 

@@ -31,14 +31,19 @@ def cell_reynolds(y, tables, p, i):
     if st["walther_b"] == 0.0 or pipe["friction"] != FRICTION_ROUGH:
         return pipe["reynolds"]
     k, n = st["temperature"], pipe["cells"]
-    mass = tables.profile[pipe["center"] + i] + (y[pipe["y"] + i] + y[pipe["y"] + n + i]) / pipe["speed"]
+    mass = (
+        tables.profile[pipe["center"] + i]
+        + (y[pipe["y"] + i] + y[pipe["y"] + n + i]) / pipe["speed"]
+    )
     mass += tables.floats[tables.scalars[k]["wall_masses"] + p]
     temperature = y[tables.scalars[k]["y"] + pipe["cell"] + i] / mass + tables.scalars[k]["zero"]
     # Rounding of the temperature must not disturb a steady flow.
     if abs(temperature - pipe["temperature"]) <= SAME * pipe["temperature"]:
         return pipe["reynolds"]
     start = walther_viscosity(st["walther_a"], st["walther_b"], pipe["temperature"])
-    return pipe["reynolds"] * (start / walther_viscosity(st["walther_a"], st["walther_b"], temperature))
+    return pipe["reynolds"] * (
+        start / walther_viscosity(st["walther_a"], st["walther_b"], temperature)
+    )
 
 
 @njit
@@ -53,9 +58,15 @@ def viscous_friction(t, y, dydt, out, handle):
         pipe = tables.pipes[p]
         if pipe["friction"] != FRICTION_ROUGH:
             continue
-        n, o, spread = pipe["cells"], pipe["y"], GAUSS * pipe["dx"] / pipe["speed"]
+        n = pipe["cells"]
+        o = pipe["y"]
+        spread = GAUSS * pipe["dx"] / pipe["speed"]
         spread, full = 0.0 if st["floor"] > 0.0 else spread, st["rho"] * pipe["area"]
-        kind, loss, rough, roughness, before = FRICTION_ROUGH, 0.0, pipe["rough"], pipe["roughness"], pipe["reynolds"]
+        kind = FRICTION_ROUGH
+        loss = 0.0
+        rough = pipe["rough"]
+        roughness = pipe["roughness"]
+        before = pipe["reynolds"]
         for i in range(n):
             now = cell_reynolds(y, tables, p, i)
             # The rates of waves already contain the friction at this temperature.
@@ -69,7 +80,9 @@ def viscous_friction(t, y, dydt, out, handle):
             # A quarter: half of the friction for each wave, as the mean of two points.
             excess *= 0.25
             if st["law"] != LAW_LINEAR:
-                mass = tables.profile[pipe["center"] + i] + (y[o + i] + y[o + n + i]) / pipe["speed"]
+                mass = (
+                    tables.profile[pipe["center"] + i] + (y[o + i] + y[o + n + i]) / pipe["speed"]
+                )
                 excess *= full / max(mass, DRY * full)
             dydt[o + i] -= excess
             dydt[o + n + i] += excess

@@ -34,9 +34,13 @@ def chain_along(mesh: Mesh, points: Sequence[Sequence[float]]) -> FaceChain:
     faces from one side of the line to the other passes one of these faces. A centre on the line counts as left of it.
     """
     left, right = mesh.centre[mesh.left[: mesh.inner]], mesh.centre[mesh.right[: mesh.inner]]
-    normal, count, turn = mesh.normal[: mesh.inner], np.zeros(mesh.inner, int), np.zeros(mesh.inner)
+    normal = mesh.normal[: mesh.inner]
+    count = np.zeros(mesh.inner, int)
+    turn = np.zeros(mesh.inner)
     across = normal.copy()
-    for start, stop in zip(np.asarray(points[:-1], float), np.asarray(points[1:], float), strict=True):
+    for start, stop in zip(
+        np.asarray(points[:-1], float), np.asarray(points[1:], float), strict=True
+    ):
         along = stop - start
         ahead = cross(along, right - start) >= 0.0
         crosses = ((cross(along, left - start) >= 0.0) != ahead) & (
@@ -47,8 +51,12 @@ def chain_along(mesh: Mesh, points: Sequence[Sequence[float]]) -> FaceChain:
         turn[crosses] = side[crosses]
         across[crosses] = np.outer(side[crosses], (-along[1], along[0])) / np.hypot(*along)
     faces = np.flatnonzero(count % 2)
-    cosine, sine = np.maximum(np.sum(normal * across, axis=1), 0.0)[faces], cross(normal, across)[faces]
-    length = sum(length_inside(mesh, *np.array(ends, float)) for ends in zip(points[:-1], points[1:], strict=True))
+    cosine = np.maximum(np.sum(normal * across, axis=1), 0.0)[faces]
+    sine = cross(normal, across)[faces]
+    length = sum(
+        length_inside(mesh, *np.array(ends, float))
+        for ends in zip(points[:-1], points[1:], strict=True)
+    )
     whole = float(mesh.length[faces] @ cosine)
     return FaceChain(faces, turn[faces], cosine, sine, length / whole if whole > 0.0 else 1.0)
 
@@ -59,7 +67,9 @@ def length_inside(mesh: Mesh, start: np.ndarray, stop: np.ndarray) -> float:
     A segment along faces counts as slightly right of them.
     """
     along = stop - start
-    start = start + BESIDE * np.ptp(mesh.points, axis=0).max() * np.array([along[1], -along[0]]) / np.hypot(*along)
+    start = start + BESIDE * np.ptp(mesh.points, axis=0).max() * np.array(
+        [along[1], -along[0]]
+    ) / np.hypot(*along)
     corners = mesh.points[np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)]
     edges = np.roll(corners, -1, axis=1) - corners
     height, rise = (

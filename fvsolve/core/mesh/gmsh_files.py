@@ -13,16 +13,37 @@ import numpy as np
 from fvsolve.units import plain_numbers, show
 
 KINDS = {  # number of an element type -> (name as in meshio, points)
-    1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8), 6: ("wedge", 6),
-    7: ("pyramid", 5), 8: ("line3", 3), 9: ("triangle6", 6), 10: ("quad9", 9), 11: ("tetra10", 10),
-    12: ("hexahedron27", 27), 13: ("wedge18", 18), 14: ("pyramid14", 14), 15: ("vertex", 1), 16: ("quad8", 8),
-    17: ("hexahedron20", 20), 18: ("wedge15", 15), 19: ("pyramid13", 13), 21: ("triangle10", 10), 26: ("line4", 4),
-    27: ("line5", 5), 36: ("quad16", 16), 37: ("quad25", 25), 23: ("triangle15", 15),
-}  # fmt: skip
+    1: ("line", 2),
+    2: ("triangle", 3),
+    3: ("quad", 4),
+    4: ("tetra", 4),
+    5: ("hexahedron", 8),
+    6: ("wedge", 6),
+    7: ("pyramid", 5),
+    8: ("line3", 3),
+    9: ("triangle6", 6),
+    10: ("quad9", 9),
+    11: ("tetra10", 10),
+    12: ("hexahedron27", 27),
+    13: ("wedge18", 18),
+    14: ("pyramid14", 14),
+    15: ("vertex", 1),
+    16: ("quad8", 8),
+    17: ("hexahedron20", 20),
+    18: ("wedge15", 15),
+    19: ("pyramid13", 13),
+    21: ("triangle10", 10),
+    26: ("line4", 4),
+    27: ("line5", 5),
+    36: ("quad16", 16),
+    37: ("quad25", 25),
+    23: ("triangle15", 15),
+}
 LONGEST = 40  # greatest length of the name of a section [characters]
 MOST = 2.0**53  # greatest whole number of a text
 HEADER = re.compile(rb"\$MeshFormat\s+(4(?:\.\d+)?)\s+([01])\s+(\d)\s")
-NAME = re.compile(r'^[ \t]*(\d)[ \t]+(\d+)[ \t]+"(.*)"', re.MULTILINE)  # dimension, number and name of a group
+# dimension, number and name of a group
+NAME = re.compile(r'^[ \t]*(\d)[ \t]+(\d+)[ \t]+"(.*)"', re.MULTILINE)
 
 
 class ElementBlock(NamedTuple):
@@ -69,7 +90,9 @@ class Numbers:
         width = {"i": 4, "u": self.size, "f": 8}[kind] if self.size else 1
         begin, self.at = self.at, self.at + width * count
         if self.at > len(self.data):
-            raise ValueError(f"section ${self.name} ends before its last number; is the file complete?")
+            raise ValueError(
+                f"section ${self.name} ends before its last number; is the file complete?"
+            )
         if self.size:
             return np.frombuffer(self.data, f"<{kind}{width}", count, begin)
         return self.data[begin : self.at]
@@ -86,7 +109,9 @@ class Numbers:
         """Numbers of points and elements : int64[count]. Raises ValueError for other numbers."""
         values = self.take("u", count)
         if not ((values < MOST) & (values == np.floor(values))).all():
-            raise ValueError(f"section ${self.name} has numbers of points or elements that are not whole numbers")
+            raise ValueError(
+                f"section ${self.name} has numbers of points or elements that are not whole numbers"
+            )
         return values.astype(np.int64)
 
     def counted(self, kind: str) -> list[int]:
@@ -99,22 +124,37 @@ def read_gmsh_4(data: bytes) -> GmshMesh | None:
     match = HEADER.search(data[:1000])
     if match is None:
         return None
-    version, binary, size = match[1].decode(), match[2] == b"1", int(match[3])
+    version = match[1].decode()
+    binary = match[2] == b"1"
+    size = int(match[3])
     parts = dict(sections(data))
     if missing := [name for name in ("Nodes", "Elements") if name not in parts]:
         raise ValueError(f"the file has no section ${missing[0]}")
     # Gmsh writes 4.0 as "4", others write 4.1 so: the first line of 4.1 has four numbers
-    old = version == "4.0" or (version == "4" and not binary and len(parts["Nodes"].split(b"\n", 1)[0].split()) == 2)
-    if (old and binary) or (binary and (size not in (4, 8) or b"\1\0\0\0" not in parts["MeshFormat"])):
+    old = version == "4.0" or (
+        version == "4" and not binary and len(parts["Nodes"].split(b"\n", 1)[0].split()) == 2
+    )
+    if (old and binary) or (
+        binary and (size not in (4, 8) or b"\1\0\0\0" not in parts["MeshFormat"])
+    ):
         raise ValueError("MSH 4.0 in binary form, or of another processor, is not read")
-    read = {name: Numbers(name, content, size if binary else 0) for name, content in parts.items()
-            if name in ("Entities", "PartitionedEntities", "Nodes", "Elements")}  # fmt: skip
-    physical = entities(read.get("Entities"), old) | entities(read.get("PartitionedEntities"), old, partitioned=True)
+    read = {
+        name: Numbers(name, content, size if binary else 0)
+        for name, content in parts.items()
+        if name in ("Entities", "PartitionedEntities", "Nodes", "Elements")
+    }
+    physical = entities(read.get("Entities"), old) | entities(
+        read.get("PartitionedEntities"), old, partitioned=True
+    )
     numbers, points = nodes(read["Nodes"], old)
     order = np.argsort(numbers, kind="stable")
-    cells, groups, first = [], {}, 0
+    cells = []
+    groups = {}
+    first = 0
     for dimension, entity, kind, rows in elements(read["Elements"], old):
-        spot = order[np.minimum(np.searchsorted(numbers, rows, sorter=order), max(numbers.size - 1, 0))]
+        spot = order[
+            np.minimum(np.searchsorted(numbers, rows, sorter=order), max(numbers.size - 1, 0))
+        ]
         cells.append(ElementBlock(kind, np.where(numbers[spot] == rows, spot, -1)))
         if kind == "line":
             for group in {abs(number) for number in physical.get((dimension, entity), ())}:
@@ -138,7 +178,9 @@ def sections(data: bytes) -> Iterator[tuple[str, bytes]]:
         at = end + len(name) + 4
 
 
-def entities(section: Numbers | None, old: bool, partitioned: bool = False) -> dict[tuple[int, int], list[int]]:
+def entities(
+    section: Numbers | None, old: bool, partitioned: bool = False
+) -> dict[tuple[int, int], list[int]]:
     """Physical groups of entities : (dimension, number of the entity) -> numbers of its groups, negative if reversed.
 
     old : True for MSH 4.0; partitioned : True for the section of entities that are cut by partitions
@@ -192,7 +234,9 @@ def elements(section: Numbers, old: bool) -> Iterator[tuple[int, int, str, np.nd
     for _ in range(blocks):
         first, second, code = (section.whole("i") for _ in range(3))
         if code not in KINDS:
-            raise ValueError(f"elements of the type {code} are not read; expected triangles and quadrilaterals")
+            raise ValueError(
+                f"elements of the type {code} are not read; expected triangles and quadrilaterals"
+            )
         kind, points = KINDS[code]
         count = section.whole("u")
         rows = section.numbers(count * (1 + points)).reshape(count, 1 + points)[:, 1:]

@@ -10,7 +10,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 WALL = "wall"  # patch of all boundary faces without a name
-NO_NEIGHBOUR, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
+# no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
+NO_NEIGHBOUR, CROWDED = -1, -2
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +74,24 @@ class Mesh:
     def patch(self, name: str) -> slice:
         """Range of the faces of a patch; raises ValueError for an unknown name."""
         k = self.patches.index(name)
-        first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
+        # -right of inner faces is 0 or less, in any order
+        first, last = np.searchsorted(-self.right, [k + 1, k + 2])
         return slice(int(first), int(last))
 
     def neighbouring_faces(self, name: str) -> np.ndarray:
         """Numbers in a patch of the faces before and after each of its faces, its own at ends : int64[2, count]."""
         starts, stops = self.ends[self.patch(name)].T
-        numbers, at_start, at_stop = np.arange(starts.size), np.argsort(starts), np.argsort(stops)
+        numbers = np.arange(starts.size)
+        at_start = np.argsort(starts)
+        at_stop = np.argsort(stops)
         before = at_stop[np.searchsorted(stops[at_stop], starts).clip(max=starts.size - 1)]
         after = at_start[np.searchsorted(starts[at_start], stops).clip(max=starts.size - 1)]
         ends = (stops[before] == starts, before), (starts[after] == stops, after)
         return np.array([np.where(joined, other, numbers) for joined, other in ends])
 
-    def extrapolation(self, name: str, size: int, walls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def extrapolation(
+        self, name: str, size: int, walls: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Nearest cells around the cell behind each face of a boundary patch, and their weights in extrapolation.
 
         They are neighbours and neighbours of these, `size` at most: with the nearest three, noise on triangles grows.
@@ -103,16 +109,22 @@ class Mesh:
         def next_to(cell: int) -> np.ndarray:
             return beyond[order[starts[cell] : starts[cell + 1]]]
 
-        cells, weights = np.repeat(self.left[faces, None], size, axis=1), np.zeros((faces.size, size, 2))
+        cells = np.repeat(self.left[faces, None], size, axis=1)
+        weights = np.zeros((faces.size, size, 2))
         for m, (face, cell) in enumerate(zip(faces, self.left[faces], strict=True)):
             near = np.unique(np.concatenate([next_to(k) for k in (cell, *next_to(cell))]))
             near = near[near != cell]
-            near = near[np.argsort(np.hypot(*(self.centre[near] - self.centre[cell]).T), kind="stable")][:size]
+            near = near[
+                np.argsort(np.hypot(*(self.centre[near] - self.centre[cell]).T), kind="stable")
+            ][:size]
             offsets = self.centre[near] - self.centre[cell]
             middle = self.middle[face] - self.centre[cell]
             mirrored = 2.0 * (middle @ self.normal[face]) * self.normal[face]
             gradient = np.linalg.pinv(offsets, rcond=0.05)
-            cells[m, : near.size], weights[m, : near.size] = near, (np.array([middle, mirrored]) @ gradient).T
+            cells[m, : near.size], weights[m, : near.size] = (
+                near,
+                (np.array([middle, mirrored]) @ gradient).T,
+            )
         return cells, weights
 
     def faces(self, name: str) -> "PatchFaces":
@@ -127,8 +139,11 @@ class Mesh:
         left, right = self.left[:inner], self.right[:inner]
         faces = np.flatnonzero(within[left] != within[right])
         leaves = within[right[faces]]  # from the left cell into the patch
-        outside, inside = np.where(leaves, left[faces], right[faces]), np.where(leaves, right[faces], left[faces])
-        return PatchFaces(faces, outside, inside, np.where(leaves, 1.0, -1.0)[:, None] * self.normal[faces])
+        outside = np.where(leaves, left[faces], right[faces])
+        inside = np.where(leaves, right[faces], left[faces])
+        return PatchFaces(
+            faces, outside, inside, np.where(leaves, 1.0, -1.0)[:, None] * self.normal[faces]
+        )
 
 
 class PatchFaces(NamedTuple):
@@ -177,7 +192,9 @@ class Edges:
     def order(self, cells: int) -> np.ndarray:
         """Order of the cells in which neighbours are close together (reverse Cuthill-McKee) : int64[cells]."""
         graph = self.graph(cells)
-        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(
+            np.int64
+        )
 
     def graph(self, cells: int) -> coo_array:
         """Adjacency matrix : int8[cells, cells], 1 at (lower number, higher number) of two cells that share a face."""
@@ -237,7 +254,9 @@ def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     difference = 0.5 * (cross(p1 - p0, p2 - p0) - cross(p2 - p0, p3 - p0))
     even, odd = p0 + p2, p1 + p3
     safe = np.where(area == 0.0, 1.0, area)
-    return area, 0.25 * (even + odd) - (odd - even) / 12.0 - (difference / (6.0 * safe))[:, None] * (p3 - p1)
+    return area, 0.25 * (even + odd) - (odd - even) / 12.0 - (difference / (6.0 * safe))[
+        :, None
+    ] * (p3 - p1)
 
 
 def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -252,7 +271,9 @@ def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarr
         outgoing = np.roll(at, -1, axis=1) - at
         incoming = np.roll(outgoing, 1, axis=1)
         along = np.sum(incoming * outgoing, axis=2)
-        values = np.stack([cross(incoming, outgoing), along, np.hypot(outgoing[..., 0], outgoing[..., 1])])
+        values = np.stack(
+            [cross(incoming, outgoing), along, np.hypot(outgoing[..., 0], outgoing[..., 1])]
+        )
         out[:, selected, :count] = values
         out[:, selected, 3] = values[:, :, 0 if count == 3 else 3]
     return out[0], out[1], out[2]
@@ -280,10 +301,23 @@ def assemble(
     a, b = points[ends[:, 0]], points[ends[:, 1]]
     along = b - a
     length = np.hypot(along[:, 0], along[:, 1])
-    normal = np.stack([along[:, 1], 0.0 - along[:, 0]], axis=1) / length[:, None]  # 0 - x avoids negative zeros
+    # 0 - x avoids negative zeros
+    normal = np.stack([along[:, 1], 0.0 - along[:, 0]], axis=1) / length[:, None]
     left, middle = edges.cell[chosen], 0.5 * (a + b)
     return Mesh(
-        points, cells, area, centre, left, right, normal, length, middle, ends, tuple(patches), grid, tuple(notes)
+        points,
+        cells,
+        area,
+        centre,
+        left,
+        right,
+        normal,
+        length,
+        middle,
+        ends,
+        tuple(patches),
+        grid,
+        tuple(notes),
     )
 
 
@@ -313,16 +347,22 @@ def quality(mesh: Mesh) -> Quality:
     left, right = mesh.area[mesh.left[: mesh.inner]], mesh.area[mesh.right[: mesh.inner]]
     ratio = np.maximum(left, right) / np.minimum(left, right)
     steepest = int(np.argmax(ratio)) if ratio.size else -1
-    return Quality(smallest=float(mesh.area.min()), largest=float(mesh.area.max()), angle=float(angle[sharpest]),
-                   sharpest=sharpest, ratio=float(ratio[steepest]) if ratio.size else 1.0,
-                   steepest=steepest)  # fmt: skip
+    return Quality(
+        smallest=float(mesh.area.min()),
+        largest=float(mesh.area.max()),
+        angle=float(angle[sharpest]),
+        sharpest=sharpest,
+        ratio=float(ratio[steepest]) if ratio.size else 1.0,
+        steepest=steepest,
+    )
 
 
 OUTLINE_TOLERANCE = 1e-9  # of the mesh's extent: points this close to its outline count as inside
 CANDIDATES = 16  # cells with the nearest centres, tried before all cells
 RINGS = 2  # greatest number of rings of neighbours
 WEIGHT_TOLERANCE = 1e-9  # of a cell's size: error of exact weights
-SUM_WEIGHT = 1e4  # weight of the sum of weights over that of their point, for points beyond all centres
+# weight of the sum of weights over that of their point, for points beyond all centres
+SUM_WEIGHT = 1e4
 TINY = 1e-300  # least squared length
 INWARD_FRACTION = 1e-3  # of the distance from the outline to the centre of its cell
 
@@ -334,7 +374,10 @@ class MeshPoints:
         from scipy.spatial import cKDTree
 
         self.mesh, self.near = mesh, OUTLINE_TOLERANCE * float(np.ptp(mesh.points, axis=0).max())
-        self.low, self.high = mesh.points.min(axis=0) - self.near, mesh.points.max(axis=0) + self.near
+        self.low, self.high = (
+            mesh.points.min(axis=0) - self.near,
+            mesh.points.max(axis=0) + self.near,
+        )
         self.tree = cKDTree(mesh.centre)
         order = np.argsort(mesh.cells, axis=None, kind="stable")
         first = np.searchsorted(mesh.cells.ravel()[order], np.arange(len(mesh.points) + 1))
@@ -344,7 +387,8 @@ class MeshPoints:
     def cell(self, x: float, y: float) -> int:
         """Number of the cell that contains the point (x, y) [m]; the lowest number on an edge, -1 outside all cells."""
         n = len(self.mesh.cells)
-        if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # far points, whose distances overflow, and NaN
+        # far points, whose distances overflow, and NaN
+        if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):
             return -1
         nearest = np.sort(np.ravel(self.tree.query((x, y), min(CANDIDATES, n))[1]))
         for cells in (nearest, np.arange(n)):
@@ -355,7 +399,8 @@ class MeshPoints:
 
     def _inside(self, cells: np.ndarray, x: float, y: float) -> np.ndarray:
         corners = self.mesh.cells[cells]
-        corners = np.where(corners < 0, corners[:, :1], corners)  # a triangle's fourth side has no length
+        # a triangle's fourth side has no length
+        corners = np.where(corners < 0, corners[:, :1], corners)
         a = self.mesh.points[corners]
         along = np.roll(a, -1, axis=1) - a
         left = along[..., 0] * (y - a[..., 1]) - along[..., 1] * (x - a[..., 0])
@@ -370,7 +415,9 @@ class MeshPoints:
         outer = slice(mesh.inner, None)
         a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
         along, point = b - a, np.array([x, y])
-        share = np.clip(((point - a) * along).sum(1) / np.maximum((along * along).sum(1), TINY), 0.0, 1.0)
+        share = np.clip(
+            ((point - a) * along).sum(1) / np.maximum((along * along).sum(1), TINY), 0.0, 1.0
+        )
         foot = a + share[:, None] * along
         k = int(np.argmin(np.hypot(*(foot - point).T)))
         inside = foot[k] + INWARD_FRACTION * (mesh.centre[mesh.left[outer][k]] - foot[k])
@@ -385,7 +432,9 @@ class MeshPoints:
         """
         grid = self.mesh.grid
         if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
-            (i, p), (j, q) = (_neighbour_columns(lines, value) for lines, value in ((grid.x, x), (grid.y, y)))
+            (i, p), (j, q) = (
+                _neighbour_columns(lines, value) for lines, value in ((grid.x, x), (grid.y, y))
+            )
             cells = (j[:, None] * grid.nx + i).ravel()
             weights = np.outer(q, p).ravel()
         else:
@@ -399,11 +448,16 @@ class MeshPoints:
         cells, attempts = [cell], []
         for _ in range(RINGS):
             points = {int(p) for c in cells for p in self.mesh.cells[c] if p >= 0}
-            near = {int(c) for p in points for c in self.cells_of_points[self.first[p] : self.first[p + 1]]}
+            near = {
+                int(c)
+                for p in points
+                for c in self.cells_of_points[self.first[p] : self.first[p + 1]]
+            }
             cells += sorted(near - set(cells))
             away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
             weights, residual = nnls(
-                np.vstack([np.full(len(cells), SUM_WEIGHT), away.T]), np.array([SUM_WEIGHT, 0.0, 0.0])
+                np.vstack([np.full(len(cells), SUM_WEIGHT), away.T]),
+                np.array([SUM_WEIGHT, 0.0, 0.0]),
             )
             attempts.append((np.array(cells), weights))
             if residual < WEIGHT_TOLERANCE:

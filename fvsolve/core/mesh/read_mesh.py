@@ -19,7 +19,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fvsolve.core.mesh.gmsh_files import GmshMesh, line_names, read_gmsh_4, sections
-from fvsolve.core.mesh.mesh import CROWDED, WALL, Edges, Mesh, assemble, corners, cross, edges_of, key_of
+from fvsolve.core.mesh.mesh import (
+    CROWDED,
+    WALL,
+    Edges,
+    Mesh,
+    assemble,
+    corners,
+    cross,
+    edges_of,
+    key_of,
+)
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
 from fvsolve.units import find
 
@@ -55,7 +65,9 @@ class Sketch:
 
     def list(self, cells: np.ndarray) -> str:
         """Text like '2 of 40 cells: cell 7 at ..., cell 9 at ...', with a list of at most MAX_CELLS cells."""
-        texts = [self.show(c) for c in cells[:MAX_CELLS]] + (["..."] if len(cells) > MAX_CELLS else [])
+        texts = [self.show(c) for c in cells[:MAX_CELLS]] + (
+            ["..."] if len(cells) > MAX_CELLS else []
+        )
         return f"{len(cells)} of {len(self.cells)} cells: {', '.join(texts)}"
 
 
@@ -68,11 +80,15 @@ def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
     long = side.max(axis=1, keepdims=True)
     left, right = turn > LEAST_HEIGHT * long**2, turn < -LEAST_HEIGHT * long**2
     quad = sketch.cells[:, 3] >= 0
-    has_left, has_right, flat = left.any(axis=1), right.any(axis=1), (side <= LEAST_HEIGHT * long).any(axis=1)
+    has_left = left.any(axis=1)
+    has_right = right.any(axis=1)
+    flat = (side <= LEAST_HEIGHT * long).any(axis=1)
     concave = quad & has_left & has_right
     tests = {
         "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": flat,
-        "cross themselves; expected corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
+        "cross themselves; expected corners in order around the cell": quad
+        & (left.sum(1) == 2)
+        & (right.sum(1) == 2),
         "are not convex; expected every corner below 180 degrees: split them into triangles": concave,
         "have no area; expected corners that do not lie on one line": ~has_left & ~has_right,
     }
@@ -97,11 +113,17 @@ def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fau
     at = crowded[edges.key[crowded] == faces[0]]
     cells = np.sort(number[edges.cell[at]])
     cell_texts = " and ".join(sketch.show(c) for c in cells[:MAX_CELLS])
-    reason = "more than two cells share the face" if cells.size > 2 else "both lie on one side of the face"
+    reason = (
+        "more than two cells share the face"
+        if cells.size > 2
+        else "both lie on one side of the face"
+    )
     more = f" ({faces.size} such faces)" if faces.size > 1 else ""
     where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
     remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups (MSH 2.2)?"
-    return [Fault("cells", f"some cells overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
+    return [
+        Fault("cells", f"some cells overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")
+    ]
 
 
 def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
@@ -110,7 +132,9 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
     Two coincident faces are the sides of a thin wall if a group contains one of them, and then are not a fault.
     named : bool[outer]  True for boundary faces in a group
     """
-    start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
+    start = edges.start[edges.outer]
+    stop = edges.stop[edges.outer]
+    cell = edges.cell[edges.outer]
     contact_pairs, complete = contacts(sketch.points[start], sketch.points[stop], named)
     texts = {
         "same": "coincide but are not connected: {cell} and {neighbour} at {face}; expected one set of points "
@@ -124,7 +148,9 @@ def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Faul
         if len(pairs):
             i, j = pairs[0]
             text = texts[kind].format(
-                cell=sketch.show(cell[i]), neighbour=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
+                cell=sketch.show(cell[i]),
+                neighbour=sketch.show(cell[j]),
+                face=sketch.face((start[i], stop[i])),
             )
             number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
             places = f"at {number}{'' if complete else ' or more'} place{'' if number == 1 and complete else 's'} faces"
@@ -143,20 +169,26 @@ def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, 
     middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
     tree = cKDTree(middle)
     for first in range(0, len(a), BLOCK):
-        pairs = _touching(a, b, *_pairs(tree, middle, length, np.arange(first, min(first + BLOCK, len(a)))))
+        pairs = _touching(
+            a, b, *_pairs(tree, middle, length, np.arange(first, min(first + BLOCK, len(a))))
+        )
         pairs["same"] = pairs["same"][~thin[pairs["same"]].any(axis=1)]
         if any(map(len, pairs.values())):
             break
     return pairs, first + BLOCK >= len(a)
 
 
-def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(
+    tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Numbers i, j of pairs of segments that may touch: two arrays.
 
     Segment i is in `block` and not shorter than j, and the distance between their middles is below the length of i.
     tree, middle, length : of all segments
     """
-    near = tree.query_ball_point(middle[block], (1.0 + CONTACT_DISTANCE) * length[block], return_sorted=False)
+    near = tree.query_ball_point(
+        middle[block], (1.0 + CONTACT_DISTANCE) * length[block], return_sorted=False
+    )
     i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
     j = np.concatenate(near).astype(np.int64)
     valid = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
@@ -171,8 +203,11 @@ def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dic
     within_j = _within(a, b, j, a[i]) | _within(a, b, j, b[i])
     through = _on_both_sides(a, b, i, j) & _on_both_sides(a, b, j, i)
     pairs, reverse = np.stack([i, j], axis=1), np.stack([j, i], axis=1)
-    return {"same": pairs[same], "middle": np.concatenate([pairs[within_i], reverse[within_j]]),
-            "cross": pairs[through]}  # fmt: skip
+    return {
+        "same": pairs[same],
+        "middle": np.concatenate([pairs[within_i], reverse[within_j]]),
+        "cross": pairs[through],
+    }
 
 
 def _distance(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -206,7 +241,8 @@ def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
     if size.size == 1:
         return []
     listed = [
-        f"{size[k]} in the piece of {sketch.show(first[k])}" for k in np.argsort(-size, kind="stable")[:MAX_CELLS]
+        f"{size[k]} in the piece of {sketch.show(first[k])}"
+        for k in np.argsort(-size, kind="stable")[:MAX_CELLS]
     ]
     more = ", ..." if size.size > MAX_CELLS else ""
     text = f"the cells are in {size.size} pieces that share no face: {', '.join(listed)}{more}"
@@ -237,7 +273,12 @@ def assign_patches(
         if missing.any():
             text = f"lines that are not boundary faces: {missing.sum()} of {members.size}"
             location = _line_location(sketch, edges, lines[members][missing][0])
-            faults.append(Fault(place, f"{text}; {location}; expected a curve of the boundary, or `group` of a wall"))
+            faults.append(
+                Fault(
+                    place,
+                    f"{text}; {location}; expected a curve of the boundary, or `group` of a wall",
+                )
+            )
         spot = spot[~missing]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
@@ -251,7 +292,11 @@ def assign_patches(
 
 
 def _outline(
-    groups: Mapping[str, np.ndarray], lines: np.ndarray, edges: Edges, count: int, walls: Collection[str]
+    groups: Mapping[str, np.ndarray],
+    lines: np.ndarray,
+    edges: Edges,
+    count: int,
+    walls: Collection[str],
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """(groups of lines on the boundary, notes on groups that are ignored, since all their lines lie between cells).
 
@@ -260,9 +305,15 @@ def _outline(
     inner = np.setdiff1d(edges.key, edges.key[edges.outer])
     outline, notes = {}, []
     for name, members in groups.items():
-        if members.size and name not in walls and np.isin(key_of(lines[members], count), inner).all():
+        if (
+            members.size
+            and name not in walls
+            and np.isin(key_of(lines[members], count), inner).all()
+        ):
             text = f'the lines of the group "{name}" lie between cells: ignored'
-            notes.append(f'{text}; `walls` of the basin may name it, for example {{ bank = {{ group = "{name}" }} }}')
+            notes.append(
+                f'{text}; `walls` of the basin may name it, for example {{ bank = {{ group = "{name}" }} }}'
+            )
         elif name not in walls:
             outline[name] = members
     return outline, notes
@@ -285,7 +336,8 @@ GMSH_REMEDY = "Gmsh: try Mesh.MshFileVersion = 4.1 and Mesh.SaveParametric = 0"
 PLANE_TOLERANCE = 1e-6  # of the extent: allowed range of z
 FAR = 1e100  # beyond it fourth powers overflow
 SOLID_FORMATS = (".node", ".ele")
-LONGEST_LINE, MOST_PRINTED = 10_000, 10_000  # characters of a line of a file, and of the warnings of meshio
+# characters of a line of a file, and of the warnings of meshio
+LONGEST_LINE, MOST_PRINTED = 10_000, 10_000
 LONGEST_TEXT = 300  # greatest length of a text of meshio in a message [characters]
 LARGE, SMALL = 1e4, 1e-3  # extents that suggest another unit [m]
 
@@ -324,14 +376,18 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     faults = _place_faults(content, unit)
     if faults:
         raise MeshError(faults, path.name)
-    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)  # -1 comes first
+    # -1 comes first
+    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)
     cells = renumbered[:-1].reshape(-1, 4) - 1
     notes = list(content.notes)
     spare = len(content.points) + 1 - used.size
     if spare:
-        notes.append(f"points in the file that belong to no cell: {spare} of {len(content.points)}, ignored")
+        notes.append(
+            f"points in the file that belong to no cell: {spare} of {len(content.points)}, ignored"
+        )
     spot = np.minimum(np.searchsorted(used[1:], content.lines), used.size - 2)
-    lines = np.where(used[1:][spot] == content.lines, spot, -1)  # -1 for a point that belongs to no cell
+    # -1 for a point that belongs to no cell
+    lines = np.where(used[1:][spot] == content.lines, spot, -1)
     sketch = Sketch(content.points[used[1:], :2], cells, unit)
     faults, bad, clockwise = shape_faults(sketch)
     quads, triangles = cells[clockwise][:, [0, 3, 2, 1]], cells[clockwise][:, [0, 2, 1, 3]]
@@ -346,12 +402,17 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     outline, ignored = _outline(content.groups, lines, edges, len(sketch.points), walls)
     notes += ignored
     faults, names, patch = assign_patches(sketch, edges, lines, outline)
-    chains = {name: key_of(lines[members], len(sketch.points)) for name, members in content.groups.items()
-              if name not in outline}  # fmt: skip
+    chains = {
+        name: key_of(lines[members], len(sketch.points))
+        for name, members in content.groups.items()
+        if name not in outline
+    }
     for name, keys in chains.items():
         if (missing := ~np.isin(keys, edges.key)).any():
             where = _line_location(sketch, edges, lines[content.groups[name]][missing][0])
-            faults.append(Fault(f"groups.{name}", f"{where}; expected sides of cells, as the group is a wall"))
+            faults.append(
+                Fault(f"groups.{name}", f"{where}; expected sides of cells, as the group is a wall")
+            )
     touching = contact_faults(sketch, edges, patch >= 0)
     faults += touching or piece_faults(sketch, edges)
     if faults:
@@ -363,7 +424,9 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     patch = np.where(patch < 0, len(names) - 1, patch)
     mesh = assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
     between = key_of(mesh.ends[: mesh.inner], len(sketch.points))
-    return replace(mesh, groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()})
+    return replace(
+        mesh, groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()}
+    )
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:
@@ -399,7 +462,9 @@ def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> l
         text = f'the patch of all {unnamed} boundary faces is "{WALL}"'
         notes.append(f"the file contains no named group of lines: {text}")
     elif unnamed:
-        notes.append(f'boundary faces in no group: {unnamed} of {patch.size}; their patch is "{WALL}"')
+        notes.append(
+            f'boundary faces in no group: {unnamed} of {patch.size}; their patch is "{WALL}"'
+        )
     extent = factor * np.ptp(sketch.points, axis=0).max()
     if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
@@ -423,15 +488,23 @@ def load_file(path: Path) -> Content:
     if len(shape) == 2 and shape[1] in (2, 3):
         points[:, : shape[1]] = file_mesh.points
     else:
-        faults.append(Fault("points", f"an array of shape {shape}; expected two or three coordinates per point"))
+        faults.append(
+            Fault(
+                "points", f"an array of shape {shape}; expected two or three coordinates per point"
+            )
+        )
     if faults:
         raise MeshError(faults, path.name)
     cells = [_padded(block.data) for block in file_mesh.cells if block.type in PLANE]
     lines = [block.data for block in file_mesh.cells if block.type == "line"]
     groups, unnamed = _groups(file_mesh)
-    content = Content(points, np.concatenate(cells).astype(np.int64),
-                      np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64), groups,
-                      (*notes, *unnamed))  # fmt: skip
+    content = Content(
+        points,
+        np.concatenate(cells).astype(np.int64),
+        np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64),
+        groups,
+        (*notes, *unnamed),
+    )
     for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0)):
         low = np.where(np.arange(table.shape[1]) == 3, least, 0)
         rows = np.flatnonzero(np.any((table < low) | (table >= len(points)), axis=1))
@@ -450,7 +523,9 @@ def _read_file(path: Path) -> tuple[Any, tuple[str, ...]]:
     """
     if not path.is_file():
         near = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
-        raise MeshError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path))
+        raise MeshError(
+            [Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)
+        )
     if path.suffix.lower() != ".msh":
         return _read_by_meshio(path)
     try:
@@ -458,7 +533,9 @@ def _read_file(path: Path) -> tuple[Any, tuple[str, ...]]:
         if (result := read_gmsh_4(data)) is not None:
             return result, ()
     except (OSError, ValueError) as error:
-        raise MeshError([Fault("", f"the file cannot be read ({error}); {GMSH_REMEDY}")], path.name) from None
+        raise MeshError(
+            [Fault("", f"the file cannot be read ({error}); {GMSH_REMEDY}")], path.name
+        ) from None
     file_mesh, notes = _read_by_meshio(path)
     with contextlib.suppress(ValueError):  # meshio keeps one of two groups of the same name
         file_mesh.field_data = line_names(dict(sections(data)).get("PhysicalNames", b""))
@@ -472,23 +549,42 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     printed = BoundedText()
     try:
         if path.suffix.lower() in SOLID_FORMATS:  # meshio does not end at the end of such a file
-            raise ValueError("files of TetGen contain tetrahedra; expected a mesh of one plane surface")
-        if path.suffix.lower() == ".su2" and max(map(len, path.read_bytes().split(b"\n"))) > LONGEST_LINE:
-            raise ValueError(f"a line has more than {LONGEST_LINE} characters")  # meshio takes minutes to print it
-        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), warnings.catch_warnings():
+            raise ValueError(
+                "files of TetGen contain tetrahedra; expected a mesh of one plane surface"
+            )
+        if (
+            path.suffix.lower() == ".su2"
+            and max(map(len, path.read_bytes().split(b"\n"))) > LONGEST_LINE
+        ):
+            # meshio takes minutes to print it
+            raise ValueError(f"a line has more than {LONGEST_LINE} characters")
+        with (
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(printed),
+            warnings.catch_warnings(),
+        ):
             warnings.simplefilter("ignore")
             file_mesh = meshio.read(path)
         return file_mesh, tuple(
-            f"meshio: {_single_line(line)}" for line in printed.getvalue().split("Warning:") if line.strip()
+            f"meshio: {_single_line(line)}"
+            for line in printed.getvalue().split("Warning:")
+            if line.strip()
         )
     except (Exception, SystemExit) as error:  # meshio calls exit, or raises errors of any type
-        text = printed.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+        text = (
+            printed.getvalue()
+            if isinstance(error, SystemExit)
+            else f"{type(error).__name__}: {error}"
+        )
     text = _single_line(text)
     remedy = GMSH_REMEDY if path.suffix.lower() == ".msh" else ""
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
         remedy = f"expected a name that ends in {listing(known, 40)}"
-    raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read the file ({text})", remedy])))], path.name)
+    raise MeshError(
+        [Fault("", "; ".join(filter(None, [f"meshio cannot read the file ({text})", remedy])))],
+        path.name,
+    )
 
 
 class BoundedText(io.StringIO):
@@ -519,7 +615,9 @@ def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
         return [Fault("cells", f"{text}; {expected}: a mesh of one plane surface")]
     if other:
         remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
-        return [Fault("cells", f"{', '.join(other)} cannot be used ({counts}); {expected}; {remedy}")]
+        return [
+            Fault("cells", f"{', '.join(other)} cannot be used ({counts}); {expected}; {remedy}")
+        ]
     if not set(kinds) & set(PLANE):
         text = f"there are no two-dimensional cells ({counts}); {expected}; was the surface meshed?"
         remedy = " Gmsh: if there are physical groups, it writes only those; add one of the surface (Physical Surface)"
@@ -528,13 +626,18 @@ def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
 
 
 def _padded(cells: np.ndarray) -> np.ndarray:
-    return np.pad(np.asarray(cells, np.int64), ((0, 0), (0, 4 - cells.shape[1])), constant_values=-1)
+    return np.pad(
+        np.asarray(cells, np.int64), ((0, 0), (0, 4 - cells.shape[1])), constant_values=-1
+    )
 
 
 def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """(name -> numbers of the lines of each group, notes on groups that have only a number in the file)."""
-    field_data = file_mesh.field_data or {}  # name -> (number, dimension) of each group of lines that has a name
-    name_of = {int(v[0]): name for name, v in field_data.items() if np.shape(v) == (2,) and int(v[1]) == 1}
+    # name -> (number, dimension) of each group of lines that has a name
+    field_data = file_mesh.field_data or {}
+    name_of = {
+        int(v[0]): name for name, v in field_data.items() if np.shape(v) == (2,) and int(v[1]) == 1
+    }
     members: dict[str, list[np.ndarray]] = {name: [] for name in name_of.values()}
     unnamed: set[int] = set()
     first = 0
@@ -552,7 +655,9 @@ def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     text = f"groups of lines with a number instead of a name in the file: their patches are named {numbers}"
     notes = (text,) if unnamed else ()
     empty = [np.empty(0, np.int64)]
-    return {name: np.unique(np.concatenate(lines or empty)) for name, lines in members.items()}, notes
+    return {
+        name: np.unique(np.concatenate(lines or empty)) for name, lines in members.items()
+    }, notes
 
 
 def _tagged_lines(file_mesh: Any) -> Iterable[tuple[int, np.ndarray]]:

@@ -56,7 +56,9 @@ def rectangle(
     if pieces.size > 1:
         text = f"{gaps} leave {pieces.size} pieces that share no face, {pieces.max()} of {pieces.sum()} cells in the"
         x, y = points[corners[np.argmax(piece != np.argmax(pieces)), 0]]
-        faults.append(Fault(place, f"{text} largest, another piece at {x:.6g},{y:.6g} m; expected one piece"))
+        faults.append(
+            Fault(place, f"{text} largest, another piece at {x:.6g},{y:.6g} m; expected one piece")
+        )
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")
@@ -64,7 +66,9 @@ def rectangle(
     return assemble(points, corners, edges, names, patch, grid)
 
 
-def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Sequence) -> list[Fault]:
+def _bad_numbers(
+    size: Sequence, cells: Sequence, origin: Sequence, grading: Sequence
+) -> list[Fault]:
     def is_pair(given: Sequence) -> bool:
         return not isinstance(given, str) and len(given) == 2
 
@@ -78,10 +82,18 @@ def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Seq
         ("size", size, is_positive, "two positive lengths [m], along x and y"),
         ("cells", cells, is_count, "two whole numbers of cells, along x and y, at least 1"),
         ("origin", origin, math.isfinite, "the two coordinates [m] of the south-west corner"),
-        ("grading", grading, is_positive, "two positive ratios of last to first spacing, along x and y"),
+        (
+            "grading",
+            grading,
+            is_positive,
+            "two positive ratios of last to first spacing, along x and y",
+        ),
     ]
-    faults = [Fault(key, f"{_list_text(given)}; expected {expected}") for key, given, is_valid, expected in checks
-              if not (is_pair(given) and all(is_valid(value) for value in given))]  # fmt: skip
+    faults = [
+        Fault(key, f"{_list_text(given)}; expected {expected}")
+        for key, given, is_valid, expected in checks
+        if not (is_pair(given) and all(is_valid(value) for value in given))
+    ]
     if not faults and any(n == 1 and g != 1.0 for n, g in zip(cells, grading, strict=True)):
         text = f"{_list_text(grading)} with cells {_list_text(cells)}; expected 1 along an axis with one cell"
         faults.append(Fault("grading", text))
@@ -89,7 +101,11 @@ def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Seq
 
 
 def _list_text(given: Sequence) -> str:
-    return "[" + ", ".join(f"{value:.9g}" if isinstance(value, float) else str(value) for value in given) + "]"
+    return (
+        "["
+        + ", ".join(f"{value:.9g}" if isinstance(value, float) else str(value) for value in given)
+        + "]"
+    )
 
 
 def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray:
@@ -118,21 +134,41 @@ def _nearest(lines: np.ndarray, value: float) -> str:
     If `value` is beyond all lines, the text contains only the position of the outermost line next to it.
     """
     k = int(np.clip(np.searchsorted(lines, value), 1, lines.size - 1))
-    around = [lines[0]] if value < lines[0] else [lines[-1]] if value > lines[-1] else lines[k - 1 : k + 1]
+    around = (
+        [lines[0]]
+        if value < lines[0]
+        else [lines[-1]]
+        if value > lines[-1]
+        else lines[k - 1 : k + 1]
+    )
     return " and ".join(f"{line:.9g}" for line in around)
 
 
-def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Sequence[float]) -> list[Fault]:
+def _cut(
+    solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Sequence[float]
+) -> list[Fault]:
     """Mark the cells of a hole as False in `solid` : bool[ny, nx]; return the faults of the hole.
 
     lines : grid lines along x, along y; place : key of the hole for faults; hole : (x0, y0, x1, y1) [m]
     """
     names = ("x0", "y0", "x1", "y1")
-    if len(hole) != 4 or not all(math.isfinite(v) for v in hole) or not (hole[0] < hole[2] and hole[1] < hole[3]):
-        return [Fault(place, f"{_list_text(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
+    if (
+        len(hole) != 4
+        or not all(math.isfinite(v) for v in hole)
+        or not (hole[0] < hole[2] and hole[1] < hole[3])
+    ):
+        return [
+            Fault(
+                place,
+                f"{_list_text(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1",
+            )
+        ]
     indices = [_line(lines[k % 2], value) for k, value in enumerate(hole)]
     faults = [
-        Fault(place, f"{name} = {value:.9g} m is on no grid line; nearest {name[0]}: {_nearest(lines[k % 2], value)} m")
+        Fault(
+            place,
+            f"{name} = {value:.9g} m is on no grid line; nearest {name[0]}: {_nearest(lines[k % 2], value)} m",
+        )
         for k, (name, value) in enumerate(zip(names, hole, strict=True))
         if indices[k] is None
     ]
@@ -188,24 +224,33 @@ def _patches(
         taken = on & (patch < len(names))
         if taken.any():
             other, at = names[patch[taken][0]], middle[taken]
-            text = f'overlaps "{other}" on the {where} side, about {at.min():.9g} to {at.max():.9g} m'
+            text = (
+                f'overlaps "{other}" on the {where} side, about {at.min():.9g} to {at.max():.9g} m'
+            )
             faults.append(Fault(f"patches.{name}", f"{text}; expected each face in one patch"))
         patch[on] = names.index(name)
     return names, np.minimum(patch, len(names) - 1)
 
 
-def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
+def _patch_range(
+    place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray
+) -> tuple | Fault:
     """(start, end) of a patch along a side, on grid lines [m], or the fault of its range.
 
     place : key of the patch for faults; span : [] for the whole side, else stated start and end
     lines, solid : as for `_corners`
     """
     if side not in SIDES:
-        return Fault(place, f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}')
+        return Fault(
+            place,
+            f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}',
+        )
     along = lines[SIDES[side]]
     cells = {"west": solid[:, 0], "east": solid[:, -1], "south": solid[0], "north": solid[-1]}[side]
     if not cells.any():
-        return Fault(place, f"the holes remove the whole {side} side; expected another side, or other holes")
+        return Fault(
+            place, f"the holes remove the whole {side} side; expected another side, or other holes"
+        )
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:
@@ -217,9 +262,13 @@ def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray],
         i, j = (int(np.argmin(np.abs(along - value))) for value in span)
         i = min(i, along.size - 2)
         near = f"{along[i]:.9g} to {along[max(j, i + 1)]:.9g} m"
-        return Fault(place, f"{text} does not consist of whole faces of the {side} side; nearest is {near}")
+        return Fault(
+            place, f"{text} does not consist of whole faces of the {side} side; nearest is {near}"
+        )
     if not cells[first:last].all():
         ends = np.flatnonzero(np.diff(cells.astype(int), prepend=0, append=0)).reshape(-1, 2)
         free = " or ".join(f"{along[i]:.9g} to {along[j]:.9g} m" for i, j in ends)
-        return Fault(place, f"{text} on the {side} side runs along a hole; expected a span within {free}")
+        return Fault(
+            place, f"{text} on the {side} side runs along a hole; expected a span within {free}"
+        )
     return along[first], along[last]

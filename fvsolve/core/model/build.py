@@ -41,7 +41,8 @@ def steady_profile(draft) -> dict[str, Any]:
     if draft.case.law.linear:
         start = SteadyStart(draft)
     else:
-        from fvsolve.core.model.nonlinear_start import NonlinearStart  # not loaded under the linear law
+        # not loaded under the linear law
+        from fvsolve.core.model.nonlinear_start import NonlinearStart
 
         start = NonlinearStart(draft)
     start.solve()
@@ -63,7 +64,8 @@ def steady_profile(draft) -> dict[str, Any]:
     return {**start.report(), "unsteady": unsteady, "creep": limit_creep_step(draft, unsteady)}
 
 
-CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that differ after a change of numbers of parts
+# fields of a case that differ after a change of numbers of parts
+CHANGING_FIELDS = ("nodes", "links", "raw", "read")
 
 
 def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
@@ -73,7 +75,11 @@ def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
     """
     before = packed.case
     changed = changed_links(before, case)
-    if changed is None or packed.plane_size or not all(name in packed.valve_names for name in changed):
+    if (
+        changed is None
+        or packed.plane_size
+        or not all(name in packed.valve_names for name in changed)
+    ):
         return None
     draft = packed.copy_for(case)
     for name in changed:
@@ -95,7 +101,11 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
     if not same or before.needs_equilibrium or before.links.keys() != case.links.keys():
         return None
     changed = [name for name, link in case.links.items() if link is not before.links[name]]
-    return changed if all(type(case.links[name]) is type(before.links[name]) for name in changed) else None
+    return (
+        changed
+        if all(type(case.links[name]) is type(before.links[name]) for name in changed)
+        else None
+    )
 
 
 def build(case: Case) -> Model:
@@ -105,7 +115,9 @@ def build(case: Case) -> Model:
     unequal heads, a demand that no link can supply, a node joined only by rigid columns.
     """
     if not isinstance(case, Case):
-        raise FvsolveError(f"build takes a Case, not {type(case).__name__}; expected the result of load()")
+        raise FvsolveError(
+            f"build takes a Case, not {type(case).__name__}; expected the result of load()"
+        )
     return build_like(case)
 
 
@@ -116,7 +128,9 @@ def build_like(case: Case, like: Model | None = None) -> Model:
     """
     notices = []
     if case.needs_equilibrium:
-        draft = tables_with_start(replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"})))
+        draft = tables_with_start(
+            replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
+        )
         for feature in draft.features:
             case, found = feature.rest(case, draft)
             notices += found
@@ -131,7 +145,9 @@ def build_like(case: Case, like: Model | None = None) -> Model:
     return model
 
 
-def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()) -> ModelDraft:
+def tables_with_start(
+    case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()
+) -> ModelDraft:
     """Tables of a case with its initial steady state; raises CaseError if there are faults.
 
     draft : tables before the start, to be filled, or None to make them
@@ -241,7 +257,8 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
     schedules, pieces = draft.schedules.tables(tanks.EVENTS * draft.tanks)
-    schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
+    # from here on constant, as in the model
+    schedules.flags.writeable = pieces.flags.writeable = False
     sizes = draft.sizes = ArraySizes()
     reserve_network(draft)
     for feature in draft.features:
@@ -256,29 +273,57 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     if sizes.reads_rates:
         layout["rates"] = draft.to_work(most_states(draft))
     draft.tables = rec.Tables(
-        settings=settings, layout=layout, pipes=draft.pipe_table, nodes=draft.node_table, valves=draft.valve_table,
-        columns=draft.column_table, clusters=draft.cluster_table, schedules=schedules, probes=draft.probe_table,
-        devices=draft.device_table, basins=draft.basin_table,
-        patches=draft.patch_table, scalars=draft.scalar_table, heat_sources=draft.heat_source_table,
-        exchangers=draft.exchanger_table, walls=draft.wall_table, couplings=draft.coupling_table,
-        reactions=draft.reaction_table, integers=np.array(draft.integers, dtype=np.int64),
-        floats=np.array(draft.floats, dtype=float), profile=profile, plane=draft.plane(), pieces=pieces,
-    )  # fmt: skip
+        settings=settings,
+        layout=layout,
+        pipes=draft.pipe_table,
+        nodes=draft.node_table,
+        valves=draft.valve_table,
+        columns=draft.column_table,
+        clusters=draft.cluster_table,
+        schedules=schedules,
+        probes=draft.probe_table,
+        devices=draft.device_table,
+        basins=draft.basin_table,
+        patches=draft.patch_table,
+        scalars=draft.scalar_table,
+        heat_sources=draft.heat_source_table,
+        exchangers=draft.exchanger_table,
+        walls=draft.wall_table,
+        couplings=draft.coupling_table,
+        reactions=draft.reaction_table,
+        integers=np.array(draft.integers, dtype=np.int64),
+        floats=np.array(draft.floats, dtype=float),
+        profile=profile,
+        plane=draft.plane(),
+        pieces=pieces,
+    )
     sizes.run_array("work", draft.work_size)
     draft.shapes = sizes.shapes()
 
 
 def reserve_network(draft: ModelDraft) -> None:
     """Reserve the arrays of nodes, pipes, restrictions and columns."""
-    nodes, pipes, sizes = len(draft.node_table), len(draft.pipe_table), draft.sizes
-    valves, columns, clusters = len(draft.valve_table), len(draft.column_table), draft.cluster_table
+    nodes = len(draft.node_table)
+    pipes = len(draft.pipe_table)
+    sizes = draft.sizes
+    valves = len(draft.valve_table)
+    columns = len(draft.column_table)
+    clusters = draft.cluster_table
     sizes.out("pressure", nodes)
     sizes.ledger("supply", nodes)
     for name, size in (
-        ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
-        ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
-        ("conductance", valves), ("drive", valves), ("isolated", nodes),
-    ):  # fmt: skip
+        ("net", nodes),
+        ("ends", 4 * pipes),
+        ("valve", valves),
+        ("column", columns),
+        ("valve_controlled", columns),
+        ("stiffness", draft.moving),
+        ("outflow_fraction", draft.moving),
+        ("swept", draft.moving),
+        ("conductance", valves),
+        ("drive", valves),
+        ("isolated", nodes),
+    ):
         sizes.out(name, size)
     # `marks` has the first times at which the model does not hold. Density laws with cavities add three for each pipe:
     # location of the first cavity, greatest cavity volume, and its time. The last are: for each valve the time at which
@@ -297,9 +342,13 @@ def reserve_network(draft: ModelDraft) -> None:
         sizes.need_places(cells)
     sizes.need_scratch(lambda places: 4 * places + 64)
     # equations of a cluster, or of nodes between columns, beside the arrays of all nodes and valves
-    system = max((c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in clusters), default=0)
+    system = max(
+        (c["matrix"] + 4 * c["nodes"] + 5 * c["valves"] + c["held"] for c in clusters), default=0
+    )
     between = int(np.sum(draft.node_table["columns"] > 1))
-    sizes.need_scratch(max(system, between * (between + 3)) + 6 * nodes + 2 * valves + 5 * len(clusters))
+    sizes.need_scratch(
+        max(system, between * (between + 3)) + 6 * nodes + 2 * valves + 5 * len(clusters)
+    )
 
 
 def accepted_size(draft: ModelDraft) -> int:
@@ -316,7 +365,9 @@ def accepted_size(draft: ModelDraft) -> int:
 
 def settings_of(draft: ModelDraft) -> np.ndarray:
     """Settings of a model, a single record : `kernels.dtypes.SETTINGS`[1]."""
-    case, pipes, table = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
+    case = draft.case
+    pipes = draft.pipe_table
+    table = np.zeros(1, rec.SETTINGS)
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["from_arriving"] = case.numerics.scheme == "upwind" and case.numerics.method == "euler"
@@ -359,11 +410,17 @@ def column_rates(draft: ModelDraft):
 
 def most_states(draft: ModelDraft) -> int:
     """Upper bound of the number of states, for the greatest possible number of terms of unsteady friction."""
-    unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
+    unsteady = [
+        mesh.cells
+        for mesh in draft.meshes
+        if draft.case.links[mesh.name].friction.model == "unsteady"
+    ]
     return draft.size + MAX_TERMS * sum(unsteady)
 
 
-def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = start_notices) -> Model:
+def model_of(
+    draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = start_notices
+) -> Model:
     """Build the model of a complete draft, with `notices` on its start.
 
     The state at the start is zero except for what features write.
@@ -376,13 +433,32 @@ def model_of(draft: ModelDraft, notices: Callable[[ModelDraft], list[Notice]] = 
     draft.warnings += notices(draft)
     draft.warnings += limiter_notices(draft.case.numerics.scheme, draft.case.numerics.limiter)
     return Model(
-        case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
-        draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names,
-        dict(case.elevations), case.probes, draft.warnings,
-        draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        case.extreme_probes, draft.watched_start, closed(draft),
+        case,
+        draft.tables,
+        draft.shapes,
+        draft.state_names,
+        np.array(draft.scale),
+        inside,
+        draft.schedules.spacing,
+        draft.meshes,
+        list(case.places),
+        list(case.links),
+        draft.valve_names,
+        draft.column_names,
+        dict(case.elevations),
+        case.probes,
+        draft.warnings,
+        draft.steady,
+        draft.profiles,
+        draft.devices,
+        draft.laws,
+        start,
+        draft.events,
+        case.extreme_probes,
+        draft.watched_start,
+        closed(draft),
         flags_at_start(draft),
-    )  # fmt: skip
+    )
 
 
 def settle(draft: ModelDraft) -> list[str]:
@@ -391,7 +467,11 @@ def settle(draft: ModelDraft) -> list[str]:
     for name, link in draft.case.links.items():
         if link.kind == "pipe":
             model = link.pipe_model or draft.case.numerics.pipe_model
-            facts[name] = {"line": "finite-volume", "line_bound": None, "line_why": f'pipe_model = "{model}"'}
+            facts[name] = {
+                "line": "finite-volume",
+                "line_bound": None,
+                "line_why": f'pipe_model = "{model}"',
+            }
     return [name for feature in draft.features for name in feature.settle(draft)]
 
 

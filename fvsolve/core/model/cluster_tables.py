@@ -18,12 +18,18 @@ def classify_nodes(draft) -> None:
     """
     nodes, valves = draft.node_table, draft.valve_table
     inner, joins = nodes["kind"] == rec.JUNCTION, draft.coupling_table
-    pairs = [(v["from_node"], v["to_node"]) for v in (*valves, *joins) if inner[v["from_node"]] and inner[v["to_node"]]]
+    pairs = [
+        (v["from_node"], v["to_node"])
+        for v in (*valves, *joins)
+        if inner[v["from_node"]] and inner[v["to_node"]]
+    ]
     group, sensed = union(len(nodes), pairs), sensed_junctions(draft, inner)
     if sensed:
         refuse_sensed(draft, group, sensed)
         group = union(
-            len(nodes), pairs + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)]
+            len(nodes),
+            pairs
+            + [pair for k, own in sensed.items() for pair in pairs_with(valves[k], own, inner)],
         )
     touched: dict[int, list[int]] = {}
     couples = rows_by_group(group, inner, enumerate(joins), touched)
@@ -38,7 +44,9 @@ def classify_nodes(draft) -> None:
     for root, ks in touched.items():
         own = couples.get(root, [])
         valves["chained"][ks] = valves["chained"][ks].any() if ks else 0
-        valves["flow_given"][ks] = len(ks) == 1 and not own and not nodes["admittance"][members[root]].any()
+        valves["flow_given"][ks] = (
+            len(ks) == 1 and not own and not nodes["admittance"][members[root]].any()
+        )
         if has_single_root(draft, members[root], ks, own):
             refuse_holds(draft, [k for k in ks if held_end(draft, k) is not None])
         else:
@@ -49,7 +57,9 @@ def classify_nodes(draft) -> None:
         valves["solve"][k] = rec.CLUSTER
         clusters.append(add_cluster(draft, [], [int(k)], []))
     if not draft.case.law.linear:
-        for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
+        for i in np.flatnonzero(
+            inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)
+        ):
             clusters.append(add_cluster(draft, [int(i)], [], []))
     store_gates(draft)
     refuse_isolated_groups(draft, members)
@@ -60,8 +70,11 @@ def classify_nodes(draft) -> None:
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
         if nodes["solve"][i] == rec.ALONE:
             name = list(draft.case.places)[i]
-            draft.fault(f"nodes.{name}", "only rigid columns join this node, so nothing sets its pressure; "
-                       "make it a chamber, or make one of its links a pipe")  # fmt: skip
+            draft.fault(
+                f"nodes.{name}",
+                "only rigid columns join this node, so nothing sets its pressure; "
+                "make it a chamber, or make one of its links a pipe",
+            )
 
 
 def sensed_junctions(draft, inner) -> dict[int, list[int]]:
@@ -92,15 +105,22 @@ def refuse_sensed(draft, group, sensed: dict[int, list[int]]) -> None:
         ends = [int(valve[end]) for end in ("from_node", "to_node")]
         touched = {group[i] for i in ends if nodes["kind"][i] == rec.JUNCTION}
         for i in own:
-            weight = sum(float(row[f"{column}_weight"]) for column in ("node", "second") if row[column] == i)
+            weight = sum(
+                float(row[f"{column}_weight"]) for column in ("node", "second") if row[column] == i
+            )
             steady = (i == ends[0] and weight > 0.0) or (i == ends[1] and weight < 0.0)
             if not steady and group[i] in touched:
                 name = draft.valve_names[k]
-                draft.fault(f"links.{name}", f"senses {names[i]}, a junction whose pressure follows the flow of this "
-                            f"valve at once; give the valve a time_constant, or make {names[i]} a chamber")  # fmt: skip
+                draft.fault(
+                    f"links.{name}",
+                    f"senses {names[i]}, a junction whose pressure follows the flow of this "
+                    f"valve at once; give the valve a time_constant, or make {names[i]} a chamber",
+                )
 
 
-def rows_by_group(group, inner, rows, touched: dict[int, list[int]], further=None) -> dict[int, list[int]]:
+def rows_by_group(
+    group, inner, rows, touched: dict[int, list[int]], further=None
+) -> dict[int, list[int]]:
     """Numbers of the rows that end at inner nodes of each group : label of the group -> numbers.
 
     group, inner : label of each node, and True for a node without storage; rows : pairs of number and row
@@ -142,7 +162,9 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
     draft.integers += [*members, *ks, *own]
     devices = draft.valve_table["device"][ks]
     senses = (draft.device_table["node"][devices[devices >= 0]] >= 0).any() if ks else False
-    order, size, held = -1, n * n, 0
+    order = -1
+    size = n * n
+    held = 0
     holds = {k: end for k in ks if (end := held_end(draft, k)) is not None}
     if ks and draft.valve_table["chained"][ks].all() and not senses:
         matrix = SparseMatrix(draft, members, ks, own, holds)
@@ -155,7 +177,19 @@ def add_cluster(draft, members, ks, own) -> tuple[int, ...]:
             held += add_hold(draft, matrix, k, holds[k])
     else:
         refuse_holds(draft, holds)
-    return at, n, at + n, len(ks), at + n + len(ks), len(own), inverse, order, size, int(senses), held
+    return (
+        at,
+        n,
+        at + n,
+        len(ks),
+        at + n + len(ks),
+        len(own),
+        inverse,
+        order,
+        size,
+        int(senses),
+        held,
+    )
 
 
 def held_end(draft, k: int) -> str | None:
@@ -175,7 +209,9 @@ def add_hold(draft, matrix, k: int, end: str) -> int:
         return 0
     held, other = matrix.ends_held(k, end)
     columns = [held, *sorted(matrix.joined[held])]
-    places = [(q, matrix.place[held, q], matrix.place[other, q] if other >= 0 else -1) for q in columns]
+    places = [
+        (q, matrix.place[held, q], matrix.place[other, q] if other >= 0 else -1) for q in columns
+    ]
     draft.integers += [rec.TO_HELD if end == "to" else rec.FROM_HELD, held, other, len(places)]
     draft.integers += [number for entry in places for number in entry]
     return 1 + len(places)
@@ -185,24 +221,34 @@ def refuse_holds(draft, holds) -> None:
     """Add a fault for each valve that would hold a value at once in a group with waves; holds : rows of the valves"""
     for k in holds:
         text = "0 s: the valve acts at once, which needs pipes without waves at its junctions"
-        draft.fault(f"links.{draft.valve_names[k]}.time_constant",
-                    f'{text}; expected a time above 0 s, or pipe_model = "quasi-steady"')  # fmt: skip
+        draft.fault(
+            f"links.{draft.valve_names[k]}.time_constant",
+            f'{text}; expected a time above 0 s, or pipe_model = "quasi-steady"',
+        )
 
 
 def refuse_shared_nodes(draft, holds) -> None:
     """Add a fault for each valve at whose ends another valve holds the pressure; holds : as for `SparseMatrix`"""
-    names, valves, of_node = list(draft.case.places), draft.valve_table, {}
+    names = list(draft.case.places)
+    valves = draft.valve_table
+    of_node = {}
     for k in (k for k, end in holds.items() if end):
         node, name = int(valves[k][f"{holds[k]}_node"]), draft.valve_names[k]
         if node in of_node:
             text = f"{of_node[node]} and {name} both hold the pressure at {names[node]} at once"
-            draft.fault(f"links.{name}", f"{text}; expected one such valve, or a time_constant above 0 s")
+            draft.fault(
+                f"links.{name}", f"{text}; expected one such valve, or a time_constant above 0 s"
+            )
         of_node.setdefault(node, name)
     for k in (k for k, end in holds.items() if end):
-        node, name = int(valves[k]["to_node" if holds[k] == "from" else "from_node"]), draft.valve_names[k]
+        node = int(valves[k]["to_node" if holds[k] == "from" else "from_node"])
+        name = draft.valve_names[k]
         if of_node.get(node, name) != name:
             text = f"its end {names[node]} is where {of_node[node]} holds the pressure at once"
-            draft.fault(f"links.{name}", f"{text}; expected a pipe between both, or a time_constant above 0 s")
+            draft.fault(
+                f"links.{name}",
+                f"{text}; expected a pipe between both, or a time_constant above 0 s",
+            )
 
 
 class SparseMatrix:
@@ -216,7 +262,10 @@ class SparseMatrix:
     def __init__(self, draft, members, ks, own, holds) -> None:
         self.draft, self.rows = draft, {i: k for k, i in enumerate(members)}
         links = [draft.valve_table[k] for k in ks] + [draft.coupling_table[k] for k in own]
-        self.links = [tuple(self.rows.get(int(row[end]), -1) for end in ("from_node", "to_node")) for row in links]
+        self.links = [
+            tuple(self.rows.get(int(row[end]), -1) for end in ("from_node", "to_node"))
+            for row in links
+        ]
         self.joined: list[set[int]] = [set() for _ in members]
         for i, j in self.links:
             self.join(self.joined, i, j)
@@ -264,7 +313,10 @@ class SparseMatrix:
 
     def integers(self) -> list[int]:
         """Numbers for `node_clusters.solve_in_order`, with the places of the entries of each link in between."""
-        place, links, entries, starts = self.place, [], [], []
+        place = self.place
+        links = []
+        entries = []
+        starts = []
         for i, j in self.links:
             both = i >= 0 and j >= 0
             links += [i, j, place[i, j] if both else -1, place[j, i] if both else -1]
@@ -308,7 +360,9 @@ def store_gates(draft) -> None:
 
     Nodes with a demand, and nodes with the valve of a vessel, are left out.
     """
-    nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
+    nodes = draft.node_table
+    valves = draft.valve_table
+    columns = draft.column_table
     nodes["gates"], places = -1, list(draft.case.places.values())
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     valves_at, columns_at = rows_at_nodes(valves), rows_at_nodes(columns)
@@ -330,7 +384,9 @@ def store_gates(draft) -> None:
 def rows_at_nodes(table) -> dict[int, list[int]]:
     """Rows of links that end at each node, in ascending order : node -> rows; table : links"""
     found: dict[int, list[int]] = {}
-    for k, ends in enumerate(zip(table["from_node"].tolist(), table["to_node"].tolist(), strict=True)):
+    for k, ends in enumerate(
+        zip(table["from_node"].tolist(), table["to_node"].tolist(), strict=True)
+    ):
         for i in set(ends):
             found.setdefault(i, []).append(k)
     return found
@@ -342,7 +398,9 @@ def refuse_isolated_groups(draft, members) -> None:
     Valves join the nodes to each other, and only air valves and rigid columns lead out of the group.
     members : label of a group -> indices of its nodes
     """
-    nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
+    nodes = draft.node_table
+    valves = draft.valve_table
+    names = list(draft.case.places)
     valves_at = rows_at_nodes(valves)
     for group in members.values():
         links = [valves[k] for k in sorted({k for i in group for k in valves_at.get(i, [])})]
@@ -354,11 +412,19 @@ def refuse_isolated_groups(draft, members) -> None:
         place, other = (names[i] for i in sorted(group, key=lambda i: i != first)[:2])
         reason, span = "a valve joins this air valve", " while the air valve is shut"
         if not air:
-            joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
-            reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} this node", ""
-        draft.fault(f"nodes.{place}", f"{reason} to {other}, and otherwise only rigid columns join these nodes, so "
-                    f"nothing sets their pressure{span}; make {other} a chamber, or make one of the columns "
-                    "a pipe")  # fmt: skip
+            joins = [
+                name
+                for name, v in zip(draft.valve_names, valves, strict=True)
+                if int(v["from_node"]) in group
+            ]
+            reason = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} this node"
+            span = ""
+        draft.fault(
+            f"nodes.{place}",
+            f"{reason} to {other}, and otherwise only rigid columns join these nodes, so "
+            f"nothing sets their pressure{span}; make {other} a chamber, or make one of the columns "
+            "a pipe",
+        )
 
 
 def follows_column(draft, members, ks) -> bool:
@@ -378,7 +444,9 @@ def smooth_near_stores(draft) -> None:
     joined by a short pipe, would otherwise move in steps of seconds: linearly implicit steps alternate in sign there.
     """
     nodes, valves = draft.node_table, draft.valve_table
-    lowerings = [lowering for _, _, lowering in draft.links.get("valve", []) for _ in range(lowering.rows)]
+    lowerings = [
+        lowering for _, _, lowering in draft.links.get("valve", []) for _ in range(lowering.rows)
+    ]
     steep = [k for k, lowering in enumerate(lowerings) if lowering.smooths]
     if not steep or draft.case.numerics.rtol is None:
         return
@@ -392,11 +460,16 @@ def smooth_near_stores(draft) -> None:
     stores = {label[i] for i in np.flatnonzero((nodes["y"] >= 0) & (nodes["stiffness"] > 0.0))}
     for k in steep:
         near = {label[i] for i in ends[k]} & stores
-        if near and (drop := tolerated_drop(draft, [k, *(other for at in near for other in groups.get(at, []))])):
+        if near and (
+            drop := tolerated_drop(
+                draft, [k, *(other for at in near for other in groups.get(at, []))]
+            )
+        ):
             lowerings[k].smooth(draft, valves[k], drop)
 
 
-TOLERANCES = 10.0  # tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale
+# tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale
+TOLERANCES = 10.0
 
 
 def regularise(draft, ks) -> None:
@@ -413,8 +486,13 @@ def regularise(draft, ks) -> None:
         if row["transition"] == 0.0 and (row["hooks"] < 0 or regular):
             name = draft.valve_names[k]
             link = draft.case.conduits[name]
-            neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
-            row["transition"] = draft.hydraulics.transition_flow(name, link, LAMINAR_REYNOLDS, draft.fault)
+            neck = any(
+                getattr(places[row[end]], "precharge", None) is not None
+                for end in ("from_node", "to_node")
+            )
+            row["transition"] = draft.hydraulics.transition_flow(
+                name, link, LAMINAR_REYNOLDS, draft.fault
+            )
             row["rounding_drop"] = max(1.0 if neck else 0.0, unseen)
 
 

@@ -22,7 +22,11 @@ def datum_of(model: Model, port: str | None = None) -> float:
     """
     if port is not None:
         return float(model.elevation[port])
-    placed = [model.elevation[name] for name, node in model.case.places.items() if getattr(node, "head", None) is None]
+    placed = [
+        model.elevation[name]
+        for name, node in model.case.places.items()
+        if getattr(node, "head", None) is None
+    ]
     return float(min(placed, default=0.0))
 
 
@@ -34,19 +38,27 @@ def available_energy(model: Model) -> dict[str, float]:
     tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. Parts that move in space
     are not included; without them the sum over all parts is an upper bound of the energy that the model can release.
     """
-    tables, nodes, energies = model.tables, model.tables.nodes, {}
+    tables = model.tables
+    nodes = model.tables.nodes
+    energies = {}
     datum = float(tables.settings[0]["datum"])
     vessels = vessel_energy_function(model)
     for name, row in zip(model.node_names, nodes, strict=True):
         if row["y"] >= 0 and row["kind"] != rec.VESSEL:
-            energies[name] = tank_energy_above_datum(model, row) if row["kind"] == rec.TANK else vessels(row)
+            energies[name] = (
+                tank_energy_above_datum(model, row) if row["kind"] == rec.TANK else vessels(row)
+            )
     for (name, part, device), row in zip(model.devices, tables.devices, strict=True):
         if above := device.above(model, part, row):
             energies[name] = above
     for k, pipe in enumerate(model.pipes):
-        energies[pipe.name] = pipe_energy(model, k) + friction_memory_energy(model, k) + creep_energy(model, k)
+        energies[pipe.name] = (
+            pipe_energy(model, k) + friction_memory_energy(model, k) + creep_energy(model, k)
+        )
     for name, row in zip(model.column_names, tables.columns, strict=True):
-        energies[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
+        energies[name] = (
+            0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
+        )
     for part in model.meshed:
         energies[part.name] = part.above(part.deviations(model.start), datum)
     for feature in model.features:
@@ -61,16 +73,25 @@ def vessel_energy_function(model: Model):
     """
     st, floats = model.tables.settings[0], model.tables.floats
     if model.case.law.linear:
-        return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
+        return lambda row: (
+            0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
+        )
     from fvsolve.core.kernels.density import density, enthalpy, pressure_of_enthalpy
     from fvsolve.core.kernels.network_energy import vessel_energy
 
     def energy(row) -> float:
         ambient, height = float(st["ambient"]), float(row["elevation"] - st["datum"])
-        rest = reachable(st, pressure_of_enthalpy(st, floats, enthalpy(st, floats, ambient) - st["gravity"] * height))
+        rest = reachable(
+            st,
+            pressure_of_enthalpy(
+                st, floats, enthalpy(st, floats, ambient) - st["gravity"] * height
+            ),
+        )
         volume = float(row["volume"])
-        parts = [vessel_energy(st, floats, row, density(st, floats, float(p)) * volume, volume, float(p))
-                 for p in (row["pressure"], rest)]  # fmt: skip
+        parts = [
+            vessel_energy(st, floats, row, density(st, floats, float(p)) * volume, volume, float(p))
+            for p in (row["pressure"], rest)
+        ]
         return parts[0] - parts[1]
 
     return energy
@@ -85,18 +106,30 @@ def potential(model: Model, row) -> float:
     """Reduced pressure P = p - p_ambient + rho g z of a node at the start [Pa], under the density law `linear`."""
     st = model.tables.settings[0]
     height = float(row["elevation"] - st["datum"])
-    return float(row["pressure"]) - model.case.ambient_pressure + float(st["rho"] * st["gravity"]) * height
+    return (
+        float(row["pressure"])
+        - model.case.ambient_pressure
+        + float(st["rho"] * st["gravity"]) * height
+    )
 
 
 def pipe_energy(model: Model, k: int) -> float:
     """Energy of pipe k at the start [J], above its energy at rest and at the reduced pressure P = 0."""
-    row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
+    row = model.tables.pipes[k]
+    pipe = model.pipes[k]
+    st = model.tables.settings[0]
     if model.case.law.linear:
         p, flow = potential(model, model.tables.nodes[row["from_node"]]), row["flow"] / row["area"]
         q = p - row["drag"] / row["area"] * pipe.length
         square = (p * p + p * q + q * q) / (3.0 * row["speed"] ** 2) + flow * flow
         return float(0.5 * pipe.length * row["area"] / st["rho"] * square)
-    from fvsolve.core.kernels.density import enthalpy, mass_of_pressure, pressure_of_enthalpy, pressure_of_mass, thrust
+    from fvsolve.core.kernels.density import (
+        enthalpy,
+        mass_of_pressure,
+        pressure_of_enthalpy,
+        pressure_of_mass,
+        thrust,
+    )
 
     floats, profile = model.tables.floats, model.tables.profile
     base, total = enthalpy(st, floats, float(st["ambient"])), 0.0
@@ -105,16 +138,23 @@ def pipe_energy(model: Model, k: int) -> float:
         rest = reachable(st, pressure_of_enthalpy(st, floats, base - height))
         low = mass_of_pressure(st, floats, row, rest)[0]
         p = pressure_of_mass(st, floats, row, m)
-        head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
-        strain_energy = m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
+        head = enthalpy(st, floats, p) - base + height
+        least = enthalpy(st, floats, rest) - base + height
+        strain_energy = (
+            m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
+        )
         total += float(row["dx"]) * (strain_energy + 0.5 * row["flow"] ** 2 / m)
     return float(total)
 
 
 def friction_memory_energy(model: Model, k: int) -> float:
     """Energy in the memory states of unsteady friction of pipe k [J], for the flow at the start."""
-    row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
-    share, full, square = float(memory_shares(model.tables.floats, row).sum()), st["rho"] * row["area"], 1.0
+    row = model.tables.pipes[k]
+    pipe = model.pipes[k]
+    st = model.tables.settings[0]
+    share = float(memory_shares(model.tables.floats, row).sum())
+    full = st["rho"] * row["area"]
+    square = 1.0
     if not model.case.law.linear:  # memory states hold velocities
         square = np.mean((full / model.tables.profile[row["center"] + np.arange(pipe.cells)]) ** 2)
     return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
@@ -126,15 +166,26 @@ def creep_energy(model: Model, k: int) -> float:
     if row["elements"] == 0:
         return 0.0
     pairs, rest = elements(model.tables.floats, row), pipe_energy(model, k)
-    area, rho, length = float(row["area"]), model.case.properties.density, model.pipes[k].length
+    area = float(row["area"])
+    rho = model.case.properties.density
+    length = model.pipes[k].length
     if model.case.law.linear:
         elastic = rest - float(0.5 * row["flow"] ** 2 * length / (rho * area))
     else:
         from fvsolve.core.kernels.density import pressure_of_mass
 
-        st, floats, profile = model.tables.settings[0], model.tables.floats, model.tables.profile
-        p = [pressure_of_mass(st, floats, row, float(m)) for m in profile[row["center"] + np.arange(row["cells"])]]
-        excess = np.array(p) - st["ambient"] + rho * st["gravity"] * (model.pipes[k].elevation - st["datum"])
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        profile = model.tables.profile
+        p = [
+            pressure_of_mass(st, floats, row, float(m))
+            for m in profile[row["center"] + np.arange(row["cells"])]
+        ]
+        excess = (
+            np.array(p)
+            - st["ambient"]
+            + rho * st["gravity"] * (model.pipes[k].elevation - st["datum"])
+        )
         elastic = float(0.5 * row["dx"] * area / rho * np.sum((excess / row["speed"]) ** 2))
     return float(np.sum(pairs[:, 0] / pairs[:, 1])) * elastic
 
@@ -153,12 +204,17 @@ def tank_energy_above_datum(model: Model, row) -> float:
     if target <= 0.0:
         return float(-tank_energy(st, floats, row, rho, low))
     added = rho * float(row["area"]) * target + float(row["mass"])
-    while tank_level(row, floats, rho, low + added) < target and row["mass"] + low + added < row["full"]:
+    while (
+        tank_level(row, floats, rho, low + added) < target
+        and row["mass"] + low + added < row["full"]
+    ):
         added *= 2.0
     high = min(float(row["full"] - row["mass"]), low + added)
     for _ in range(200):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if tank_level(row, floats, rho, middle) < target else (low, middle)
+        low, high = (
+            (middle, high) if tank_level(row, floats, rho, middle) < target else (low, middle)
+        )
     return float(-tank_energy(st, floats, row, rho, high))
 
 
@@ -189,12 +245,15 @@ class Accounts:
         model, case = run_data.model, run_data.model.case
         for own in run_data.features:
             own.for_energy()
-        if reason := next((text for feature in model.features if (text := feature.energy_refusal())), ""):
+        if reason := next(
+            (text for feature in model.features if (text := feature.energy_refusal())), ""
+        ):
             raise FvsolveError(reason)
         self.power, self.stored = model.functions.energies
         self.accounts: list[Account] = []
         self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
-        self.contacts: list[tuple[int, int]] = []  # lines of the rate and of the loss of every contact
+        # lines of the rate and of the loss of every contact
+        self.contacts: list[tuple[int, int]] = []
         self.power_count = self.stores = 0
         nodes = model.tables.nodes
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):
@@ -207,13 +266,17 @@ class Accounts:
                 self.add("dissipated", pipe.name, "creep", at + 4)
                 self.add("law", pipe.name, "creep", at + 5)
             self.hold(pipe.name, "pipe", at + 3, 2)
-            self.accounts.append(Account("scheme", pipe.name, "pipe", tuple(range(at, at + 6)), (1, *[-1] * 5)))
+            self.accounts.append(
+                Account("scheme", pipe.name, "pipe", tuple(range(at, at + 6)), (1, *[-1] * 5))
+            )
         self.valves()
         for name in model.column_names:
             at = self.take(3)
             self.add("dissipated", name, "friction", at + 1)
             self.hold(name, "rigid column", at + 2)
-            self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
+            self.accounts.append(
+                Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1))
+            )
         self.network_rows = self.power_count  # rows of power that `kernels.network_energy` fills
         for feature in model.features:
             feature.begin_accounts(self)
@@ -242,18 +305,22 @@ class Accounts:
         at = self.stores
         self.stores += rows
         if rate is not None:
-            self.stored_accounts.append(Account("stored", place, kind, tuple(range(at, at + rows)), (1.0,) * rows))
+            self.stored_accounts.append(
+                Account("stored", place, kind, tuple(range(at, at + rows)), (1.0,) * rows)
+            )
             self.add("rate", place, kind, rate)
 
     def node(self, name: str, place: Any, code: int) -> None:
         at = self.take(2)
         if books := lowering_of(type(place)).ledger_name:
             self.add("supplied", name, books, at)
-        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # the energy of a vessel is booked by its device
+        # the energy of a vessel is booked by its device
+        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)
         self.hold(name, place.kind, at + 1 if stores else None)
 
     def valves(self) -> None:
-        self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and True if it dissipates
+        # row of a device's restriction, and True if it dissipates
+        self.taken: dict[str, tuple[int, bool]] = {}
         resists = {name: device.dissipates(part) for name, part, device in self.model.devices}
         for link, _, lowering in rows_in(self.model.case, "valve"):
             for name in lowering.row_names(link):
@@ -267,8 +334,10 @@ class Accounts:
         for name, part, _ in self.model.devices:
             at, kind = self.take(3), part.kind.replace("-", " ")
             own, resists = self.taken.get(name, (None, True))
-            for category, sign, first, has_own in (("supplied", -1.0, at, not resists),
-                                                   ("dissipated", 1.0, at + 2, resists)):  # fmt: skip
+            for category, sign, first, has_own in (
+                ("supplied", -1.0, at, not resists),
+                ("dissipated", 1.0, at + 2, resists),
+            ):
                 rows = (first, own) if own is not None and has_own else (first,)
                 self.accounts.append(Account(category, name, kind, rows, (1.0, sign)[: len(rows)]))
             self.hold(name, kind, at + 1)
@@ -298,13 +367,22 @@ class Accounts:
 
 def terms_of(accounts: list[Account]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Terms of the sums of accounts: number of the account, row, and sign of each term."""
-    terms = [(k, row, sign) for k, account in enumerate(accounts)
-             for row, sign in zip(account.rows, account.signs, strict=True)]  # fmt: skip
+    terms = [
+        (k, row, sign)
+        for k, account in enumerate(accounts)
+        for row, sign in zip(account.rows, account.signs, strict=True)
+    ]
     numbers, rows, signs = zip(*terms, strict=True) if terms else ((), (), ())
-    return np.array(numbers, dtype=np.int64), np.array(rows, dtype=np.int64), np.array(signs, dtype=np.float64)
+    return (
+        np.array(numbers, dtype=np.int64),
+        np.array(rows, dtype=np.int64),
+        np.array(signs, dtype=np.float64),
+    )
 
 
-def sums_of(terms: tuple[np.ndarray, np.ndarray, np.ndarray], rows: np.ndarray, count: int) -> np.ndarray:
+def sums_of(
+    terms: tuple[np.ndarray, np.ndarray, np.ndarray], rows: np.ndarray, count: int
+) -> np.ndarray:
     """Sum of the rows of each account with their signs : float64[count]; terms : result of `terms_of`."""
     numbers, at, signs = terms
     return np.bincount(numbers, signs * rows[at], count)

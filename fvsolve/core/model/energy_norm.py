@@ -11,11 +11,14 @@ from fvsolve.core.assembly.pipe_terms import elements, memory_shares
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import FvsolveError
 
-RANK_TOLERANCE = 1e-12  # singular values below this share of a group's greatest: motions that store no energy
-MAX_GROUP = 2500  # largest group of positions joined by springs whose singular values are computed, in about 7 s
+# singular values below this share of a group's greatest: motions that store no energy
+RANK_TOLERANCE = 1e-12
+# largest group of positions joined by springs whose singular values are computed, in about 7 s
+MAX_GROUP = 2500
 # weight of a scalar's amount, as a share of that of its mass: less than waves do to it in 1000 steps
 SCALAR_WEIGHT = 1e-6
-ROUNDING_SHARE = 1e-6  # rates below this share of the sum of magnitudes of their terms are round-off of differences
+# rates below this share of the sum of magnitudes of their terms are round-off of differences
+ROUNDING_SHARE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +74,14 @@ class EnergyForm:
         root, n = np.sqrt(self.least), self.idle.shape[0]
         more = csr_array(root * self.idle_rows)
         return EnergyForm(
-            vstack([self.rows, more]).tocsr(), (*self.parts, *[""] * more.shape[0]),
-            vstack([self.forward, more]).tocsr(), hstack([self.back, csr_array(self.idle / root)]).tocsr(),
-            np.zeros((n, 0)), np.zeros((0, n)), self.least,
-        )  # fmt: skip
+            vstack([self.rows, more]).tocsr(),
+            (*self.parts, *[""] * more.shape[0]),
+            vstack([self.forward, more]).tocsr(),
+            hstack([self.back, csr_array(self.idle / root)]).tocsr(),
+            np.zeros((n, 0)),
+            np.zeros((0, n)),
+            self.least,
+        )
 
 
 def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
@@ -103,7 +110,11 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     stored = {i: (names[i], {i: float(np.sqrt(own[i]))}) for i in np.flatnonzero(own)}
     squares = [feature.squares(model, y) for feature in model.features]
     stored |= {e: (names[e], row) for own in squares for e, row in own.stored.items()}
-    parts = [*stored.values(), *(row for own in squares for row in own.first), *device_rows(model, y)]
+    parts = [
+        *stored.values(),
+        *(row for own in squares for row in own.first),
+        *device_rows(model, y),
+    ]
     parts += [row for own in squares for row in own.last]
     parts += [row for feature in model.features for row in feature.energy_rows(model)]
     entries = [(k, i, value) for k, (_, row) in enumerate(parts) for i, value in row.items()]
@@ -144,10 +155,15 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
         idle.append((rest * scale).T)
         idle_rows.append(rest / scale)
         r += k
-    (i, j, v), (p, q, w) = (map(np.concatenate, zip(*pieces, strict=True)) for pieces in (forth_entries, back_entries))
-    forth, back = coo_array((v, (i, j)), shape=(r, n)).tocsr(), coo_array((w, (p, q)), shape=(n, r)).tocsr()
+    (i, j, v), (p, q, w) = (
+        map(np.concatenate, zip(*pieces, strict=True)) for pieces in (forth_entries, back_entries)
+    )
+    forth = coo_array((v, (i, j)), shape=(r, n)).tocsr()
+    back = coo_array((w, (p, q)), shape=(n, r)).tocsr()
     small = np.asarray((back.multiply(1.0 / scale[:, None]).tocsr() ** 2).sum(axis=0)).ravel()
-    return EnergyForm(rows, parts, forth, back, np.hstack(idle), np.vstack(idle_rows), float(1.0 / small.max()))
+    return EnergyForm(
+        rows, parts, forth, back, np.hstack(idle), np.vstack(idle_rows), float(1.0 / small.max())
+    )
 
 
 def split_states(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -181,7 +197,9 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         weights[memory] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
         for k, (gain, rate) in enumerate(elements(tables.floats, row)):
             first = row["strain"] + k * row["cells"]
-            weights[first : first + row["cells"]] = 0.5 * row["dx"] / (rho * row["area"]) * gain / rate
+            weights[first : first + row["cells"]] = (
+                0.5 * row["dx"] / (rho * row["area"]) * gain / rate
+            )
     for row in tables.nodes:
         if row["y"] >= 0 and row["kind"] not in (rec.MOVING, rec.VESSEL):
             weights[row["y"]] = stiffness(model, row) / (2.0 * rho)
@@ -205,6 +223,11 @@ def device_rows(model, y: np.ndarray):
 def stiffness(model, row) -> float:
     """Pressure per stored mass [Pa/kg] of a tank or chamber at the start."""
     if row["kind"] == rec.TANK and row["shape"] >= 0:
-        floats, at, n = model.tables.floats, int(row["shape"]), int(row["shapes"])
-        return float(model.case.gravity / np.interp(row["level"], floats[at : at + n], floats[at + n : at + 2 * n]))
+        floats = model.tables.floats
+        at = int(row["shape"])
+        n = int(row["shapes"])
+        return float(
+            model.case.gravity
+            / np.interp(row["level"], floats[at : at + n], floats[at + n : at + 2 * n])
+        )
     return float(row["stiffness"])

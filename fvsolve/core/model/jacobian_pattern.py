@@ -54,7 +54,9 @@ class Couplings:
         """Yield all couplings of the model, except some of a state with itself."""
         for pipe in self.pipes:
             if pipe["cells"] == 0:
-                yield pairs_of(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
+                yield pairs_of(
+                    unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe)))
+                )
                 continue
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
@@ -62,7 +64,9 @@ class Couplings:
             yield from self.creep_pairs(pipe)
         yield from self.stored()
         for column in self.columns:
-            yield pairs_of(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
+            yield pairs_of(
+                unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column)))
+            )
         yield from self.device_pairs()
         for own in self.features:
             yield from own.pairs()
@@ -75,7 +79,11 @@ class Couplings:
 
     def joints(self) -> list:
         """Links whose end nodes are solved together: valves, short delay lines, columns that valves can control."""
-        return [*self.valves, *self.couplings, *(column for column in self.columns if self.is_controlled(column))]
+        return [
+            *self.valves,
+            *self.couplings,
+            *(column for column in self.columns if self.is_controlled(column)),
+        ]
 
     def is_controlled(self, column) -> bool:
         """True if the flow of a rigid column follows the valves at its end at some openings."""
@@ -95,7 +103,9 @@ class Couplings:
             if (states := own.sets_pressure(i)) is not None:
                 return states
         given = self.schedule(self.nodes["schedule"][i])
-        of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
+        of_devices = (
+            self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i
+        )
         of_features = (own.pressure(i) for own in self.features)
         return unique_states(self.own(i), given, *of_features, *of_devices)
 
@@ -117,7 +127,9 @@ class Couplings:
         device = self.devices[link["device"]]
         _, part, rows = self.parts[link["device"]]
         of_features = [own.read_by(part, rows) for own in self.features]
-        lifting = [self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)]
+        lifting = [
+            self.sets[i] if self.sets else self.pressure_states(i) for i in self.lifting_nodes(link)
+        ]
         schedules = self.schedule(*rows.schedules_at_once(device, self.valves, self.floats))
         return unique_states(self.acting_states(link["device"]), schedules, *of_features, *lifting)
 
@@ -136,7 +148,10 @@ class Couplings:
         """
         joined_nodes = [(*ends_of(link), *self.lifting_nodes(link)) for link in self.joints()]
         inner = [[i for i in places if self.inner[i]] for places in joined_nodes]
-        group = union(len(self.nodes), [(i, j) for places in inner for i, j in zip(places, places[1:], strict=False)])
+        group = union(
+            len(self.nodes),
+            [(i, j) for places in inner for i, j in zip(places, places[1:], strict=False)],
+        )
         enter: list[list] = [[] for _ in group]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -151,7 +166,10 @@ class Couplings:
         for i in np.flatnonzero(self.inner):
             enter[group[i]].append(self.schedule(self.nodes["schedule"][i]))
         joined = [unique_states(*parts) for parts in enter]
-        return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
+        return [
+            joined[group[i]] if self.inner[i] else self.pressure_states(i)
+            for i in range(len(group))
+        ]
 
     def stored(self) -> Iterator[Pairs]:
         """Yield pairs (rates, states) of the masses in nodes and in what they feed, and of the mass ledger.
@@ -184,7 +202,11 @@ class Couplings:
         for k, (row, (_, _, rows)) in enumerate(zip(self.devices, self.parts, strict=True)):
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"], row["second"]) if i >= 0]
-            read.append(self.schedule(row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)))
+            read.append(
+                self.schedule(
+                    row["schedule"], *rows.schedules_of_rates(row, self.valves, self.floats)
+                )
+            )
             yield pairs_of(self.device_states(row), unique_states(self.acting_states(k), *read))
 
     def device_reading(self, device) -> np.ndarray:
@@ -277,7 +299,9 @@ class Couplings:
         for right, i in enumerate(ends_of(pipe)):
             enters, leaves = self.sides(pipe, right)
             near, last = slice(self.reach.behind), slice(max(self.reach.ahead, 1))
-            read = unique_states(self.sets[i], self.edge_cells(pipe, right), enters[: self.reach.entering])
+            read = unique_states(
+                self.sets[i], self.edge_cells(pipe, right), enters[: self.reach.entering]
+            )
             yield pairs_of(enters[near], read)
             yield pairs_of(leaves[last], leaves[: self.reach.leaving])
             if self.coupled(pipe):
@@ -310,7 +334,8 @@ def lumped_states(model) -> np.ndarray:
     flow of restrictions bends within a few pascals. The result is empty under density laws whose pressures come from
     iterations.
     """
-    if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
+    # pressures come from iterations, rougher than rounding
+    if model.case.law.name not in ("linear", "log"):
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["cells"] > 0]
     cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes]

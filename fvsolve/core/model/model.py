@@ -48,9 +48,13 @@ class State(Displayable):
         self.t = as_time(self.t)
         self.y = as_numbers("y", self.y)
         if self.y.ndim != 1:
-            raise FvsolveError(f"y has shape {self.y.shape}; expected a one-dimensional array of numbers")
+            raise FvsolveError(
+                f"y has shape {self.y.shape}; expected a one-dimensional array of numbers"
+            )
         if not isinstance(self.memory, dict):
-            raise FvsolveError(f"memory is of type {type(self.memory).__name__}; expected a dict of arrays by name")
+            raise FvsolveError(
+                f"memory is of type {type(self.memory).__name__}; expected a dict of arrays by name"
+            )
 
     def summary_line(self) -> str:
         return f"at t = {self.t:g} s: {self.y.size} numbers"
@@ -72,7 +76,12 @@ def as_numbers(name: str, values: Any) -> np.ndarray:
     """
     if type(values) is float:
         return np.float64(values)
-    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray and values.ndim:
+    if (
+        type(values) is np.ndarray
+        and values.dtype == np.float64
+        and values.flags.carray
+        and values.ndim
+    ):
         return values
     try:
         array = np.asarray(values)
@@ -91,7 +100,9 @@ def as_limit(limit: Any) -> float:
     """
     value = as_numbers("limit", limit)
     if value.ndim or np.isnan(value):
-        raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
+        raise FvsolveError(
+            f"limit = {show(value)} is not a time; expected a number of seconds, or infinity"
+        )
     return float(value)
 
 
@@ -151,16 +162,20 @@ class Model(Displayable):
     devices: list[tuple]  # (name, part, lowering), in the order of their table
     laws: list[str]  # modules of compiled laws of parts, in the order of the rows of `hooks`
     start: np.ndarray  # state at the start: zero except what features write
-    events: list[tuple[str, str]]  # of devices and valves: (name, meaning of a zero of its event function)
+    # of devices and valves: (name, meaning of a zero of its event function)
+    events: list[tuple[str, str]]
     watched: list[Probe]  # read in addition to the probes, for their extremes only
-    watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan for others
+    # pressures of `watched` along pipes in the profile [Pa], nan for others
+    watched_start: np.ndarray
     features: list[Any]  # see `assembly.features`
     flags: np.ndarray  # event flags before a run
     # idle run data for evaluating single states; tables before the start is solved, reused by `vary`
     idle_run_data: deque[RunData] = field(default_factory=deque, init=False)
     tables_before_start: list = field(default_factory=list, init=False)
-    idle_loops: deque = field(default_factory=deque, init=False)  # loops of `advance` that no call uses
-    computed: dict = field(default_factory=dict, init=False)  # results of functions, see `once_per_model`
+    # loops of `advance` that no call uses
+    idle_loops: deque = field(default_factory=deque, init=False)
+    # results of functions, see `once_per_model`
+    computed: dict = field(default_factory=dict, init=False)
 
     picture = "fvsolve.report.draw.object_pictures:model_figure"
 
@@ -186,9 +201,16 @@ class Model(Displayable):
 
     def schedule_of(self, name: str) -> int:
         """Number of the schedule of a link of a feature; raises FvsolveError if there is none."""
-        numbers = {link: k for feature in self.features for link, k in feature.link_schedules.items() if k >= 0}
+        numbers = {
+            link: k
+            for feature in self.features
+            for link, k in feature.link_schedules.items()
+            if k >= 0
+        }
         if not isinstance(name, str) or name not in numbers:
-            raise FvsolveError(f"{show(name)} has no schedule; expected {listing([*numbers]) or 'a link of a feature'}")
+            raise FvsolveError(
+                f"{show(name)} has no schedule; expected {listing([*numbers]) or 'a link of a feature'}"
+            )
         return numbers[name]
 
     @property
@@ -234,7 +256,9 @@ class Model(Displayable):
         For each delay line it is the value of the delay line with the longest travel time.
         """
         pipes = self.tables.pipes
-        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["cells"] == 0, pipes["rate_factor"], 1.0)
+        rates = (
+            pipes["speed"] / pipes["dx"] * np.where(pipes["cells"] == 0, pipes["rate_factor"], 1.0)
+        )
         rates.flags.writeable = False
         return rates
 
@@ -277,14 +301,30 @@ class Model(Displayable):
         from fvsolve.core.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
-        alone = bool(self.meshed) and not (self.pipes or has.valves or has.devices or has.clusters or has.columns)
+        alone = bool(self.meshed) and not (
+            self.pipes or has.valves or has.devices or has.clusters or has.columns
+        )
         alone = alone and not any(feature.reads_nodes for feature in self.features)
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = ModelFeatures(self.case.law.family, cells, has.clusters, has.columns, self.unsteady, self.creeps,
-                    has.devices, tuple(self.laws), has.valves, (), (), has.couplings, alone,
-                    forces=bool(self.layout["forces"] >= 0), formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-                    device_heat=bool((self.tables.heat_sources["device"] >= 0).any()))  # fmt: skip
+        cast = ModelFeatures(
+            self.case.law.family,
+            cells,
+            has.clusters,
+            has.columns,
+            self.unsteady,
+            self.creeps,
+            has.devices,
+            tuple(self.laws),
+            has.valves,
+            (),
+            (),
+            has.couplings,
+            alone,
+            forces=bool(self.layout["forces"] >= 0),
+            formulas=bool((self.tables.schedules["pieces"] < 0).any()),
+            device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
+        )
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
         packages = tuple(name for feature in self.features for name in feature.packages)
         cast = cast._replace(features=terms, further_packages=packages)
@@ -306,7 +346,9 @@ class Model(Displayable):
         from fvsolve.core.model.jacobian_pattern import jacobian_pattern, lumped_states
         from fvsolve.core.steppers.structure import Structure
 
-        return Structure(jacobian_pattern(self), self.case.numerics.linear_algebra, lumped_states(self))
+        return Structure(
+            jacobian_pattern(self), self.case.numerics.linear_algebra, lumped_states(self)
+        )
 
     def new_out(self) -> np.ndarray:
         """New array for the values that the right-hand side writes in addition to dydt."""
@@ -322,15 +364,19 @@ class Model(Displayable):
         state = self.checked_size(y)
         if not np.isfinite(state).all():
             k = int(np.argmax(~np.isfinite(state)))
-            raise FvsolveError(f"y[{k}] = {state[k]}, {self.state_names[k]}; expected a finite number for every state")
+            raise FvsolveError(
+                f"y[{k}] = {state[k]}, {self.state_names[k]}; expected a finite number for every state"
+            )
         return as_time(t), state
 
     def checked_size(self, y: Any) -> np.ndarray:
         """State as float64[n]. Raises FvsolveError if its size does not fit this model."""
         state = as_numbers("y", y)
         if state.shape != (self.y_size,):
-            raise FvsolveError(f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
-                               "that Model.state_names lists")  # fmt: skip
+            raise FvsolveError(
+                f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
+                "that Model.state_names lists"
+            )
         return state
 
     def rhs(self, t: float | State, y: np.ndarray | None = None) -> np.ndarray:
@@ -353,7 +399,9 @@ class Model(Displayable):
             if text := feature.refusal(function):
                 raise FvsolveError(text)
 
-    def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(
+        self, t: float, y: np.ndarray, limit: float = np.inf
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
 
         From time `limit` [s] on, schedules keep their left limit at `limit`. Delay lines are allowed, but no waves
@@ -394,17 +442,23 @@ class Model(Displayable):
             high, low = y.copy(), y.copy()
             high[j] += step
             low[j] -= step
-            jacobian[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (high[j] - low[j])
+            jacobian[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (
+                high[j] - low[j]
+            )
         return jacobian
 
-    def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
+    def observe(
+        self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf
+    ) -> np.ndarray:
         """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
 
         Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned. Delay lines
         contain the waves in the memory of the `State`; at (t, y) they are empty. From time `limit` [s] on, schedules
         keep their left limit at `limit`.
         """
-        armed, limit, past = None, as_limit(limit), None
+        armed = None
+        limit = as_limit(limit)
+        past = None
         if isinstance(t, State) and y is None:
             t, y, armed, past = t.t, t.y, flags_of(t, self), t
         t, y = self.checked(t, y)
@@ -422,9 +476,13 @@ class Model(Displayable):
         waves = as_numbers("waves", waves)
         known = isinstance(k, (int, np.integer)) and 0 <= k < len(self.pipes)
         if not known or waves.shape != (self.pipes[k].cells,):
-            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of "
-                               f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
-        return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
+            raise FvsolveError(
+                f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of "
+                f"the pipe, and a pipe number less than {len(self.pipes)}"
+            )
+        return self.case.law.cell_pressure(
+            self.tables.pipes[k], self.profiles[k], self.tables.profile, waves
+        )
 
     def cell_pressures(self, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of all pipes from the sum of both waves [kg/s] : float64[cells].
@@ -433,7 +491,9 @@ class Model(Displayable):
         """
         waves = as_numbers("waves", waves)
         if waves.shape != (self.cells,):
-            raise FvsolveError(f"waves has shape {waves.shape}; expected a number for each of the {self.cells} cells")
+            raise FvsolveError(
+                f"waves has shape {waves.shape}; expected a number for each of the {self.cells} cells"
+            )
         starts = list(self.profiles.values())
         return self.case.law.cell_pressures(self.tables.pipes, starts, self.tables.profile, waves)
 
@@ -454,7 +514,9 @@ class Model(Displayable):
         """True if the density law includes cavities."""
         return self.case.law.cavitates
 
-    def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
+    def fields(
+        self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None
+    ) -> dict[str, Any]:
         """Values along pipes, in meshes and at nodes in a state [SI] : part -> quantity -> values of cells.
 
         Further keys: "nodes" : node -> quantity -> float; "points" : part whose mesh moves -> corners of its cells.
@@ -463,7 +525,9 @@ class Model(Displayable):
         """
         y = self.checked_size(y)
         if np.shape(out) != (int(self.layout["size"]),):
-            raise FvsolveError(f"out has shape {np.shape(out)}; expected the second array that Model.evaluate returns")
+            raise FvsolveError(
+                f"out has shape {np.shape(out)}; expected the second array that Model.evaluate returns"
+            )
         fields, law = {}, self.case.law
         for k, pipe in enumerate(self.pipes):
             row = self.tables.pipes[k]
@@ -474,10 +538,13 @@ class Model(Displayable):
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             flow = mass_flow / law.density(pressure)
             fields[pipe.name] = {
-                "pressure": pressure, "head": self.head(pressure, pipe.elevation),
-                "velocity": flow / law.area(row, pressure), "flow": flow,
-                "min_pressure": pressure, "max_pressure": pressure,
-            }  # fmt: skip
+                "pressure": pressure,
+                "head": self.head(pressure, pipe.elevation),
+                "velocity": flow / law.area(row, pressure),
+                "flow": flow,
+                "min_pressure": pressure,
+                "max_pressure": pressure,
+            }
         nodes, at = self.tables.nodes, int(self.layout["pressure"])
         fields["points"], fields["nodes"] = {}, {}
         for i, name in enumerate(self.node_names):

@@ -23,8 +23,10 @@ class NonlinearStart(SteadyStart):
         super().__init__(draft)
         self.st, self.floats = draft.tables.settings[0], draft.tables.floats
         self.rho = draft.fluid.density
-        self.exit_losses = {name: self.jet(row, *2 * [self.rho * float(row["area"])]) for name, row in
-                     zip(draft.pipe_names, self.pipes, strict=True)}  # fmt: skip
+        self.exit_losses = {
+            name: self.jet(row, *2 * [self.rho * float(row["area"])])
+            for name, row in zip(draft.pipe_names, self.pipes, strict=True)
+        }
         self.end_flow = end_flow
         if self.law.cavitates:
             from fvsolve.core.kernels.cavitating_nodes import end_flow_cavitating
@@ -35,18 +37,34 @@ class NonlinearStart(SteadyStart):
         previous = None
         for _ in range(80):
             super().solve()
-            present = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
-            scale = 1 + np.max(np.abs(present), initial=0.0)  # with masses alone there are no unknowns
-            changes = np.full(present.size, np.inf) if previous is None else np.abs(present - previous) / scale
+            present = np.concatenate(
+                (self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale)
+            )
+            # with masses alone there are no unknowns
+            scale = 1 + np.max(np.abs(present), initial=0.0)
+            changes = (
+                np.full(present.size, np.inf)
+                if previous is None
+                else np.abs(present - previous) / scale
+            )
             if np.max(changes, initial=0.0) <= 1e-14:
                 return
             previous = present
             self.correct_drops()
         if np.max(changes) > 1e-9:
             draft, worst = self.draft, int(np.argmax(changes))
-            names = [*self.case.places, *draft.pipe_names, *draft.column_names, *draft.valve_names, *self.case.links]
-            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} does not converge with "
-                        'variable density; check the heads around it, or use initial = "rest"')  # fmt: skip
+            names = [
+                *self.case.places,
+                *draft.pipe_names,
+                *draft.column_names,
+                *draft.valve_names,
+                *self.case.links,
+            ]
+            draft.fault(
+                "numerics.initial",
+                f"no steady state was found: {names[worst]} does not converge with "
+                'variable density; check the heads around it, or use initial = "rest"',
+            )
             self.draft.check()
 
     def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:
@@ -70,14 +88,19 @@ class NonlinearStart(SteadyStart):
         potential = self.answer.potential
         names = self.draft.pipe_names
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
-            flow, i, j = float(self.pipe_flow[k]), int(row["from_node"]), int(row["to_node"])
+            flow = float(self.pipe_flow[k])
+            i = int(row["from_node"])
+            j = int(row["to_node"])
             row["flow"] = flow
             row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
             if not math.isfinite(b_to):
-                self.draft.fault(f"links.{names[k]}", "no steady state: the pressure in this pipe falls below the "
-                                 "range of the density law; check the heads at its ends, or use "
-                                 'initial = "rest"')  # fmt: skip
+                self.draft.fault(
+                    f"links.{names[k]}",
+                    "no steady state: the pressure in this pipe falls below the "
+                    "range of the density law; check the heads at its ends, or use "
+                    'initial = "rest"',
+                )
                 self.draft.check()
             exit_loss = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.at_rest(j) else 0.0
             self.exit_losses[names[k]] = self.jet(row, *self.ends)
@@ -124,7 +147,9 @@ class NonlinearStart(SteadyStart):
             start += 0.5 * (flow / m) ** 2
         faces, centers = np.zeros(mesh.cells + 1), np.zeros(mesh.cells)
         profile = self.draft.tables.profile
-        b_to = profile_along(self.st, self.floats, profile, row, float(start), z, flow, faces, centers)
+        b_to = profile_along(
+            self.st, self.floats, profile, row, float(start), z, flow, faces, centers
+        )
         self.ends = faces[0], faces[-1]
         return faces, centers, b_to
 
@@ -159,12 +184,23 @@ class NonlinearStart(SteadyStart):
             profile[row["center"] : row["center"] + n] = centers
             for m0, name, sign in ((faces[0], "from", -1.0), (faces[-1], "to", 1.0)):
                 i = int(row[f"{name}_node"])
-                inflow, _, mass = self.end_flow(self.st, self.floats, row, m0, sign * flow,
-                                         float(self.nodes["pressure"][i]), bool(self.at_rest(i)))  # fmt: skip
-                consistent = abs(inflow - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
+                inflow, _, mass = self.end_flow(
+                    self.st,
+                    self.floats,
+                    row,
+                    m0,
+                    sign * flow,
+                    float(self.nodes["pressure"][i]),
+                    bool(self.at_rest(i)),
+                )
+                consistent = abs(inflow - sign * flow) <= 1e-7 * (
+                    self.flow_scale * 1e-3 + abs(flow)
+                )
                 row[f"{name}_base"] = inflow if consistent else sign * flow
                 row[f"{name}_mass"] = mass if consistent else m0
-            vapour_mass, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.law.cavity_pressure)
+            vapour_mass, _ = kernels.mass_of_pressure(
+                self.st, self.floats, row, self.law.cavity_pressure
+            )
             profile[row["cell"] : row["cell"] + n] = row["speed"] * (vapour_mass - centers)
             self.draft.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
             self.flux(row, faces, profile)
@@ -173,14 +209,18 @@ class NonlinearStart(SteadyStart):
         from fvsolve.core.kernels.barotropic_pipes import momentum_flux
 
         for i, m in enumerate(faces):
-            profile[row["flux"] + i] = momentum_flux(self.st, self.floats, row, float(m), float(row["flow"]))
+            profile[row["flux"] + i] = momentum_flux(
+                self.st, self.floats, row, float(m), float(row["flow"])
+            )
 
     def pressure_of_mass(self, row, m: float) -> float:
         return kernels.pressure_of_mass(self.st, self.floats, row, float(m))
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
         row, mesh = self.pipes[k], self.draft.meshes[k]
-        return self.pressure_of_mass(row, self.mass_at(k, fraction)), self.height(row, mesh, fraction)
+        return self.pressure_of_mass(row, self.mass_at(k, fraction)), self.height(
+            row, mesh, fraction
+        )
 
     def mass_at(self, k: int, fraction: float) -> float:
         """Mass per length of the steady state at a fraction of the length of pipe k [kg/m].
@@ -230,11 +270,15 @@ class NonlinearStart(SteadyStart):
     def fill_valves(self) -> None:
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
-            row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            row["drop"] = (
+                self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            )
             if row["hooks"] >= 0:
                 self.valve_lowering(k).follow(self, k)
             elif row["open"] > 0.0:
                 target = valve_target(self.draft.tables, self.out, k, float(row["open"]))[0]
-                law_flow = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
+                law_flow = (
+                    target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
+                )
                 if abs(law_flow - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                     row["open"] = 0.0

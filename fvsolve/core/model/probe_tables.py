@@ -48,7 +48,9 @@ def probe_offsets(draft, start) -> None:
     """
     count = len(draft.case.probes)
     draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
-    for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)):
+    for k, (row, probe) in enumerate(
+        zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)
+    ):
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
     pairs = [*zip(draft.probe_table, all_probes(draft.case), strict=True)]
@@ -71,11 +73,14 @@ def linear_offsets(draft, start, row, probe) -> None:
     weight = draft.fluid.density * draft.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
     if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
-        leaves = row["kind"] == rec.VALVE_FLOW and row["side"] < 0  # out of the end `to` of a conduit
+        # out of the end `to` of a conduit
+        leaves = row["kind"] == rec.VALVE_FLOW and row["side"] < 0
         row["scale"] = (-1.0 if leaves else 1.0) / draft.fluid.density
         if probe.quantity == "velocity":
             is_pipe, floats = row["kind"] == rec.PIPE_FLOW, draft.tables.floats
-            row["scale"] /= draft.pipe_table[row["index"]]["area"] if is_pipe else floats[row["weights"]]
+            row["scale"] /= (
+                draft.pipe_table[row["index"]]["area"] if is_pipe else floats[row["weights"]]
+            )
     elif row["kind"] in (rec.PRESSURE, rec.PIPE_PRESSURE, rec.PRESSURE_BETWEEN):
         if row["kind"] == rec.PRESSURE:
             base, z = (draft.node_table[row["index"]][key] for key in ("pressure", "elevation"))
@@ -86,7 +91,9 @@ def linear_offsets(draft, start, row, probe) -> None:
         else:
             base, z = start.profile_at(int(row["index"]), probe.fraction)
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
-        row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
+        row["offset"] = base - (
+            0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure
+        )
         place = draft.case.places.get(probe.name)
         is_level = probe.quantity == "level" and hasattr(place, "basin")
         if probe.quantity == "head" or is_level:

@@ -17,8 +17,16 @@ if TYPE_CHECKING:
 
 def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
     """Arrays that a run writes, filled with zeros; shapes : shape of each."""
-    arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
-    arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
+    arrays = {
+        name: np.zeros(shape)
+        for name, shape in shapes._asdict().items()
+        if name not in rec.INTEGERS
+    }
+    arrays |= {
+        name: np.zeros(getattr(shapes, name), dtype=np.int64)
+        for name in shapes._fields
+        if name in rec.INTEGERS
+    }
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
     return rec.RunArrays(**arrays)
 
@@ -48,10 +56,14 @@ class RunData:
         for own in self.features:
             self.tables = self.tables._replace(**own.written_tables())
         self.kept: list = []  # arrays behind handles
-        self.replaced = 0  # number of arrays that have been replaced since the start, because they have grown
+        # number of arrays that have been replaced since the start, because they have grown
+        self.replaced = 0
         self.clock["limit"], self.marks[:] = np.inf, np.nan
         self.use_flags(model.flags)
-        self.written.bands[:] = [row for part in model.meshed for row in part.band(0, part.row_count)]  # all
+        # all
+        self.written.bands[:] = [
+            row for part in model.meshed for row in part.band(0, part.row_count)
+        ]
         for array in (self.envelope, self.extremes):
             array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
 
@@ -70,7 +82,11 @@ class RunData:
         """True for each probe of a pressure in a part that is isolated during the whole run : bool[probes]."""
         parts, both = self.model.isolated, (*self.model.probes, *self.model.watched)
         return np.array(
-            [f"{probe.part}.{probe.name}" in parts and probe.quantity in OF_PRESSURE for probe in both], bool
+            [
+                f"{probe.part}.{probe.name}" in parts and probe.quantity in OF_PRESSURE
+                for probe in both
+            ],
+            bool,
         )
 
     @cached_property
@@ -84,14 +100,25 @@ class RunData:
 
         callables : (calls, hooks) of `kernels.compiled_functions.Functions`
         """
-        from fvsolve.core.kernels.table_handle import View, addresses_of, linked_handles, places_in_memory
+        from fvsolve.core.kernels.table_handle import (
+            View,
+            addresses_of,
+            linked_handles,
+            places_in_memory,
+        )
 
         model = self.model
         shared = model.places if self.tables is model.tables else addresses_of(self.tables)
         views = []
         for own in self.features:
             for name, (array, replaced) in own.views().items():
-                views.append(View(array, addresses_of(self.tables._replace(**replaced)), self.feature_tables(name)))
+                views.append(
+                    View(
+                        array,
+                        addresses_of(self.tables._replace(**replaced)),
+                        self.feature_tables(name),
+                    )
+                )
         following = [array for own in self.features for array in own.coefficients()]
         written = written._replace(memory=places_in_memory([*self.arrays().values(), *following]))
         self.kept.append(written.memory)
@@ -149,7 +176,9 @@ class RunData:
         """
         return min((own.capacity() for own in self.features), default=np.inf)
 
-    def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    def along(
+        self, t: float, out: np.ndarray, parts: int = 1
+    ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """Waves along pipes without cells [kg/s] : number of the pipe -> (forward, backward), float64[parts * cells].
 
         They are the waves in the middle of each of `parts` equal parts of every cell.
@@ -172,7 +201,9 @@ class RunData:
         """
         return self.evaluate_checked(*self.model.checked(t, y), limit)
 
-    def evaluate_checked(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate_checked(
+        self, t: float, y: np.ndarray, limit: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Result of `evaluate` for arguments in the form that `Model.checked` returns."""
         self.clock["limit"] = limit
         dydt, out = np.zeros(y.size), self.model.new_out()

@@ -17,7 +17,8 @@ SLOW_EVENT = 100.0  # travel times: for longer events the liquid is practically 
 SHORT_PIPE = 0.1  # of the longest travel time: shorter pipes count only next to fast events
 FAST_EVENT = 4.0  # of a pipe's own travel times: events next to it that are shorter count as fast
 LEAST_CELLS = 3  # least cells of a piece next to a check valve or vessel
-COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces of a pipe are reported
+# steps shorter by this factor than those of other pieces of a pipe are reported
+COSTLY_RATIO = 10.0
 
 
 def start_notices(draft: Any) -> list[Notice]:
@@ -35,7 +36,10 @@ def too_few_cells(draft: Any) -> list[Notice]:
     if not len(table):
         return []
     cells = np.where(table["cells"] > 0, table["cells"], np.inf)
-    return [*_behind_events(draft, cells), *(_near_answering(draft, cells) or _costly_piece(draft, cells))]
+    return [
+        *_behind_events(draft, cells),
+        *(_near_answering(draft, cells) or _costly_piece(draft, cells)),
+    ]
 
 
 def events(case: Any) -> Iterator[tuple[str, float]]:
@@ -66,7 +70,9 @@ def duration(schedule: Schedule, start: float, end: float) -> float:
         spans = np.diff(times)
         if np.any(np.diff(values)[spans == 0.0]):
             return 0.0
-        steep = float(np.max(np.abs(np.diff(values)[spans > 0.0]) / spans[spans > 0.0], initial=0.0))
+        steep = float(
+            np.max(np.abs(np.diff(values)[spans > 0.0]) / spans[spans > 0.0], initial=0.0)
+        )
         return float(np.ptp(values)) / steep if steep > 0.0 else math.inf
     if schedule.kind == "harmonic":
         return schedule.wave[2] / math.pi
@@ -74,7 +80,11 @@ def duration(schedule: Schedule, start: float, end: float) -> float:
     if schedule.kind == "step":
         return 0.0 if ((changes > 0.0) & (t[1:] >= start) & (t[1:] <= end)).any() else math.inf
     steep = np.where((t[1:] > start) & (t[:-1] < end), changes / np.diff(t), 0.0).max(initial=0.0)
-    return float(np.ptp(schedule.value)) / steep / max(schedule.exponent, 1.0) if steep > 0.0 else math.inf
+    return (
+        float(np.ptp(schedule.value)) / steep / max(schedule.exponent, 1.0)
+        if steep > 0.0
+        else math.inf
+    )
 
 
 def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
@@ -124,8 +134,16 @@ def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) ->
     case, shortest = draft.case, {}
     for key, time in durations.items():
         group, name, key_name = (*key.split("."), "", "")[:3]
-        for node in (name,) if group == "nodes" else case.links[name].ports.values() if group == "links" else ():
-            shortest[node] = min(shortest.get(node, math.inf), math.inf if key_name == "trip" else time)
+        for node in (
+            (name,)
+            if group == "nodes"
+            else case.links[name].ports.values()
+            if group == "links"
+            else ()
+        ):
+            shortest[node] = min(
+                shortest.get(node, math.inf), math.inf if key_name == "trip" else time
+            )
     ends = [[shortest.get(end, math.inf) for end in _ends(case, name)] for name in draft.pipe_names]
     return np.min(np.array(ends).reshape(-1, 2), axis=1) < FAST_EVENT * travel
 
@@ -142,22 +160,34 @@ def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
     few = (cells < LEAST_CELLS) & np.array([bool(notice) for notice in adjacent])
     if not few.any():
         return []
-    worst = int(np.argmin(np.where(few, draft.pipe_table["dx"] * draft.pipe_table["cells"], np.inf)))
-    name, cost = draft.pipe_names[worst], "".join(f"; {notice.text}" for notice in _costly_piece(draft, cells))
-    text = (f"{_location(case, name)}: {_cells(cells[worst])}, too few to resolve the waves at "
-            f"{listing(adjacent[worst], 3)}; next to a check valve or accumulator give {_advice(case, name)} or more"
-            f"{_others(draft, few, worst)}{cost}")  # fmt: skip
-    return [Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(LEAST_CELLS))]
+    worst = int(
+        np.argmin(np.where(few, draft.pipe_table["dx"] * draft.pipe_table["cells"], np.inf))
+    )
+    name = draft.pipe_names[worst]
+    cost = "".join(f"; {notice.text}" for notice in _costly_piece(draft, cells))
+    text = (
+        f"{_location(case, name)}: {_cells(cells[worst])}, too few to resolve the waves at "
+        f"{listing(adjacent[worst], 3)}; next to a check valve or accumulator give {_advice(case, name)} or more"
+        f"{_others(draft, few, worst)}{cost}"
+    )
+    return [
+        Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(LEAST_CELLS))
+    ]
 
 
 def answering_parts(case: Any) -> dict[str, list[str]]:
     """Check valves and accumulators at the ends of each pipe : pipe -> names."""
-    parts_at: dict[str, list[str]] = {name: [name] for name, node in case.nodes.items() if node.kind == "accumulator"}
+    parts_at: dict[str, list[str]] = {
+        name: [name] for name, node in case.nodes.items() if node.kind == "accumulator"
+    }
     for name, link in case.links.items():
         for node in link.ports.values() if link.kind == "check-valve" else ():
             parts_at.setdefault(node, []).append(name)
     pipes = [name for name, link in case.links.items() if link.kind == "pipe"]
-    return {name: [part for end in _ends(case, name) for part in parts_at.get(end, ())] for name in pipes}
+    return {
+        name: [part for end in _ends(case, name) for part in parts_at.get(end, ())]
+        for name in pipes
+    }
 
 
 def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
@@ -171,7 +201,9 @@ def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
     pipe = _cut_pipe(case, name)
     if pipe is None:
         return []
-    ratio = rate[worst] / min(rate[draft.pipe_names.index(piece)] or math.inf for piece in case.routes[pipe].pipes)
+    ratio = rate[worst] / min(
+        rate[draft.pipe_names.index(piece)] or math.inf for piece in case.routes[pipe].pipes
+    )
     if ratio <= COSTLY_RATIO:
         return []
     text = (
@@ -185,7 +217,9 @@ def _cut_pipe(case: Any, piece: str) -> str | None:
     """Name of the cut pipe to which a piece belongs; None for a pipe that is not cut."""
     name = piece.rpartition("-")[0]
     route = case.routes.get(name)
-    return name if route is not None and piece in route.pipes and is_cut(name, route.pipes) else None
+    return (
+        name if route is not None and piece in route.pipes and is_cut(name, route.pipes) else None
+    )
 
 
 def _location(case: Any, name: str) -> str:
@@ -193,9 +227,12 @@ def _location(case: Any, name: str) -> str:
     pipe = _cut_pipe(case, name)
     if pipe is None:
         return name
-    route, lengths = case.routes[pipe], [case.links[value].length for value in case.routes[pipe].pipes]
+    route = case.routes[pipe]
+    lengths = [case.links[value].length for value in case.routes[pipe].pipes]
     at = (route.start or 0.0) + sum(lengths[: route.pipes.index(name)])
-    span = " to ".join(case.amount(value, "length", 10) for value in (at, at + case.links[name].length))
+    span = " to ".join(
+        case.amount(value, "length", 10) for value in (at, at + case.links[name].length)
+    )
     return f"{name} (chainage {span} of {pipe})"
 
 
@@ -239,10 +276,14 @@ def coarse_for_cavities(draft) -> list[Notice]:
         return []
     error = DURATION * longest.cells**-RATE
     better = DURATION * ENOUGH**-RATE
-    text = (f"{longest.name}: with {longest.cells} cell{'s' if longest.cells > 1 else ''} the duration of a first "
-            f"cavity is about {100.0 * error:.2g} % too short if damping is low; "
-            f"{ENOUGH} cells reduce this error to {100.0 * better:.2g} %")  # fmt: skip
-    return [Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))]
+    text = (
+        f"{longest.name}: with {longest.cells} cell{'s' if longest.cells > 1 else ''} the duration of a first "
+        f"cavity is about {100.0 * error:.2g} % too short if damping is low; "
+        f"{ENOUGH} cells reduce this error to {100.0 * better:.2g} %"
+    )
+    return [
+        Notice("cells", f"links.{longest.name}", text, "cells", float(longest.cells), float(ENOUGH))
+    ]
 
 
 MAX_VELOCITY = 60.0  # of pipe flow [m/s]: penstocks are below 10, jets of 180 m of head reach it
@@ -260,8 +301,12 @@ def flow_notices(draft: Any) -> list[Notice]:
 def _flows(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Pipes and rigid columns of the case file : (names, flows at the start [kg/s], areas [m2])."""
     tables = ((draft.pipe_names, draft.pipe_table), (draft.column_names, draft.column_table))
-    rows = [(name, row["flow"], row["area"]) for names, table in tables for name, row in zip(names, table, strict=True)
-            if name in draft.case.links]  # fmt: skip
+    rows = [
+        (name, row["flow"], row["area"])
+        for names, table in tables
+        for name, row in zip(names, table, strict=True)
+        if name in draft.case.links
+    ]
     return [row[0] for row in rows], *np.array([row[1:] for row in rows]).reshape(-1, 2).T
 
 
@@ -270,10 +315,16 @@ def _fast_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray)
     if not (speed > MAX_VELOCITY).any():
         return []
     worst = int(np.argmax(speed))
-    fastest, limit = (draft.case.amount(velocity, "velocity") for velocity in (speed[worst], MAX_VELOCITY))
-    text = (f"{_listed(names, speed > MAX_VELOCITY)}: {fastest} at the start in {names[worst]}, above "
-            f"{limit}; check the units of flow and diameter")  # fmt: skip
-    return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), MAX_VELOCITY)]
+    fastest, limit = (
+        draft.case.amount(velocity, "velocity") for velocity in (speed[worst], MAX_VELOCITY)
+    )
+    text = (
+        f"{_listed(names, speed > MAX_VELOCITY)}: {fastest} at the start in {names[worst]}, above "
+        f"{limit}; check the units of flow and diameter"
+    )
+    return [
+        Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), MAX_VELOCITY)
+    ]
 
 
 def _laminar_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
@@ -282,17 +333,25 @@ def _laminar_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarr
     The probable cause is a wrong unit of flow or viscosity.
     """
     fluid = draft.fluid
-    if not names or not fluid.viscosity or not WATER_DENSITIES[0] <= fluid.density <= WATER_DENSITIES[1]:
+    if (
+        not names
+        or not fluid.viscosity
+        or not WATER_DENSITIES[0] <= fluid.density <= WATER_DENSITIES[1]
+    ):
         return []
     bore = np.sqrt(4.0 / np.pi * area)
     reynolds = np.where(bore >= WIDE_PIPE, np.abs(flow) * bore / (area * fluid.viscosity), 0.0)
     worst = int(np.argmax(reynolds))
     if not NO_FLOW < reynolds[worst] < LAMINAR:
         return []
-    text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar, which is unusual for "
-            f"water in pipes this wide; check the flow, {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')}, "
-            f"and the viscosity, {fluid.viscosity:.4g} Pa s")  # fmt: skip
-    return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
+    text = (
+        f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar, which is unusual for "
+        f"water in pipes this wide; check the flow, {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')}, "
+        f"and the viscosity, {fluid.viscosity:.4g} Pa s"
+    )
+    return [
+        Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)
+    ]
 
 
 def _listed(names: list[str], chosen: np.ndarray) -> str:

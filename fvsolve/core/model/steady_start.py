@@ -44,23 +44,31 @@ class SteadyStart:
         self.rest = self.case.numerics.initial == "rest"
         self.t = self.case.numerics.start
         self.weight = draft.fluid.density * self.case.gravity
-        sizes = [1e-9, *(draft.fluid.density * self.pipes["area"]), *(draft.fluid.density * self.columns["area"])]
+        sizes = [
+            1e-9,
+            *(draft.fluid.density * self.pipes["area"]),
+            *(draft.fluid.density * self.columns["area"]),
+        ]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
         # typical mass flows of pipes, columns and restrictions [kg/s]
         self.flow_scales = np.array([*sizes[1:], *np.zeros(len(self.leaks))])
-        self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
+        # pressure drop in addition to the law's [Pa], for laws with changing density
+        self.extra: dict[str, float] = {}
         # of pipes: loss of the flow that leaves at each end, per M^2 [Pa s2/kg2]
         self.exit_losses: dict[str, tuple[float, float]] = {}
         # of valves: density relative to reference, driving pressure drop relative to potential drop
         self.density_ratios: dict[int, tuple[float, float]] = {}
         self.factor: dict[int, float] = {}  # factor on the conductance of valves, likewise
-        self.ratio: dict[int, float] = {}  # driving pressure drop of valves relative to potential drop, likewise
+        # driving pressure drop of valves relative to potential drop, likewise
+        self.ratio: dict[int, float] = {}
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
         self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
-        self.uncontrolled: set[int] = set()  # valves that cannot sustain a pressure, see `release_regulators`
-        self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies, held by `solve` [Pa]
+        # valves that cannot sustain a pressure, see `release_regulators`
+        self.uncontrolled: set[int] = set()
+        # of closed chambers: pressures that support bodies, held by `solve` [Pa]
+        self.loads: dict[int, float] = {}
 
     @cached_property
     def out(self) -> np.ndarray:
@@ -97,11 +105,16 @@ class SteadyStart:
 
         Raises CaseError if no such state is found.
         """
-        random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
+        random = Random(0)
+        devices = list(zip(self.draft.devices, self.draft.device_table, strict=True))
         changing: dict[str, int] = {}  # device -> last revision in which it changed
         for turn in range(MAX_REVISIONS):
             self.balance()
-            revised = (name for (name, part, device), row in devices if device.revise_state(self, part, row))
+            revised = (
+                name
+                for (name, part, device), row in devices
+                if device.revise_state(self, part, row)
+            )
             # later one by one, to avoid cycles
             now = [*islice(revised, 1 if turn > SIMULTANEOUS_REVISIONS else None)]
             changing |= dict.fromkeys(now, turn)
@@ -111,9 +124,13 @@ class SteadyStart:
             if turn % RESTART_INTERVAL == RESTART_INTERVAL - 1:
                 self.scatter(random)
         self.report_faults(self.fixed_potentials)
-        names = listing([name for name, turn in changing.items() if turn >= MAX_REVISIONS - RESTART_INTERVAL])
-        self.draft.fault("numerics.initial", f"no steady state was found: the states of {names} keep changing; "
-                         'try initial = "rest"')  # fmt: skip
+        names = listing(
+            [name for name, turn in changing.items() if turn >= MAX_REVISIONS - RESTART_INTERVAL]
+        )
+        self.draft.fault(
+            "numerics.initial",
+            f'no steady state was found: the states of {names} keep changing; try initial = "rest"',
+        )
         self.draft.check()
 
     def scatter(self, random: Random) -> None:
@@ -134,7 +151,9 @@ class SteadyStart:
         for i in (int(self.valves[k][end]) for end in ("from_node", "to_node")):
             unserved = i in self.answer.no_solution
             drawn = sum(self.demand[self.answer.no_solution]) if unserved else 0.0
-            potentials.append(-math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i]))
+            potentials.append(
+                -math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i])
+            )
         return potentials[0], potentials[1]
 
     def valve_flows(self) -> np.ndarray:
@@ -145,12 +164,18 @@ class SteadyStart:
         """Solve for the steady state with devices in their current states."""
         self.fixed_potentials, self.demand = self.boundary_values()
         held = self.fixed_potentials
-        pipes = [self.friction_edge(mesh.name, row, mesh.length) for mesh, row in
-                 zip(self.draft.meshes, self.pipes, strict=True)]  # fmt: skip
-        columns = [self.friction_edge(name, row, row["length"]) for name, row in
-                   zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
+        pipes = [
+            self.friction_edge(mesh.name, row, mesh.length)
+            for mesh, row in zip(self.draft.meshes, self.pipes, strict=True)
+        ]
+        columns = [
+            self.friction_edge(name, row, row["length"])
+            for name, row in zip(self.draft.column_names, self.columns, strict=True)
+        ]
         valves = [self.valve_edge(k) for k in range(len(self.valves))]
-        leaks = [self.leak_edge(k) for k in range(len(self.leaks)) if self.leaks[k]["leakage"] > 0.0]
+        leaks = [
+            self.leak_edge(k) for k in range(len(self.leaks)) if self.leaks[k]["leakage"] > 0.0
+        ]
         self.edges = [*pipes, *columns, *valves, *leaks]
         self.release_regulators(len(pipes) + len(columns))
         sizes = self.flow_scales[: len(self.edges)]
@@ -164,9 +189,15 @@ class SteadyStart:
             self.inflow[edge.j] += value
         for nodes, own, typical in self.answer.pieces:
             tolerance = 10.0 * ROUNDING_SHARE * (typical + np.max(np.abs(flow[own]), initial=0.0))
-            self.inflow[nodes] = np.where(np.abs(self.inflow[nodes]) <= tolerance, 0.0, self.inflow[nodes])
+            self.inflow[nodes] = np.where(
+                np.abs(self.inflow[nodes]) <= tolerance, 0.0, self.inflow[nodes]
+            )
         n, m = len(pipes), len(pipes) + len(columns)
-        self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
+        self.pipe_flow, self.column_flow, self.valve_flow = (
+            flow[:n],
+            flow[n:m],
+            flow[m : m + len(valves)],
+        )
 
     def release_regulators(self, first: int) -> None:
         """Open or shut each valve that would hold a pressure although demands alone determine its flow.
@@ -177,9 +208,13 @@ class SteadyStart:
         first : index of the edge of the first valve
         """
         self.uncontrolled = set()
-        holding = [k for k in range(len(self.valves)) if self.edges[first + k].held_potential is not None]
+        holding = [
+            k for k in range(len(self.valves)) if self.edges[first + k].held_potential is not None
+        ]
         while holding:
-            open_edges = (edge for edge in self.edges if edge.held_potential is None and not edge.shut)
+            open_edges = (
+                edge for edge in self.edges if edge.held_potential is None and not edge.shut
+            )
             joined = [(edge.i, edge.j) for edge in open_edges if edge.row is not None or edge.drop]
             group = union(len(self.nodes), joined)
             known = {group[i] for i in np.flatnonzero(~np.isnan(self.fixed_potentials)).tolist()}
@@ -208,7 +243,9 @@ class SteadyStart:
                 demand[i] = self.schedule_value(row["schedule"])
             elif i in self.loads:
                 held[i] = self.law.potential_of(self.loads[i], row["elevation"])
-            elif (pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)) is not None:
+            elif (
+                pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)
+            ) is not None:
                 held[i] = self.law.potential_of(pressure, row["elevation"])
         return held, np.zeros_like(demand) if self.rest else demand
 
@@ -229,7 +266,9 @@ class SteadyStart:
         times its loss coefficient in `exit_losses` for the end at which the mass flow M leaves. The drag [kg/s2] is the
         friction of the mass flow, see `kernels.steady_friction.drag`. A stated `initial_flow` is a fixed flow.
         """
-        numbers = tuple(float(row[key]) for key in ("friction", "loss", "rough", "roughness", "reynolds"))
+        numbers = tuple(
+            float(row[key]) for key in ("friction", "loss", "rough", "roughness", "reynolds")
+        )
         least = drag_slope(*numbers, 1e-6 * self.draft.fluid.density * float(row["area"]))
         extra, losses = self.extra.get(name, 0.0), self.exit_losses.get(name, (0.0, 0.0))
         law = law_of(FRICTION, float(length / row["area"]), *numbers, least, extra, *losses)
@@ -309,20 +348,35 @@ class SteadyStart:
             self.draft.fault(place, text)
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
-            free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
-            if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
+            free = (
+                row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
+            )
+            if (
+                free
+                and not self.rest
+                and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE
+            ):
                 a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
                 a, b = (self.case.amount(head, "head", 6) for head in (a, b))
-                self.draft.fault(f"links.{name}", "no steady state: this pipe has no friction, but different heads at "
-                                 f"its ends, {a} and {b}; give it `friction` or `initial_flow`, or use "
-                                 'initial = "rest"')  # fmt: skip
+                self.draft.fault(
+                    f"links.{name}",
+                    "no steady state: this pipe has no friction, but different heads at "
+                    f"its ends, {a} and {b}; give it `friction` or `initial_flow`, or use "
+                    'initial = "rest"',
+                )
         if not self.draft.faults and not self.answer.converged:
             weak = [list(self.case.places)[i] for i in self.answer.undetermined]
-            worst = (f"the equations hardly determine the pressure at {listing(weak, 6)}" if weak else
-                     f"flows balance least at {list(self.case.places)[self.least_balanced()]}")  # fmt: skip
-            self.draft.fault("numerics.initial", f"no steady state was found: {worst}; check "
-                             "there for demands that cannot be supplied, links of extreme resistance, and frictionless "
-                             'paths between unequal heads, or use initial = "rest"')  # fmt: skip
+            worst = (
+                f"the equations hardly determine the pressure at {listing(weak, 6)}"
+                if weak
+                else f"flows balance least at {list(self.case.places)[self.least_balanced()]}"
+            )
+            self.draft.fault(
+                "numerics.initial",
+                f"no steady state was found: {worst}; check "
+                "there for demands that cannot be supplied, links of extreme resistance, and frictionless "
+                'paths between unequal heads, or use initial = "rest"',
+            )
         self.draft.check()
 
     def least_balanced(self) -> int:
@@ -337,42 +391,65 @@ class SteadyStart:
         Friction does not determine the distribution of flow in such loops.
         """
         # fixed nodes count as a single node: paths between them close loops
-        merged = {i: -1 for i, potential in enumerate(self.fixed_potentials) if not np.isnan(potential)}
-        rows = [*zip(self.draft.pipe_names, self.pipes, strict=True),
-                *zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
-        ends = {name: [merged.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")]
-                for name, row in rows if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
+        merged = {
+            i: -1 for i, potential in enumerate(self.fixed_potentials) if not np.isnan(potential)
+        }
+        rows = [
+            *zip(self.draft.pipe_names, self.pipes, strict=True),
+            *zip(self.draft.column_names, self.columns, strict=True),
+        ]
+        ends = {
+            name: [merged.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")]
+            for name, row in rows
+            if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0
+        }
         fixed, free = self.fixed_potentials, [row for row in rows if row[0] in ends]
-        swinging = [name for name, row in free if self.case.links[name].initial_flow is None and
-                    abs(fixed[row["from_node"]] - fixed[row["to_node"]]) > 1e-6 * PRESSURE_SCALE]  # fmt: skip
+        swinging = [
+            name
+            for name, row in free
+            if self.case.links[name].initial_flow is None
+            and abs(fixed[row["from_node"]] - fixed[row["to_node"]]) > 1e-6 * PRESSURE_SCALE
+        ]
         for name in swinging:
             text = f"{name}: without friction between unequal heads no flow is steady"
             text += "; the flow starts from rest, and oscillates or grows"
             self.draft.warnings.append(Notice("start", f"links.{name}", text))
         loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
-        while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
+        # a link to a node that no other link joins is in no loop
+        while self.answer.split and loops != before:
             before, counts = loops, Counter(end for pair in loops.values() for end in pair)
-            loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
+            loops = {
+                name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1
+            }
         weak = [list(self.case.places)[i] for i in self.answer.undetermined] if not loops else []
         if weak:
-            text = (f"{listing(weak, 6)}: the equations hardly determine the pressure here, because links of extreme "
-                    "resistance, or frictionless links alone, join this part; check diameters, lengths and openings of "
-                    "its links")  # fmt: skip
+            text = (
+                f"{listing(weak, 6)}: the equations hardly determine the pressure here, because links of extreme "
+                "resistance, or frictionless links alone, join this part; check diameters, lengths and openings of "
+                "its links"
+            )
             self.draft.warnings.append(Notice("start", f"nodes.{weak[0]}", text))
         elif self.answer.split and (loops or not swinging):
             text = f"{listing(loops) or 'paths'}: flow in loops without friction is not unique"
             text += "; the start has the smallest of these flows (least norm)"
-            self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
+            self.draft.warnings.append(
+                Notice("start", f"links.{next(iter(loops))}" if loops else "links", text)
+            )
 
     def freeze_factors(self) -> None:
         """Set the constant factors of `steady` friction by roughness, from the starting flow.
 
         Without flow at the start the factor is that of fully rough flow, 0 for a smooth wall, and a notice is added.
         """
-        rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
-                *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
+        rows = [
+            *zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
+            *zip(self.draft.column_names, self.columns, self.column_flow, strict=True),
+        ]
         for name, row, flow in rows:
-            if row["friction"] != rec.FRICTION_ROUGH or self.case.links[name].friction.model != "steady":
+            if (
+                row["friction"] != rec.FRICTION_ROUGH
+                or self.case.links[name].friction.model != "steady"
+            ):
                 continue
             reynolds = row["reynolds"] * abs(flow)
             if reynolds > 0.0:
@@ -381,10 +458,14 @@ class SteadyStart:
                 e = row["roughness"]
                 factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
                 text = f"{name}: no flow at the start; its friction factor is that of fully rough flow, {factor:.4g}"
-                self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+                self.draft.warnings.append(
+                    Notice("start", f"links.{name}", text, "friction", factor)
+                )
             if "temperature" in row.dtype.names and row["temperature"] > 0.0:
                 text = f"{name}: its friction keeps the viscosity of the start; quasi-steady friction would follow it"
-                self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+                self.draft.warnings.append(
+                    Notice("start", f"links.{name}", text, "friction", factor)
+                )
                 row["temperature"] = 0.0
             row["loss"] += row["rough"] * factor
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
@@ -393,13 +474,17 @@ class SteadyStart:
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             held = row["kind"] in FIXED_PRESSURE
             own = lowering_of(type(node))
-            row["pressure"] = own.pressure_at_start(self, i, node, row) if held else self.pressure(i)
+            row["pressure"] = (
+                own.pressure_at_start(self, i, node, row) if held else self.pressure(i)
+            )
             if row["kind"] in STORING:
                 row["mass"] = self.law.mass_in(row["pressure"], row["volume"])
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
 
     def pipe_drop(self, row) -> float:
-        return drag(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow")))
+        return drag(
+            *(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
+        )
 
     def fill_pipes(self) -> None:
         """Set the steady pressures along pipes, from a potential that is linear between the ends.
@@ -436,7 +521,10 @@ class SteadyStart:
         """Steady pressure [Pa] and elevation [m] at a fraction of the length of pipe k."""
         row, mesh = self.pipes[k], self.draft.meshes[k]
         z = self.height(row, mesh, fraction)
-        potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
+        potential = (
+            self.answer.potential[row["from_node"]]
+            - row["drag"] / row["area"] * fraction * mesh.length
+        )
         return potential - self.weight * z, z
 
     def fill_columns(self) -> None:
@@ -445,12 +533,16 @@ class SteadyStart:
             row["drag"] = self.pipe_drop(row)
             p = self.answer.potential[[row["from_node"], row["to_node"]]]
             offset = (p[0] - p[1]) - row["drag"] * row["length"] / row["area"]
-            row["offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+            row["offset"] = (
+                offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+            )
 
     def fill_valves(self) -> None:
         for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
             row["flow"] = flow
-            row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            row["drop"] = (
+                self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            )
             size = PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
             if flow == 0.0 and abs(row["drop"]) <= ROUNDING_SHARE * size:
                 row["drop"] = 0.0
@@ -506,20 +598,28 @@ class SteadyStart:
         for row in self.leaks:
             net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
         self.use_start_flows(net)
-        for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
+        for (name, node), row, inflow in zip(
+            self.case.places.items(), self.nodes, net, strict=True
+        ):
             name = name.removesuffix(".inside")
             if inflow != 0.0:
                 own = lowering_of(type(node))
-                text = own.motion_text(name, node, row, inflow, inflow / fluid.density, self.case.amount)
+                text = own.motion_text(
+                    name, node, row, inflow, inflow / fluid.density, self.case.amount
+                )
                 moving += [text] if text else []
         amount = self.case.amount
         for name, pressure in self.unbalanced_drops.items():
             drop = amount(pressure, "pressure", span=True)
-            moving.append(f"pipe {name}: a pressure difference of {drop}, not balanced by friction, drives its flow")
+            moving.append(
+                f"pipe {name}: a pressure difference of {drop}, not balanced by friction, drives its flow"
+            )
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 drop = amount(row["offset"], "pressure", span=True)
-                moving.append(f"rigid column {name}: an unbalanced pressure of {drop} drives its flow")
+                moving.append(
+                    f"rigid column {name}: an unbalanced pressure of {drop} drives its flow"
+                )
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             still = row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0
             if still and self.conductance(k) > 0.0:
@@ -527,5 +627,7 @@ class SteadyStart:
                 moving.append(f"valve {name}: open with {drop} across it; a flow starts")
         if self.case.numerics.initial == "equilibrium":
             for text in moving:
-                self.draft.fault("numerics.initial", f'"equilibrium" expects that nothing moves, but {text}')
+                self.draft.fault(
+                    "numerics.initial", f'"equilibrium" expects that nothing moves, but {text}'
+                )
         return {"moving": moving}

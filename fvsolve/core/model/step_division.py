@@ -23,5 +23,9 @@ def step_at_start(model) -> float:
     numerics, step = model.case.numerics, model.case.numerics.step
     explicit = method_named(automatic.first_method(numerics.method)).explicit
     least = dividing_rate(model, step) if explicit else 0.0
-    rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE]) if least > 0.0 else 0.0
+    rate = (
+        float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
+        if least > 0.0
+        else 0.0
+    )
     return DIVIDED_FRACTION / rate if rate > least > 0.0 else step

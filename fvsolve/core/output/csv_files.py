@@ -13,9 +13,16 @@ from fvsolve.errors import RunError
 from fvsolve.file_replacement import replacing, write_file
 
 ENVELOPE_QUANTITIES = {
-    "distance": "length", "elevation": "head", "initial_head": "head", "min_pressure": "pressure", "t_min": "time",
-    "max_pressure": "pressure", "t_max": "time", "min_head": "head", "max_head": "head",
-}  # fmt: skip
+    "distance": "length",
+    "elevation": "head",
+    "initial_head": "head",
+    "min_pressure": "pressure",
+    "t_min": "time",
+    "max_pressure": "pressure",
+    "t_max": "time",
+    "min_head": "head",
+    "max_head": "head",
+}
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
 BLOCK, LONGEST_LINE = 2**20, 2**24  # bytes that are read at once, and greatest length of a row
 LATEST = 1e100  # limit of times, in any unit
@@ -45,7 +52,9 @@ class HistoryFile:
             raise RunError(f"{self.path} {text}")
         lines, last = lines_of(self.path, size)
         if lines != rows + 1 or (rows and not is_row_until(last, self.time, t)):
-            text = f"its rows do not fit the checkpoint ({rows} rows up to t = {t:.6g} s in {size} B)"
+            text = (
+                f"its rows do not fit the checkpoint ({rows} rows up to t = {t:.6g} s in {size} B)"
+            )
             raise RunError(f"{self.path}: {text}; start the run again with --force")
 
     def continue_from(self, rows: int, size: int) -> None:
@@ -107,7 +116,9 @@ def read_headers(path: Path) -> list[tuple[str, str]]:
         with open(path, encoding="utf-8", newline="") as file:
             return [split_header(header) for header in next(csv.reader(file), [])]
     except OSError as error:
-        raise RunError(f"{path}: {error.strerror}; expected a run directory with this file") from None
+        raise RunError(
+            f"{path}: {error.strerror}; expected a run directory with this file"
+        ) from None
     except (ValueError, csv.Error) as error:
         text = f"its header is damaged ({error}); run again with --force"
         raise RunError(f"{path} cannot be read: {text}") from None
@@ -131,7 +142,9 @@ def read_table(path: Path) -> np.ndarray:
         text = f"rows have {table.shape[1]} numbers, the header has {names} columns; run again with --force"
         raise RunError(f"{path} cannot be read: {text}")
     if table.size and not (np.diff(table[:, 0], prepend=-LATEST, append=LATEST) >= 0.0).all():
-        raise RunError(f"{path} cannot be read: its times are not numbers in rising order; run again with --force")
+        raise RunError(
+            f"{path} cannot be read: its times are not numbers in rising order; run again with --force"
+        )
     return table if table.size else np.empty((0, names))
 
 
@@ -161,7 +174,10 @@ def with_initial_heads(summary, model) -> dict:
     """
     envelopes = {}
     for k, pipe in enumerate(model.pipes):
-        cells = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
+        cells = {
+            **summary.envelope[pipe.name],
+            "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells)),
+        }
         arrays = with_points(summary, pipe.name, cells)
         arrays["initial_head"] = model.head(arrays.pop("initial_pressure"), arrays["elevation"])
         envelopes[pipe.name] = arrays
@@ -171,8 +187,13 @@ def with_initial_heads(summary, model) -> dict:
 def envelope_in_units(envelope: dict, case) -> dict:
     """Convert an envelope from SI to the units of envelope.csv."""
     columns = envelope_columns(case)
-    return {pipe: {col.name: np.asarray(col.from_si(np.asarray(arrays[col.name], float))) for col in columns}
-            for pipe, arrays in envelope.items()}  # fmt: skip
+    return {
+        pipe: {
+            col.name: np.asarray(col.from_si(np.asarray(arrays[col.name], float)))
+            for col in columns
+        }
+        for pipe, arrays in envelope.items()
+    }
 
 
 def write_envelope(path: Path, envelope: dict, case) -> None:
@@ -198,10 +219,19 @@ def read_envelope(path: Path) -> dict:
             names = [split_header(header)[0] for header in next(rows, [])]
             for row in rows:
                 pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
-        tables = {pipe: dict(zip(names[1:], np.array(values).T, strict=True)) for pipe, values in pipes.items()}
+        tables = {
+            pipe: dict(zip(names[1:], np.array(values).T, strict=True))
+            for pipe, values in pipes.items()
+        }
         for pipe, arrays in tables.items():
-            if not all(np.isfinite(arrays[name]).all() for name in ("distance", "elevation") if name in arrays):
-                raise ValueError(f"a distance or an elevation of {pipe} is not finite; run again with --force")
+            if not all(
+                np.isfinite(arrays[name]).all()
+                for name in ("distance", "elevation")
+                if name in arrays
+            ):
+                raise ValueError(
+                    f"a distance or an elevation of {pipe} is not finite; run again with --force"
+                )
         return tables
     except (OSError, ValueError, IndexError, csv.Error) as error:
         raise RunError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
@@ -213,7 +243,10 @@ def route_envelopes(envelope: dict, case) -> dict[str, dict[str, Any]]:
     envelope : pipe -> quantity -> float64[cells]; both it and the result are in the units of envelope.csv
     """
     distances = column("distance", "length", case)
-    return {name: joined_envelopes(envelope, legs(route, case.links), distances) for name, route in case.routes.items()}
+    return {
+        name: joined_envelopes(envelope, legs(route, case.links), distances)
+        for name, route in case.routes.items()
+    }
 
 
 def joined_envelopes(envelope: dict, route, distances) -> dict[str, Any]:
@@ -225,7 +258,9 @@ def joined_envelopes(envelope: dict, route, distances) -> dict[str, Any]:
     for leg in route:
         turn = slice(None, None, -1) if leg.backwards else slice(None)
         pipe = {key: np.asarray(values)[turn] for key, values in envelope[leg.pipe].items()}
-        arrays["chainage"].append(distances.from_si(leg.chainage(distances.to_si(pipe["distance"]))))
+        arrays["chainage"].append(
+            distances.from_si(leg.chainage(distances.to_si(pipe["distance"])))
+        )
         arrays["pipe"].append(np.full(pipe["distance"].size, leg.pipe))
         for key, values in pipe.items():
             arrays.setdefault(key, []).append(values)
@@ -235,13 +270,20 @@ def joined_envelopes(envelope: dict, route, distances) -> dict[str, Any]:
 def write_routes(path: Path, envelope: dict, case) -> None:
     """Write routes.csv with a row for each cell along each route. envelope : in the units of envelope.csv"""
     columns = envelope_columns(case)
-    headers = ["route", column("chainage", "length", case).header, "pipe", *(item.header for item in columns)]
+    headers = [
+        "route",
+        column("chainage", "length", case).header,
+        "pipe",
+        *(item.header for item in columns),
+    ]
     with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(headers)
         for name, item in route_envelopes(envelope, case).items():
             values = zip(*(item[key.name].tolist() for key in columns), strict=True)
-            for chainage, pipe, row in zip(item["chainage"].tolist(), item["pipe"].tolist(), values, strict=True):
+            for chainage, pipe, row in zip(
+                item["chainage"].tolist(), item["pipe"].tolist(), values, strict=True
+            ):
                 table.writerow([name, repr(chainage), pipe, *map(repr, row)])
 
 
@@ -251,8 +293,10 @@ class LineSeries:
     def __init__(self, folder: Path, model):
         self.folder = folder / "lines"
         basins = {basin.name: basin for basin in model.meshed}
-        self.lines = {name: LineSampler(line, basins[line.basin], model.case)
-                      for name, line in model.case.output.lines.items()}  # fmt: skip
+        self.lines = {
+            name: LineSampler(line, basins[line.basin], model.case)
+            for name, line in model.case.output.lines.items()
+        }
 
     def start(self) -> None:
         """Create the folder of the files of a new run."""
@@ -265,7 +309,9 @@ class LineSeries:
         """
         for name in self.lines:
             if frames and not self.path(name, frames - 1).is_file():
-                raise RunError(f"{self.folder}: frames of {name} are missing; start the run again with --force")
+                raise RunError(
+                    f"{self.folder}: frames of {name} are missing; start the run again with --force"
+                )
         self.folder.mkdir(exist_ok=True)
         clear_lines(self.folder.parent, frames)
 
@@ -291,27 +337,43 @@ class LineSampler:
         start, end = np.array(line.from_), np.array(line.to)
         points = start + share[:, None] * (end - start)
         self.places = np.column_stack([share * np.hypot(*(end - start)), points])
-        read = [basin.points.cell_weights(*p) if basin.points.cell(*p) >= 0 else (np.zeros(0, int), np.zeros(0))
-                for p in points]  # fmt: skip
+        read = [
+            basin.points.cell_weights(*p)
+            if basin.points.cell(*p) >= 0
+            else (np.zeros(0, int), np.zeros(0))
+            for p in points
+        ]
         self.cells, self.weights = (np.concatenate([sample[k] for sample in read]) for k in (0, 1))
         self.row = np.repeat(np.arange(line.points), [sample[0].size for sample in read])
         self.in_hole = np.array([sample[0].size == 0 for sample in read])
-        self.columns = [column("distance", "length", case), *(column(name, "position", case) for name in ("x", "y"))]
+        self.columns = [
+            column("distance", "length", case),
+            *(column(name, "position", case) for name in ("x", "y")),
+        ]
         self.columns += [column(name, dimension, case) for name, dimension in fields.items()]
-        labels = {name: scalar.unit for name, scalar in case.scalars.items()} if basin.scalars else {}
+        labels = (
+            {name: scalar.unit for name, scalar in case.scalars.items()} if basin.scalars else {}
+        )
         self.columns += [column(name, "number", case, label) for name, label in labels.items()]
 
     def text(self, fields: dict[str, np.ndarray]) -> str:
         """CSV text of a frame: a row of position and fields for each point. fields : name -> values of cells in SI"""
-        values = np.column_stack([self.places, *(self.along(column.name, fields) for column in self.columns[3:])])
+        values = np.column_stack(
+            [self.places, *(self.along(column.name, fields) for column in self.columns[3:])]
+        )
         rows = [",".join(map(repr, row)) for row in to_column_units(self.columns, values).tolist()]
-        return "\n".join([",".join(csv_quoted(column.header) for column in self.columns), *rows]) + "\n"
+        return (
+            "\n".join([",".join(csv_quoted(column.header) for column in self.columns), *rows])
+            + "\n"
+        )
 
     def along(self, name: str, fields: dict[str, np.ndarray]) -> np.ndarray:
         """Values of a field at the points of the line, NaN in holes : float64[points]."""
         if name == "speed":
             return np.hypot(self.along("u", fields), self.along("v", fields))
-        cells = fields["velocity"][:, VELOCITY_AXES[name]] if name in VELOCITY_AXES else fields[name]
+        cells = (
+            fields["velocity"][:, VELOCITY_AXES[name]] if name in VELOCITY_AXES else fields[name]
+        )
         values = np.bincount(self.row, self.weights * cells[self.cells], self.in_hole.size)
         return np.where(self.in_hole, np.nan, values)
 

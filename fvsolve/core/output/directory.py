@@ -51,13 +51,19 @@ def lock_folder(folder: Path, writer: str) -> FileLock:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(folder / LOCK_FILE, blocking=False, thread_local=False, fallback_to_soft=False)
+        lock = FileLock(
+            folder / LOCK_FILE, blocking=False, thread_local=False, fallback_to_soft=False
+        )
         lock.acquire()
     except Timeout:
-        raise RunError(f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
-                       "another directory with --out DIR") from None  # fmt: skip
+        raise RunError(
+            f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
+            "another directory with --out DIR"
+        ) from None
     except NotImplementedError:
-        raise RunError(f"{folder} is on a file system without locks; choose another directory with --out DIR") from None
+        raise RunError(
+            f"{folder} is on a file system without locks; choose another directory with --out DIR"
+        ) from None
     except OSError as error:
         text = f"{folder}: cannot be written: {error.strerror or error}"
         raise RunError(f"{text}; choose another directory with --out DIR") from None
@@ -83,15 +89,24 @@ class RunDirectory:
         self.folder = Path(folder)
         self.model = model
         if force and resume:
-            raise RunError("--resume continues a run and --force starts it again; state only one of them")
+            raise RunError(
+                "--resume continues a run and --force starts it again; state only one of them"
+            )
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
-        self.history = csv_files.HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
-        drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.meshed) + len(frames_of(model)) > 0
+        self.history = csv_files.HistoryFile(
+            self.folder / "history.csv", time_column(model.case), probe_columns(model)
+        )
+        drawn = (
+            model.case.output.fields > 0
+            and len(model.pipes) + len(model.meshed) + len(frames_of(model)) > 0
+        )
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = csv_files.LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
-            raise RunError(f"{self.folder} is a file; expected a directory; choose another directory with --out DIR")
+            raise RunError(
+                f"{self.folder} is a file; expected a directory; choose another directory with --out DIR"
+            )
         self.lock = lock_folder(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
@@ -113,7 +128,11 @@ class RunDirectory:
         if self.restart is None or not (self.folder / SUMMARY_FILE).is_file():
             return False
         summary = read_summary(self.folder / SUMMARY_FILE)
-        ended = summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
+        ended = (
+            summary["ok"]
+            and summary["versions"] == self.identity
+            and summary["t"] >= self.model.case.numerics.end
+        )
         if ended and (changes := other_steps(self.restart, self.model.case)):
             text = f"{self.folder} holds the finished run, so nothing can be continued with {value_text(changes)}"
             raise RunError(f"{text}; replace it with --force, or keep both runs with --out DIR")
@@ -129,10 +148,19 @@ class RunDirectory:
         if restart is not None:
             self.history.refuse_unfit(restart.rows, restart.history_bytes, restart.t)
             entries = self.fields.entries_until(restart.frames, restart.t) if self.fields else []
-        for path in (self.folder / SUMMARY_FILE, *picture_paths(self.folder), *maxima_paths(self.folder)):
+        for path in (
+            self.folder / SUMMARY_FILE,
+            *picture_paths(self.folder),
+            *maxima_paths(self.folder),
+        ):
             path.unlink(missing_ok=True)
         clear_reports(self.folder)
-        for folder in (self.folder, self.folder / "fields", self.folder / "lines", self.folder / "grids"):
+        for folder in (
+            self.folder,
+            self.folder / "fields",
+            self.folder / "lines",
+            self.folder / "grids",
+        ):
             remove_unfinished(folder)
         if restart is None:
             clear_run_files(self.folder)
@@ -179,7 +207,9 @@ class RunDirectory:
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
             steps = self.model.case.step_keys, self.continued
-            restart = Restart(state.t, state.y, state.memory, self.history.rows, size, frames, *steps)
+            restart = Restart(
+                state.t, state.y, state.memory, self.history.rows, size, frames, *steps
+            )
             write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:
@@ -219,9 +249,11 @@ class RunDirectory:
             yield
         except OSError as error:
             path = error.filename or self.folder
-            raise RunError(f"{path}: cannot be written: {error.strerror or error}. Free disk space, or "
-                           "correct the access rights, and continue with --resume, or choose another directory "
-                           "with --out DIR") from None  # fmt: skip
+            raise RunError(
+                f"{path}: cannot be written: {error.strerror or error}. Free disk space, or "
+                "correct the access rights, and continue with --resume, or choose another directory "
+                "with --out DIR"
+            ) from None
 
     def table(self):
         """Contents of history.csv : float64[rows, 1 + probes], time and probes in the units of the file."""
@@ -241,7 +273,11 @@ class RunDirectory:
         names = [*RUN_FILES, *self.model.case.copies]
         existing = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
         return sorted(
-            [*existing, *(path.relative_to(self.folder).as_posix() for path in maxima_paths(self.folder)), SUMMARY_FILE]
+            [
+                *existing,
+                *(path.relative_to(self.folder).as_posix() for path in maxima_paths(self.folder)),
+                SUMMARY_FILE,
+            ]
         )
 
     def _checkpoint(self) -> Restart | None:
@@ -254,17 +290,23 @@ class RunDirectory:
                 f"{error}{': ' if found else ''}{found}. A continued run may change end (which also changes the "
                 f"default of output.every), {', '.join(STEP_KEYS)} of [numerics], title, expectations and comparisons"
             )
-            raise RunError(f"{text}; start again with --force, or keep both runs with --out DIR") from None
+            raise RunError(
+                f"{text}; start again with --force, or keep both runs with --out DIR"
+            ) from None
         if restart and restart.y.size != self.model.y_size:
-            raise RunError(f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
-                           "again with --force")  # fmt: skip
+            raise RunError(
+                f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
+                "again with --force"
+            )
         if restart and not self.model.case.numerics.start <= restart.t:
             text = f"is at t = {restart.t:.6g} s, before numerics.start"
             raise RunError(f"{path} {text}; start the run again with --force")
         if restart and (text := count_fault(restart, self.fields is not None)):
             raise RunError(f"{path}: {text}; start the run again with --force")
         if restart and restart.t > self.model.case.numerics.end:
-            raise RunError(f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force")
+            raise RunError(
+                f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force"
+            )
         return restart
 
     def _write_case(self) -> None:
@@ -285,7 +327,11 @@ def count_fault(restart: Restart, has_frames: bool) -> str:
     has_frames : True if the run writes frames
     """
     record = restart.memory.get("state")
-    if record is None or record.size != 1 or not {"next_output", "next_field"} <= {*(record.dtype.names or ())}:
+    if (
+        record is None
+        or record.size != 1
+        or not {"next_output", "next_field"} <= {*(record.dtype.names or ())}
+    ):
         return ""
     due = record.reshape(-1)[0]
     if not restart.rows >= due["next_output"]:  # each output has a row, a jump has more
@@ -302,25 +348,41 @@ def change_text(change: dict) -> str:
 
 def value_text(changes: dict[str, list]) -> str:
     """Text of keys with their values before and after a change."""
-    texts = {key: [show(x) if x is not None else "not stated" for x in values] for key, values in changes.items()}
-    return ", ".join(f"{key} = {after} (before: {before})" for key, (before, after) in texts.items())
+    texts = {
+        key: [show(x) if x is not None else "not stated" for x in values]
+        for key, values in changes.items()
+    }
+    return ", ".join(
+        f"{key} = {after} (before: {before})" for key, (before, after) in texts.items()
+    )
 
 
 def _differences(path: Path, case) -> list[str]:
     """Texts of keys that differ between a file case.toml and a case; empty if the file cannot be read."""
     try:
-        tables = [tomllib.loads(text) for text in (path.read_text(encoding="utf-8"), case.resolved())]
+        tables = [
+            tomllib.loads(text) for text in (path.read_text(encoding="utf-8"), case.resolved())
+        ]
     except (OSError, ValueError):
         return []
     before, after = (dict(_leaves(table)) for table in tables)
     keys = [key for key in before | after if before.get(key) != after.get(key)]
-    keys = [key for key in keys if key.partition(".")[0] not in REPORT_KEYS and key != "numerics.end"]
-    return [f"{key} {show(before.get(key, 'not stated'))} (now {show(after.get(key, 'not stated'))})" for key in keys]
+    keys = [
+        key for key in keys if key.partition(".")[0] not in REPORT_KEYS and key != "numerics.end"
+    ]
+    return [
+        f"{key} {show(before.get(key, 'not stated'))} (now {show(after.get(key, 'not stated'))})"
+        for key in keys
+    ]
 
 
 def _leaves(table: dict, head: str = "") -> Iterator[tuple[str, object]]:
     for key, value in table.items():
-        yield from _leaves(value, f"{head}{key}.") if isinstance(value, dict) else [(f"{head}{key}", value)]
+        yield from (
+            _leaves(value, f"{head}{key}.")
+            if isinstance(value, dict)
+            else [(f"{head}{key}", value)]
+        )
 
 
 def read_directory(folder: Path) -> tuple:
@@ -331,7 +393,13 @@ def read_directory(folder: Path) -> tuple:
     summary = read_summary(folder / SUMMARY_FILE)
     envelope = folder / "envelope.csv"
     read = (lambda: read_envelope(envelope)) if envelope.name in summary["files"] else dict
-    return summary, lambda: read_table(folder / "history.csv"), read, folder, lambda: maxima_in(folder)
+    return (
+        summary,
+        lambda: read_table(folder / "history.csv"),
+        read,
+        folder,
+        lambda: maxima_in(folder),
+    )
 
 
 def clear_run_files(folder: Path) -> None:
@@ -367,7 +435,9 @@ def _refuse_full_disk(folder: Path, case) -> None:
     least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
         text = f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free"
-        raise RunError(f"{text}; expected a longer interval `output.every`, or another directory with --out DIR")
+        raise RunError(
+            f"{text}; expected a longer interval `output.every`, or another directory with --out DIR"
+        )
 
 
 def picture_paths(folder: Path) -> list[Path]:
@@ -387,7 +457,9 @@ def maxima_in(folder: Path) -> dict:
 
 def maxima_paths(folder: Path) -> list[Path]:
     """Paths of the existing files of greatest values in basins, run-ups and grids, in a run directory."""
-    return sorted([*folder.glob(MAXIMA_FILES), *folder.glob(RUN_UP_FILES), *folder.glob(GRID_FILES)])
+    return sorted(
+        [*folder.glob(MAXIMA_FILES), *folder.glob(RUN_UP_FILES), *folder.glob(GRID_FILES)]
+    )
 
 
 def existing_pictures(folder: Path) -> list[str]:
@@ -397,7 +469,9 @@ def existing_pictures(folder: Path) -> list[str]:
 
 def _refuse_existing_run(folder: Path) -> None:
     if (folder / SUMMARY_FILE).exists():
-        raise RunError(f"{folder} holds a run; replace it with --force, or keep it and choose another --out DIR")
+        raise RunError(
+            f"{folder} holds a run; replace it with --force, or keep it and choose another --out DIR"
+        )
     if (folder / "restart.npz").exists():
         text = f"{folder} holds an unfinished run; continue it with --resume, start it again with --force"
         raise RunError(f"{text}, or choose another directory with --out DIR")

@@ -20,8 +20,13 @@ from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 
 FIELD_UNITS = {
-    "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
-}  # fmt: skip
+    "pressure": "Pa",
+    "head": "m",
+    "velocity": "m/s",
+    "flow": "m3/s",
+    "min_pressure": "Pa",
+    "max_pressure": "Pa",
+}
 UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
 VTK_TYPES = {"f": "Float", "i": "Int", "u": "UInt"}
 CELL_TYPES = {"line": 3, "triangle": 5, "quad": 9}  # type -> its number in VTK
@@ -52,24 +57,32 @@ class FieldSeries:
     def __init__(self, folder: Path, model):
         self.folder, self.model, self.pieces = folder, model, None
         self.frames = 0
-        self.fixed_grids: dict[str, str] = {}  # file name of a part -> `grid_xml` of points that do not move
+        # file name of a part -> `grid_xml` of points that do not move
+        self.fixed_grids: dict[str, str] = {}
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.meshed}
         if model.pipes:
             from fvsolve.core.output import network_layout
 
-            places = network_layout.plan_positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
+            places = network_layout.plan_positions(
+                model.case, {pipe.name: pipe.length for pipe in model.pipes}
+            )
             self.points, self.lines = pipe_geometry(model, places)
             self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.meshed if basin.part.on is not None}
         self.places = places | moving  # a basin on a body is drawn in world axes
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
-        units = {basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
-                 for basin in model.meshed}  # fmt: skip
+        units = {
+            basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
+            for basin in model.meshed
+        }
         self.meshes = {
-            basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name]) for basin in model.meshed
+            basin.name: (*basin_geometry(basin, self.places[basin.name]), units[basin.name])
+            for basin in model.meshed
         }
         self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
-        self.drawn = next((own for feature in model.features if (own := feature.drawn(model)) is not None), None)
+        self.drawn = next(
+            (own for feature in model.features if (own := feature.drawn(model)) is not None), None
+        )
         self.pipes = [pipe.name for pipe in model.pipes]
         self.units = FIELD_UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
@@ -90,7 +103,9 @@ class FieldSeries:
         n = frames * (len(self.meshes) + (1 if self.pipes else 0) + (1 if self.drawn else 0))
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
         matches = [FILE_ATTRIBUTE.search(line) for line in entries]
-        if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
+        if len(entries) < n or not all(
+            match and (self.folder / match[1]).is_file() for match in matches
+        ):
             raise RunError(f"{index}: frames are missing; start the run again with --force")
         time = TIME_ATTRIBUTE.search(entries[-1]) if entries else None
         if entries and not (time and float(time[1]) <= t + 1e-9 * abs(t)):
@@ -116,13 +131,19 @@ class FieldSeries:
         for part, basin in enumerate(self.model.meshed, 1):
             self._write_basin(t, part, basin, frame)
         if self.drawn:
-            file, (points, speed) = f"fields/{self.drawn.name}-{self.frames:06d}.vtu", self.drawn.at(frame["out"])
+            file, (points, speed) = (
+                f"fields/{self.drawn.name}-{self.frames:06d}.vtu",
+                self.drawn.at(frame["out"]),
+            )
             blocks, grid = {**self.drawn.blocks, "speed": [speed]}, [("line", self.drawn.lines)]
             write_frame(self.folder / file, grid_xml(points, grid), blocks, {"speed": "m/s"})
             self._add_to_collection(t, len(self.meshes) + 1, file)
         if self.pipes:
             file = f"fields/{self.frames:06d}.vtu"
-            data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
+            data = {
+                name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])]
+                for name in self.units
+            }
             data["pipe"] = [self.pipe]
             points = self.points_at(frame)
             grid = self.grid("", points, [("line", self.lines)], points is self.points)
@@ -141,10 +162,13 @@ class FieldSeries:
             if basin.part.on is not None:
                 values = values | basin.vectors_at(values, frame["out"], self.model.layout)
             blocks = {key: split_blocks(value, cells) for key, value in values.items()}
-            moves = basin.name in frame["points"]  # moving meshes have points of their own at each time
+            # moving meshes have points of their own at each time
+            moves = basin.name in frame["points"]
             if moves:
                 points = np.append(self.places[basin.name], 0.0) + frame["points"][basin.name]
-            write_frame(self.folder / file, self.grid(basin.name, points, cells, not moves), blocks, units)
+            write_frame(
+                self.folder / file, self.grid(basin.name, points, cells, not moves), blocks, units
+            )
         self._add_to_collection(t, part, file)
 
     def grid(self, part: str, points: np.ndarray, cells: list, fixed: bool) -> str:
@@ -176,7 +200,10 @@ def write_frame(path: Path, grid: str, data: dict[str, list], units: dict[str, s
 
     grid : result of `grid_xml`; data : name -> list of arrays, one for each block of cells; units : name -> unit
     """
-    arrays = ((name, np.concatenate([np.asarray(block) for block in blocks])) for name, blocks in data.items())
+    arrays = (
+        (name, np.concatenate([np.asarray(block) for block in blocks]))
+        for name, blocks in data.items()
+    )
     text = "".join(array_xml(name, values, units) for name, values in arrays)
     write_file(path, f"{grid}<CellData>\n{text}</CellData>\n{VTU_TAIL}")
 
@@ -188,8 +215,11 @@ def reference_xml(basin) -> str:
         return ""
     arrays = [("Float64", "origin", part.origin or (0.0, 0.0))]
     arrays += [("Int32", "epsg", (int(part.crs.removeprefix("EPSG:")),))] if part.crs else []
-    text = "".join(f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
-                   f"{' '.join(map(repr, values))}</DataArray>\n" for kind, name, values in arrays)  # fmt: skip
+    text = "".join(
+        f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
+        f"{' '.join(map(repr, values))}</DataArray>\n"
+        for kind, name, values in arrays
+    )
     return f"<FieldData>\n{text}</FieldData>\n"
 
 
@@ -200,13 +230,20 @@ def grid_xml(points: np.ndarray, cells: list, reference: str = "") -> str:
     reference : result of `reference_xml`
     """
     corners = [np.asarray(block, dtype=np.int64) for _, block in cells]
-    ends = np.cumsum(np.concatenate([np.full(len(block), block.shape[1], dtype=np.int64) for block in corners]))
-    types = np.concatenate([np.full(len(block), CELL_TYPES[kind], dtype=np.int32) for kind, block in cells])
+    ends = np.cumsum(
+        np.concatenate([np.full(len(block), block.shape[1], dtype=np.int64) for block in corners])
+    )
+    types = np.concatenate(
+        [np.full(len(block), CELL_TYPES[kind], dtype=np.int32) for kind, block in cells]
+    )
     groups = {
         "Points": [("Points", np.asarray(points, dtype=float))],
-        "Cells": [("connectivity", np.concatenate([block.ravel() for block in corners])), ("offsets", ends),
-                  ("types", types)],
-    }  # fmt: skip
+        "Cells": [
+            ("connectivity", np.concatenate([block.ravel() for block in corners])),
+            ("offsets", ends),
+            ("types", types),
+        ],
+    }
     text = VTU_HEAD.format(points=len(points), cells=len(types), reference=reference)
     for group, arrays in groups.items():
         text += f"<{group}>\n{''.join(array_xml(name, values, {}) for name, values in arrays)}</{group}>\n"
@@ -220,7 +257,9 @@ def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
     """
     values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
     block = compressed(values.tobytes())
-    sizes = np.array([1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u8").tobytes()
+    sizes = np.array(
+        [1, values.nbytes, 0, len(block)] if values.nbytes else [0, 0, 0], dtype="<u8"
+    ).tobytes()
     content = base64.b64encode(sizes) + base64.b64encode(block if values.nbytes else b"")
     kind = f"{VTK_TYPES[values.dtype.kind]}{8 * values.itemsize}"
     shape = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
@@ -231,7 +270,9 @@ def array_xml(name: str, values: np.ndarray, units: dict[str, str]) -> str:
 def compressed(data: bytes) -> bytes:
     """Data compressed by zlib, with buffers no larger than the data need: clearing those of 268 kB takes longer."""
     window = min(max(len(data).bit_length(), MIN_WINDOW), zlib.MAX_WBITS)
-    stream = zlib.compressobj(ZLIB_LEVEL, zlib.DEFLATED, window, min(window - 6, zlib.DEF_MEM_LEVEL))
+    stream = zlib.compressobj(
+        ZLIB_LEVEL, zlib.DEFLATED, window, min(window - 6, zlib.DEF_MEM_LEVEL)
+    )
     return stream.compress(data) + stream.flush()
 
 
@@ -295,7 +336,9 @@ def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
         owner[inner], at = body(pipe.from_), inner.stop
         if body(pipe.from_) >= 0:
             first, last = np.array(places[pipe.from_].place), np.array(places[pipe.to].place)
-            points[inner] = first + np.asarray(pipe.edges[1:-1])[:, None] / pipe.length * (last - first)
+            points[inner] = first + np.asarray(pipe.edges[1:-1])[:, None] / pipe.length * (
+                last - first
+            )
     return owner
 
 
@@ -327,12 +370,17 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
 
     try:
         root = ElementTree.parse(path).getroot()
-        return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in root.iter("DataSet")]
+        return [
+            (float(entry.attrib["timestep"]), path.parent / entry.attrib["file"])
+            for entry in root.iter("DataSet")
+        ]
     except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 
 
-def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def read_pipe_lines(
+    path: Path, quantity: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Read the pipes of a .vtu file: points [m], lines, values of a quantity in SI, number of the pipe of each line.
 
     Returns float64[p, 3], int[c, 2], float64[c] and int[c]. Raises RunError if the file cannot be read.
@@ -358,7 +406,9 @@ class ParallelBasinWriter:
     def __init__(self, comm, rows: dict[str, np.ndarray]) -> None:
         self.comm, self.rows = comm, rows
 
-    def write(self, path: Path, basin, origin: np.ndarray, values: dict[str, np.ndarray], units: dict) -> None:
+    def write(
+        self, path: Path, basin, origin: np.ndarray, values: dict[str, np.ndarray], units: dict
+    ) -> None:
         """Write the fields of a basin at one time; raises OSError if a rank cannot write its file.
 
         origin : plan shift of the basin [m]; values : quantity -> values of all cells; units : quantity -> unit
@@ -370,20 +420,29 @@ class ParallelBasinWriter:
             for item in values.values():
                 comm.Send(np.ascontiguousarray(item[rank_cells(basin, rows, k)]), k)
         own = {key: item[rank_cells(basin, rows, 0)] for key, item in values.items()}
-        faults = [item for item in comm.gather(write_piece(path, basin, origin, rows, 0, own, units)) if item]
+        faults = [
+            item
+            for item in comm.gather(write_piece(path, basin, origin, rows, 0, own, units))
+            if item
+        ]
         if faults:
             raise OSError(*faults[0])
         write_file(path, pvtu_text(path, comm.size, values, units))
 
 
-def write_piece_of_rank(comm, model, path: str, name: str, rows, origin, layouts: dict, units: dict) -> None:
+def write_piece_of_rank(
+    comm, model, path: str, name: str, rows, origin, layouts: dict, units: dict
+) -> None:
     """Receive the values of the cells of this rank, write its file, and send an error, if any, to rank 0.
 
     layouts : quantity -> (shape of the value of a cell, dtype); other arguments as in `write_piece`
     """
     basin = next(item for item in model.meshed if item.name == name)
     n = rows[comm.rank + 1] - rows[comm.rank]
-    values = {key: np.empty((n * basin.mesh.grid.nx, *shape), kind) for key, (shape, kind) in layouts.items()}
+    values = {
+        key: np.empty((n * basin.mesh.grid.nx, *shape), kind)
+        for key, (shape, kind) in layouts.items()
+    }
     for item in values.values():
         comm.Recv(item, 0)
     comm.gather(write_piece(Path(path), basin, origin, rows, comm.rank, values, units))
@@ -425,12 +484,21 @@ def pvtu_text(path: Path, n: int, values: dict[str, np.ndarray], units: dict[str
         f'<PDataArray type="{VTK_TYPES[array.dtype.kind]}{8 * array.dtype.itemsize}" Name="{key}" '
         f'NumberOfComponents="{array[:1].size}">\n{unit_xml(units, key)}</PDataArray>'
         for key, array in values.items()
-    ]  # fmt: skip
+    ]
     pieces = [f'<Piece Source="{piece_path(path, k).name}"/>' for k in range(n)]
-    points = '<PPoints>\n<PDataArray type="Float64" Name="Points" NumberOfComponents="3"/>\n</PPoints>'
+    points = (
+        '<PPoints>\n<PDataArray type="Float64" Name="Points" NumberOfComponents="3"/>\n</PPoints>'
+    )
     lines = [
-        '<?xml version="1.0"?>', '<VTKFile type="PUnstructuredGrid" version="0.1" byte_order="LittleEndian">',
-        '<PUnstructuredGrid GhostLevel="0">', points, "<PCellData>", *arrays, "</PCellData>", *pieces,
-        "</PUnstructuredGrid>", "</VTKFile>",
-    ]  # fmt: skip
+        '<?xml version="1.0"?>',
+        '<VTKFile type="PUnstructuredGrid" version="0.1" byte_order="LittleEndian">',
+        '<PUnstructuredGrid GhostLevel="0">',
+        points,
+        "<PCellData>",
+        *arrays,
+        "</PCellData>",
+        *pieces,
+        "</PUnstructuredGrid>",
+        "</VTKFile>",
+    ]
     return "\n".join(lines) + "\n"

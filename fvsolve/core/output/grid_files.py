@@ -16,21 +16,27 @@ from fvsolve.units import DIMENSIONS
 SOURCE = FILE_ATTRIBUTE.pattern.replace("file", "Source")
 NEAR = 1e-12  # of the size of a cell squared: twice the area by which a point may lie outside
 MERCATOR = {  # parameter of Transverse_Mercator in the text of a CRS -> its name in CF-1.8
-    "latitude_of_origin": "latitude_of_projection_origin", "central_meridian": "longitude_of_central_meridian",
-    "scale_factor": "scale_factor_at_central_meridian", "false_easting": "false_easting",
+    "latitude_of_origin": "latitude_of_projection_origin",
+    "central_meridian": "longitude_of_central_meridian",
+    "scale_factor": "scale_factor_at_central_meridian",
+    "false_easting": "false_easting",
     "false_northing": "false_northing",
-}  # fmt: skip
+}
 BLOCK = 4096  # cells at once: limits the memory of pairs of cells and pixels
 
 
-def write_grids(folder: Path, model: Any, t: float, maxima: dict[str, dict[str, np.ndarray]]) -> None:
+def write_grids(
+    folder: Path, model: Any, t: float, maxima: dict[str, dict[str, np.ndarray]]
+) -> None:
     """Write all grids of a case. t : end of the run [s]; maxima : basin -> quantity -> float64[n] in SI"""
     basins = {basin.name: basin for basin in model.meshed}
     for name, spec in model.case.output.grids.items():
         (folder / "grids").mkdir(exist_ok=True)
         grid = PixelGrid(basins[spec.basin], spec)
         if spec.format == "netcdf":
-            grid.write_netcdf(folder / f"grids/{name}.nc", *grid.series(folder, t, maxima.get(spec.basin, {})))
+            grid.write_netcdf(
+                folder / f"grids/{name}.nc", *grid.series(folder, t, maxima.get(spec.basin, {}))
+            )
         else:
             (values,) = grid.series(folder, t, maxima.get(spec.basin, {}))[1]
             for key in spec.fields:
@@ -47,7 +53,10 @@ class PixelGrid:
     def __init__(self, basin: Any, spec: Any) -> None:
         self.basin, self.spec = basin, spec
         low, (nx, ny) = basin.mesh.points.min(axis=0), pixel_counts(basin.mesh, spec.cell)
-        self.x, self.y = (at + spec.cell * (np.arange(count) + 0.5) for at, count in zip(low, (nx, ny), strict=True))
+        self.x, self.y = (
+            at + spec.cell * (np.arange(count) + 0.5)
+            for at, count in zip(low, (nx, ny), strict=True)
+        )
         self.cell = cells_of_pixels(basin.mesh, self.x, self.y)
         self.east, self.north = basin.part.origin or (0.0, 0.0)
 
@@ -55,7 +64,9 @@ class PixelGrid:
         """Values of the pixels, NaN outside the mesh : float64[ny, nx]; cells : float64[n]"""
         return np.where(self.cell >= 0, cells[self.cell], np.nan)
 
-    def series(self, folder: Path, t: float, maxima: dict) -> tuple[list[float], Iterator[dict[str, np.ndarray]]]:
+    def series(
+        self, folder: Path, t: float, maxima: dict
+    ) -> tuple[list[float], Iterator[dict[str, np.ndarray]]]:
         """Times [s], and the values of the fields in cells at each time; greatest values belong to the last time.
 
         Times are those of the frames if a field is not a greatest value (for a GeoTIFF only the last), else the end t
@@ -64,13 +75,19 @@ class PixelGrid:
         recorded = {key: maxima[key] for key in self.spec.fields if key in maxima}
         if len(recorded) == len(self.spec.fields):
             return [t], iter([recorded])
-        files = [(time, path) for time, path in read_series(folder / "fields.pvd")
-                 if path.stem.rpartition("-")[0] == self.basin.name]  # fmt: skip
+        files = [
+            (time, path)
+            for time, path in read_series(folder / "fields.pvd")
+            if path.stem.rpartition("-")[0] == self.basin.name
+        ]
         files = files[-1:] if self.spec.format == "geotiff" else files
         own = [key for key in self.spec.fields if key not in maxima]
         void = {key: np.full(self.basin.n, np.nan) for key in recorded}
-        frames = ({key: frame_field(path, key) for key in own} | (recorded if path is files[-1][1] else void)
-                  for _, path in files)  # fmt: skip
+        frames = (
+            {key: frame_field(path, key) for key in own}
+            | (recorded if path is files[-1][1] else void)
+            for _, path in files
+        )
         return [time for time, _ in files], frames
 
     def unit(self, key: str) -> str:
@@ -83,16 +100,29 @@ class PixelGrid:
         """Write a field as a GeoTIFF with one band. cells : float64[n]"""
         rasterio = import_library("rasterio", "a GeoTIFF")
         step = self.spec.cell
-        corner = self.east + self.x[0] - 0.5 * step, self.north + self.y[0] + step * (self.y.size - 0.5)
-        keys = {"driver": "GTiff", "width": self.x.size, "height": self.y.size, "count": 1, "dtype": "float64",
-                "transform": rasterio.Affine(step, 0.0, corner[0], 0.0, -step, corner[1]), "nodata": np.nan,
-                "crs": self.basin.part.crs, "compress": "deflate"}  # fmt: skip
+        corner = (
+            self.east + self.x[0] - 0.5 * step,
+            self.north + self.y[0] + step * (self.y.size - 0.5),
+        )
+        keys = {
+            "driver": "GTiff",
+            "width": self.x.size,
+            "height": self.y.size,
+            "count": 1,
+            "dtype": "float64",
+            "transform": rasterio.Affine(step, 0.0, corner[0], 0.0, -step, corner[1]),
+            "nodata": np.nan,
+            "crs": self.basin.part.crs,
+            "compress": "deflate",
+        }
         with replacing(path) as fresh, rasterio.open(fresh, "w", **keys) as file:
             file.write(self.values(cells)[::-1], 1)
             file.set_band_description(1, key)
             file.set_band_unit(1, self.unit(key))
 
-    def write_netcdf(self, path: Path, times: list[float], frames: Iterator[dict[str, np.ndarray]]) -> None:
+    def write_netcdf(
+        self, path: Path, times: list[float], frames: Iterator[dict[str, np.ndarray]]
+    ) -> None:
         """Write the fields as NetCDF-3, after CF-1.8. frames : field -> float64[n] at each of the times [s]"""
         from scipy.io import netcdf_file
 
@@ -110,7 +140,9 @@ class PixelGrid:
             if self.basin.part.crs:
                 item = file.createVariable("crs", "i", ())
                 for key, value in grid_mapping(self.basin.part.crs).items():
-                    setattr(item, key, value if isinstance(value, (str, bytes)) else np.float64(value))
+                    setattr(
+                        item, key, value if isinstance(value, (str, bytes)) else np.float64(value)
+                    )
             for key in self.spec.fields:
                 item = file.createVariable(key, "d", ("time", "y", "x"))
                 item.units, item._FillValue = self.unit(key).replace("-", "1"), np.nan
@@ -136,7 +168,10 @@ def grid_mapping(crs: str) -> dict[str, Any]:
     result = {"epsg_code": crs, "spatial_ref": text.encode(), "crs_wkt": text.encode()}
     if 'PROJECTION["Transverse_Mercator"]' in text:
         result["grid_mapping_name"] = "transverse_mercator"
-        result |= {to: float(re.search(rf'PARAMETER\["{key}",([^]]+)\]', text)[1]) for key, to in MERCATOR.items()}
+        result |= {
+            to: float(re.search(rf'PARAMETER\["{key}",([^]]+)\]', text)[1])
+            for key, to in MERCATOR.items()
+        }
         axis, flattening = re.search(r'SPHEROID\["[^"]*",([^,]+),([^],]+)', text).groups()
         result |= {"semi_major_axis": float(axis), "inverse_flattening": float(flattening)}
     return result
@@ -166,23 +201,34 @@ def cells_of_pixels(mesh: Any, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """
     if mesh.grid is not None:
         (i, across), (j, along) = (
-            (np.clip(np.searchsorted(lines, at, "right") - 1, 0, lines.size - 2), (at >= lines[0]) & (at <= lines[-1]))
+            (
+                np.clip(np.searchsorted(lines, at, "right") - 1, 0, lines.size - 2),
+                (at >= lines[0]) & (at <= lines[-1]),
+            )
             for lines, at in ((mesh.grid.x, x), (mesh.grid.y, y))
         )
         return np.where(along[:, None] & across, mesh.grid.index[j[:, None], i], -1)
     found = np.full((y.size, x.size), -1)
-    for first in range(len(mesh.cells) - len(mesh.cells) % BLOCK, -1, -BLOCK):  # lower numbers replace higher ones
+    # lower numbers replace higher ones
+    for first in range(len(mesh.cells) - len(mesh.cells) % BLOCK, -1, -BLOCK):
         cells = np.arange(first, min(first + BLOCK, len(mesh.cells)))[::-1]
-        corners = mesh.points[np.where(mesh.cells[cells] < 0, mesh.cells[cells][:, :1], mesh.cells[cells])]
+        corners = mesh.points[
+            np.where(mesh.cells[cells] < 0, mesh.cells[cells][:, :1], mesh.cells[cells])
+        ]
         low, high = corners.min(axis=1), corners.max(axis=1)
-        (i, wide), (j, tall) = ((a, np.maximum(b - a, 0)) for at, k in ((x, 0), (y, 1))
-                                for a in [np.searchsorted(at, low[:, k])]
-                                for b in [np.searchsorted(at, high[:, k], "right")])  # fmt: skip
+        (i, wide), (j, tall) = (
+            (a, np.maximum(b - a, 0))
+            for at, k in ((x, 0), (y, 1))
+            for a in [np.searchsorted(at, low[:, k])]
+            for b in [np.searchsorted(at, high[:, k], "right")]
+        )
         own = np.repeat(np.arange(cells.size), wide * tall)
         rest = np.arange(own.size) - np.repeat(np.cumsum(wide * tall) - wide * tall, wide * tall)
         i, j = i[own] + rest % wide[own], j[own] + rest // wide[own]
         a, b = corners[own], np.roll(corners[own], -1, axis=1)
-        left = (b - a)[..., 0] * (y[j, None] - a[..., 1]) - (b - a)[..., 1] * (x[i, None] - a[..., 0])
+        left = (b - a)[..., 0] * (y[j, None] - a[..., 1]) - (b - a)[..., 1] * (
+            x[i, None] - a[..., 0]
+        )
         inside = (left >= -NEAR * np.ptp(corners, axis=1).max(axis=1)[own, None] ** 2).all(axis=1)
         found[j[inside], i[inside]] = cells[own[inside]]
     return found

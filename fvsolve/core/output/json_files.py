@@ -13,12 +13,21 @@ from typing import Any
 from fvsolve.errors import RunError
 from fvsolve.units import show
 
-MOST_BYTES, MOST_VALUES = 100_000_000, 5_000_000  # size of a file, and number of its values, that are read
+# size of a file, and number of its values, that are read
+MOST_BYTES, MOST_VALUES = 100_000_000, 5_000_000
 MOST_FAULTS = 5  # faults that a message lists
 GREATEST_WHOLE = 2**63  # limit of whole numbers
 AGAIN = "the file was changed, or written by another version of fvsolve"
-WORDS = {str: "a text", bool: "true or false", float: "a number", int: "a whole number from 0", type(None): "null",
-         list: "a list", dict: "a table", Any: "a finite value"}  # fmt: skip
+WORDS = {
+    str: "a text",
+    bool: "true or false",
+    float: "a number",
+    int: "a whole number from 0",
+    type(None): "null",
+    list: "a list",
+    dict: "a table",
+    Any: "a finite value",
+}
 
 
 def read_json(path: Path, remedy: str) -> Any:
@@ -36,7 +45,9 @@ def read_json(path: Path, remedy: str) -> Any:
     except RecursionError:
         raise RunError(f"{path} cannot be read: it is nested too deeply; {remedy}") from None
     except (OSError, ValueError) as error:
-        raise RunError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}; {remedy}") from None
+        raise RunError(
+            f"{path} cannot be read: {getattr(error, 'strerror', None) or error}; {remedy}"
+        ) from None
 
 
 def refuse_faults(path: Path, faults: Iterator[str], remedy: str) -> None:
@@ -44,7 +55,9 @@ def refuse_faults(path: Path, faults: Iterator[str], remedy: str) -> None:
     texts = list(faults)
     if texts:
         more = [f"and {len(texts) - MOST_FAULTS} more"] if len(texts) > MOST_FAULTS else []
-        raise RunError(f"{path}: {'; '.join(texts[:MOST_FAULTS] + more)}. It seems that {AGAIN}; {remedy}")
+        raise RunError(
+            f"{path}: {'; '.join(texts[:MOST_FAULTS] + more)}. It seems that {AGAIN}; {remedy}"
+        )
 
 
 def faults_of(value: Any, kind: Any, place: str = "") -> Iterator[str]:
@@ -115,7 +128,9 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is float:
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         return (
-            is_number and abs(value) < GREATEST_WHOLE if isinstance(value, int) else is_number and math.isfinite(value)
+            is_number and abs(value) < GREATEST_WHOLE
+            if isinstance(value, int)
+            else is_number and math.isfinite(value)
         )
     if kind is int:
         return type(value) is int and 0 <= value < GREATEST_WHOLE

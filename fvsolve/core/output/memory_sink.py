@@ -28,7 +28,10 @@ class MemorySink:
     def rows(self, t, values) -> None:
         """Append rows of probe values. t : float64[k] [s]; values : float64[k, probes] in SI"""
         block = np.empty((len(t), 1 + len(self.columns)))
-        block[:, 0], block[:, 1:] = self.time.from_si(np.asarray(t)), to_column_units(self.columns, np.asarray(values))
+        block[:, 0], block[:, 1:] = (
+            self.time.from_si(np.asarray(t)),
+            to_column_units(self.columns, np.asarray(values)),
+        )
         self._blocks.append(block)
 
     def field(self, t: float, frame: dict) -> None:

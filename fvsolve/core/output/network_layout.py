@@ -12,7 +12,8 @@ import numpy as np
 from fvsolve.case.pipe_routes import is_cut
 
 MAJORIZATION_ROUNDS = 200  # iterations of the stress majorization
-MAX_DENSE_NODES = 400  # greatest number of nodes for the layout by all pairs; larger networks get a radial plan
+# greatest number of nodes for the layout by all pairs; larger networks get a radial plan
+MAX_DENSE_NODES = 400
 SHORT_LINK = 0.02  # drawn length of a link without length, as a fraction of the longest pipe
 BEND_SIZE = 0.15  # sideways bend of parallel links, as a fraction of their length
 
@@ -22,8 +23,12 @@ def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
 
     lengths : link -> length [m]
     """
-    ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
-    named = [part for ends in ports.values() for part in ends] + [place(part) for part in case.places]
+    ports = {
+        name: [place(port) for port in link.ports.values()] for name, link in case.links.items()
+    }
+    named = [part for ends in ports.values() for part in ends] + [
+        place(part) for part in case.places
+    ]
     owners = dict.fromkeys(part for part in named if part not in case.nodes)
     stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
     stated |= cut_positions(case, stated)
@@ -33,8 +38,12 @@ def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     names = [*case.nodes, *owners]
     index = {name: i for i, name in enumerate(names)}
     short = SHORT_LINK * max(lengths.values(), default=1.0)
-    edges = [(index[hub], index[other], max(lengths.get(name, short), short)) for name, ends in ports.items()
-             for hub, *others in [[name, *ends] if name in owners else ends] for other in others]  # fmt: skip
+    edges = [
+        (index[hub], index[other], max(lengths.get(name, short), short))
+        for name, ends in ports.items()
+        for hub, *others in [[name, *ends] if name in owners else ends]
+        for other in others
+    ]
     plan = _plan(len(names), edges)
     return dict(zip(names, plan, strict=True))
 
@@ -51,11 +60,17 @@ def cut_positions(case, stated: dict[str, tuple]) -> dict[str, tuple]:
         pieces = [case.links[pipe] for pipe in route.pipes]
         ends = pieces[0].from_, pieces[-1].to
         if all(end in stated for end in ends):
-            share = np.cumsum([piece.length for piece in pieces]) / sum(piece.length for piece in pieces)
+            share = np.cumsum([piece.length for piece in pieces]) / sum(
+                piece.length for piece in pieces
+            )
             first, last = (np.array(stated[end], float) for end in ends)
             for piece, at in zip(pieces[:-1], share, strict=False):
                 result[piece.to] = tuple(first + at * (last - first))
-    return {name: position for name, position in result.items() if name in case.nodes and name not in stated}
+    return {
+        name: position
+        for name, position in result.items()
+        if name in case.nodes and name not in stated
+    }
 
 
 def place(port: str) -> str:
@@ -63,7 +78,9 @@ def place(port: str) -> str:
     return port.partition(".")[0]
 
 
-def link_path(start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float) -> np.ndarray:
+def link_path(
+    start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float
+) -> np.ndarray:
     """Points of a link in plan at `fractions` of its length : float64[k, 2].
 
     The link is a parabola with the sideways bend `aside` times BEND_SIZE.
@@ -134,7 +151,10 @@ def _classical_scaling(distance: np.ndarray) -> np.ndarray:
     farthest = np.unravel_index(np.argmax(distance), distance.shape)
     off = distance[farthest[0]] + distance[farthest[1]] - distance[farthest]
     has_branches = float(off.max() > 1e-9 * distance.max())  # a chain of nodes stays straight
-    return plan + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * has_branches
+    return (
+        plan
+        + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * has_branches
+    )
 
 
 def _minimise_stress(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
@@ -174,7 +194,9 @@ def _radial_plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
         leaves[i] = max(leaves[i], 1)
         if parent[i] >= 0:
             leaves[parent[i]] += leaves[i]
-    used, middle, begun = np.zeros(count), np.zeros(count), 0.0
+    used = np.zeros(count)
+    middle = np.zeros(count)
+    begun = 0.0
     for i in order:
         used[i] = used[parent[i]] if parent[i] >= 0 else begun
         middle[i] = used[i] + 0.5 * leaves[i]
@@ -187,7 +209,9 @@ def _radial_plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
     return np.round(plan - plan.min(0), 3)
 
 
-def _shortest_path_tree(count: int, edges: list[tuple[int, int, float]]) -> tuple[np.ndarray, list[int], list[int]]:
+def _shortest_path_tree(
+    count: int, edges: list[tuple[int, int, float]]
+) -> tuple[np.ndarray, list[int], list[int]]:
     """Shortest paths from the first node (Dijkstra 1959): path lengths, parents (-1 for none), nodes by length.
 
     Parts of the network that are not connected to it have a first node each.
@@ -196,7 +220,9 @@ def _shortest_path_tree(count: int, edges: list[tuple[int, int, float]]) -> tupl
     for i, j, length in edges:
         near[i].append((j, length))
         near[j].append((i, length))
-    reach, parent, order = np.full(count, np.inf), [-1] * count, []
+    reach = np.full(count, np.inf)
+    parent = [-1] * count
+    order = []
     for root in range(count):
         heap = [(0.0, root, -1)] if np.isinf(reach[root]) else []
         while heap:

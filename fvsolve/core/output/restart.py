@@ -18,7 +18,8 @@ from fvsolve.errors import RunError, listing
 from fvsolve.file_replacement import replacing
 
 SEAL = "seal"  # name of the digest of all other arrays
-END_LENGTH = 22  # end of a zip file without comment: bytes 12 to 15 are the size of its list of names
+# end of a zip file without comment: bytes 12 to 15 are the size of its list of names
+END_LENGTH = 22
 MOST_NAMES = 100_000  # greatest size of the list of names [B]
 
 
@@ -62,8 +63,10 @@ def changed_steps(restart: Restart, case) -> list[dict]:
         return restart.continued
     names = [name for feature in features_of(case) for name in feature.step_histories]
     if any(restart.memory[name].size for name in names if name in restart.memory):
-        raise RunError(f"{next(iter(values))} cannot change in a continued run with delay lines or delays of controls, "
-                       "whose histories belong to the steps; start again with --force")  # fmt: skip
+        raise RunError(
+            f"{next(iter(values))} cannot change in a continued run with delay lines or delays of controls, "
+            "whose histories belong to the steps; start again with --force"
+        )
     if restart.t == case.numerics.start:
         return restart.continued
     return [*restart.continued, {"t": restart.t, "keys": values}]
@@ -83,7 +86,11 @@ def identity(case) -> dict[str, str]:
 def versions(case) -> dict[str, str]:
     """Versions on which the numbers of a run depend: programs, source of fluid data, target processor, own limiter."""
     own = LIMITERS[case.numerics.limiter].own
-    return program_versions() | {"fluid": case.properties.source} | ({"limiter": own.digest} if own else {})
+    return (
+        program_versions()
+        | {"fluid": case.properties.source}
+        | ({"limiter": own.digest} if own else {})
+    )
 
 
 def program_versions() -> dict[str, str]:
@@ -98,7 +105,11 @@ def _program_versions() -> tuple[tuple[str, str], ...]:
     from fvsolve import jit
     from fvsolve.compile import store
 
-    own = {"fvsolve": fvsolve.__version__, "sources": jit.source_hash(), "python": sys.version.split()[0]}
+    own = {
+        "fvsolve": fvsolve.__version__,
+        "sources": jit.source_hash(),
+        "python": sys.version.split()[0],
+    }
     own |= {"numpy": np.__version__, "numba": "not used", "target": "none"}
     if jit.COMPILING:
         own |= {"numba": store.numba_version(), "target": store.target()["name"]}
@@ -145,13 +156,20 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(stream) as archive:
             members = archive.infolist()
             total = sum(member.file_size for member in members)
-            if total > size or any(member.compress_type != zipfile.ZIP_STORED for member in members):
+            if total > size or any(
+                member.compress_type != zipfile.ZIP_STORED for member in members
+            ):
                 raise ValueError("it is compressed, or its arrays overlap")
             if not fits(total):
-                raise ValueError(f"its arrays of {byte_text(total)} do not fit into the free memory")
+                raise ValueError(
+                    f"its arrays of {byte_text(total)} do not fit into the free memory"
+                )
             if len({member.filename for member in members}) < len(members):
                 raise ValueError("two arrays have the same name")
-            return {member.filename.removesuffix(".npy"): read_array(archive, member) for member in members}
+            return {
+                member.filename.removesuffix(".npy"): read_array(archive, member)
+                for member in members
+            }
 
 
 def read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
@@ -183,15 +201,28 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
             if isinstance(error, KeyError)
             else (str(error).splitlines() or [type(error).__name__])[0]
         )
-        raise RunError(f"{path} cannot be read ({reason}); start the run again with --force") from None
-    damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1))
-              if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
-    damaged = damaged or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
-    damaged += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
+        raise RunError(
+            f"{path} cannot be read ({reason}); start the run again with --force"
+        ) from None
+    damaged = [
+        name
+        for name, array, axes in (("t", t, 0), ("y", y, 1))
+        if array.dtype != np.float64 or array.ndim != axes
+    ]
+    damaged = damaged or [
+        name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()
+    ]
+    damaged += (
+        ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
+    )
     damaged += ["identity"] if not isinstance(stored, dict) else []
-    damaged += ["steps"] if not isinstance(steps, list) or [*map(type, steps)] != [dict, list] else []
+    damaged += (
+        ["steps"] if not isinstance(steps, list) or [*map(type, steps)] != [dict, list] else []
+    )
     if damaged:
-        raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
+        raise RunError(
+            f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force"
+        )
     if not is_sealed:
         text = "was changed after the run wrote it: the digest of its arrays differs"
         raise RunError(f"{path} {text}; start the run again with --force")

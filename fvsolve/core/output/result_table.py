@@ -84,9 +84,15 @@ class ResultTable:
 
     @classmethod
     def of(
-        cls, title: str, headers: Sequence[str], rows: Sequence[Sequence[Any]], units: Sequence[str] = (),
-        bad: frozenset[int] = frozenset(), mixed: Collection[int] = (), **more: Any,
-    ) -> ResultTable:  # fmt: skip
+        cls,
+        title: str,
+        headers: Sequence[str],
+        rows: Sequence[Sequence[Any]],
+        units: Sequence[str] = (),
+        bad: frozenset[int] = frozenset(),
+        mixed: Collection[int] = (),
+        **more: Any,
+    ) -> ResultTable:
         """Table with these headers of columns.
 
         units : unit of each column, or of the first columns; mixed : indices of columns whose rows have different units
@@ -112,12 +118,17 @@ class ResultTable:
     def values(self) -> list[list]:
         """Values of all rows in the order of the columns; None for a missing value."""
         keys = [column.key for column in self.columns]
-        return [[row.get(key) for key in keys] if isinstance(row, Mapping) else [*row] for row in self.rows]
+        return [
+            [row.get(key) for key in keys] if isinstance(row, Mapping) else [*row]
+            for row in self.rows
+        ]
 
     def plain(self) -> list[dict]:
         """Rows of plain values for JSON."""
         keys = [column.key for column in self.columns]
-        return [{key: plain(value) for key, value in zip(keys, row, strict=True)} for row in self.values]
+        return [
+            {key: plain(value) for key, value in zip(keys, row, strict=True)} for row in self.values
+        ]
 
     def table_columns(self) -> dict[str, list]:
         """Values of every column by key, for a data frame."""
@@ -131,9 +142,13 @@ class ResultTable:
     def words(self) -> tuple[list[str], list[list[str]]]:
         """Headers and rows as text for a terminal."""
         heads = [column.head or column.title for column in self.columns]
-        return heads, [[column.words(row) if callable(column.words) else cell_text(value, column.words)
-                        for column, value in zip(self.columns, cells, strict=True)]
-                       for row, cells in zip(self.rows, self.values, strict=True)]  # fmt: skip
+        return heads, [
+            [
+                column.words(row) if callable(column.words) else cell_text(value, column.words)
+                for column, value in zip(self.columns, cells, strict=True)
+            ]
+            for row, cells in zip(self.rows, self.values, strict=True)
+        ]
 
 
 def columns(**titles: str) -> tuple[Column, ...]:

@@ -34,7 +34,9 @@ class OtherSink:
             self.sink = maker()
             missing = [name for name in METHODS if not callable(getattr(self.sink, name, None))]
             if missing:
-                raise TypeError(f"its object has no method {', '.join(missing)}; expected {', '.join(METHODS)}")
+                raise TypeError(
+                    f"its object has no method {', '.join(missing)}; expected {', '.join(METHODS)}"
+                )
         except Exception as error:
             raise FvsolveError(unreadable(declaration.source, declaration.place, error)) from error
 

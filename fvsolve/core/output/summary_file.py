@@ -18,20 +18,36 @@ MOST_MISSING = 5  # missing entries above which a file is not the summary of a r
 def summary_data(summary, model) -> dict:
     """Results of a run as plain data in SI for summary.json; only the extremes are in the units of the probes."""
     return {
-        "title": model.case.title, "case": model.case.name, "reason": summary.reason, "ok": bool(summary.ok),
-        "t": float(summary.t), "invalid_from": plain(float(summary.invalid_from)),
-        "marks": [asdict(mark) for mark in summary.marks], "cavities": [asdict(cavity) for cavity in summary.cavities],
+        "title": model.case.title,
+        "case": model.case.name,
+        "reason": summary.reason,
+        "ok": bool(summary.ok),
+        "t": float(summary.t),
+        "invalid_from": plain(float(summary.invalid_from)),
+        "marks": [asdict(mark) for mark in summary.marks],
+        "cavities": [asdict(cavity) for cavity in summary.cavities],
         "events": [asdict(event) for event in summary.events],
-        "probes": {item.name: {"dimension": item.dimension, "unit": item.unit} for item in probe_columns(model)},
+        "probes": {
+            item.name: {"dimension": item.dimension, "unit": item.unit}
+            for item in probe_columns(model)
+        },
         "time_unit": time_column(model.case).unit,
         "envelope_units": {item.name: item.unit for item in envelope_columns(model.case)},
-        "ambient_pressure": model.case.ambient_pressure, "fluid": model.case.properties.plain(),
-        "extremes": _extremes(summary, model), "ledgers": plain(summary.ledgers), **summary.counts,
-        "methods": summary.methods, "cells": int(summary.cells), "threads": int(summary.threads),
-        "seconds": float(summary.seconds), "seconds_setup": float(summary.seconds_setup), "cost": plain(summary.cost),
-        "run_up": plain(summary.run_ups), **({"energy_use": plain(summary.energy_use)} if summary.energy_use else {}),
+        "ambient_pressure": model.case.ambient_pressure,
+        "fluid": model.case.properties.plain(),
+        "extremes": _extremes(summary, model),
+        "ledgers": plain(summary.ledgers),
+        **summary.counts,
+        "methods": summary.methods,
+        "cells": int(summary.cells),
+        "threads": int(summary.threads),
+        "seconds": float(summary.seconds),
+        "seconds_setup": float(summary.seconds_setup),
+        "cost": plain(summary.cost),
+        "run_up": plain(summary.run_ups),
+        **({"energy_use": plain(summary.energy_use)} if summary.energy_use else {}),
         "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
-    }  # fmt: skip
+    }
 
 
 def plain(value):
@@ -69,8 +85,11 @@ AGAIN = "run the case again with --force"
 
 def _similar_run(path: Path) -> str:
     """Hint for a message: run directory beside a missing summary, or in `runs`, with a similar name; "" without one."""
-    found = {other.parent.name: other.parent for folder in (path.parent.parent, Path("runs"))
-             for other in folder.glob(f"*/{path.name}")}  # fmt: skip
+    found = {
+        other.parent.name: other.parent
+        for folder in (path.parent.parent, Path("runs"))
+        for other in folder.glob(f"*/{path.name}")
+    }
     close = nearest(path.parent.name, found)
     return f'; did you mean "{found[close]}"?' if close else ""
 
@@ -81,7 +100,11 @@ def read_summary(path: Path) -> dict:
         text = f"does not hold a finished run (no {path.name}); check the path, or finish the run"
         raise RunError(f"{path.parent} {text}{_similar_run(path)}")
     summary = read_json(path, AGAIN)
-    missing = ["a JSON object"] if not isinstance(summary, dict) else [k for k in REQUIRED_KEYS if k not in summary]
+    missing = (
+        ["a JSON object"]
+        if not isinstance(summary, dict)
+        else [k for k in REQUIRED_KEYS if k not in summary]
+    )
     if len(missing) > MOST_MISSING or not isinstance(summary, dict):
         text = f"this is not the summary of a run (missing: {listing(missing)})"
         raise RunError(f"{path} cannot be read: {text}; {AGAIN}")
@@ -98,7 +121,10 @@ def _extremes(summary, model) -> dict:
     for col in probe_columns(model):
         least, t_min, greatest, t_max = summary.extremes[col.name]
         row = extremes[col.name] = {"unit": col.unit}
-        for side, value, time, t in (("minimum", least, "t_min", t_min), ("maximum", greatest, "t_max", t_max)):
+        for side, value, time, t in (
+            ("minimum", least, "t_min", t_min),
+            ("maximum", greatest, "t_max", t_max),
+        ):
             valid = not t >= summary.invalid_from
             row[side] = plain(float(col.from_si(value))) if valid else None
             row[time] = plain(float(t)) if valid else None

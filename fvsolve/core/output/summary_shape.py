@@ -106,7 +106,11 @@ class LimitVerdict(NamedTuple):
     @property
     def doubtful(self) -> bool:
         """True if the limit is not exceeded, but the error of its value is greater than its margin."""
-        return self.state == OPEN and None not in (self.error, self.margin) and self.margin < self.error
+        return (
+            self.state == OPEN
+            and None not in (self.error, self.margin)
+            and self.margin < self.error
+        )
 
 
 class Comparison(NamedTuple):
@@ -338,11 +342,20 @@ class SummaryShape(TypedDict):
     continued: NotRequired[list[ChangedSteps]]
 
 
-REQUIRED_KEYS = tuple(key for key in SummaryShape.__annotations__ if key in SummaryShape.__required_keys__)
+REQUIRED_KEYS = tuple(
+    key for key in SummaryShape.__annotations__ if key in SummaryShape.__required_keys__
+)
 UNITS_OF_ENVELOPE = dict(
-    distance="length", elevation="head", initial_head="head", min_pressure="pressure", t_min="time",
-    max_pressure="pressure", t_max="time", min_head="head", max_head="head",
-)  # fmt: skip
+    distance="length",
+    elevation="head",
+    initial_head="head",
+    min_pressure="pressure",
+    t_min="time",
+    max_pressure="pressure",
+    t_max="time",
+    min_head="head",
+    max_head="head",
+)
 
 
 def summary_faults(summary: dict[str, Any]) -> Iterator[str]:
@@ -354,9 +367,14 @@ def summary_faults(summary: dict[str, Any]) -> Iterator[str]:
 def contradictions(summary: dict[str, Any]) -> Iterator[str]:
     """Yield a text for each unknown unit, and for extremes and errors of other probes than those of the summary."""
     columns = {"time_unit": ("time", summary["time_unit"])}
-    columns |= {f"envelope_units.{key}": (kind, summary["envelope_units"][key])
-                for key, kind in UNITS_OF_ENVELOPE.items()}  # fmt: skip
-    columns |= {joined("probes", name): (row["dimension"], row["unit"]) for name, row in summary["probes"].items()}
+    columns |= {
+        f"envelope_units.{key}": (kind, summary["envelope_units"][key])
+        for key, kind in UNITS_OF_ENVELOPE.items()
+    }
+    columns |= {
+        joined("probes", name): (row["dimension"], row["unit"])
+        for name, row in summary["probes"].items()
+    }
     for place, (dimension, unit) in columns.items():
         if dimension not in units.DIMENSIONS:
             yield f'{place}.dimension: {show(dimension)} is unknown; expected a dimension such as "pressure"'

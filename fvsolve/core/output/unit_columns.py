@@ -23,7 +23,9 @@ class UnitColumn(NamedTuple):
 
     def from_si(self, value):
         """Convert a number or an array from SI (absolute pressures) to the unit of the column."""
-        return value if self.plain else units.convert(value, self.dimension, self.unit, self.ambient)
+        return (
+            value if self.plain else units.convert(value, self.dimension, self.unit, self.ambient)
+        )
 
     def to_si(self, value):
         """Convert a number or an array from the unit of the column to SI (absolute pressures)."""

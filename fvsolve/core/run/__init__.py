@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fvsolve.argument_checks import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
-from fvsolve.core.output.directory import RunDirectory, change_text, existing_pictures, read_directory
+from fvsolve.core.output.directory import (
+    RunDirectory,
+    change_text,
+    existing_pictures,
+    read_directory,
+)
 from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.core.output.restart import identity
 from fvsolve.core.output.summary_file import summary_data, write_summary
@@ -26,7 +31,15 @@ if TYPE_CHECKING:
 __all__ = ["Result", "open_run", "run"]
 
 
-@validated(set=TABLE, out=PATH, force=FLAG, resume=FLAG, progress=FUNCTION, threads=COUNT_FROM_ONE, pictures=FLAG)
+@validated(
+    set=TABLE,
+    out=PATH,
+    force=FLAG,
+    resume=FLAG,
+    progress=FUNCTION,
+    threads=COUNT_FROM_ONE,
+    pictures=FLAG,
+)
 def run(
     case: "str | Path | Mapping[str, Any] | Case | Model",
     set: Mapping[str, Any] | None = None,
@@ -87,9 +100,13 @@ def model_of(case, set: Mapping | None = None, like=None):
         except CaseError as error:
             raise locate_faults(error, case) from None
         except MemoryError:
-            raise RunError(f"{case.name}: memory is too small for its model; expected fewer cells") from None
+            raise RunError(
+                f"{case.name}: memory is too small for its model; expected fewer cells"
+            ) from None
     if set:
-        raise RunError("keys of a Model cannot be overridden; give the argument `set` together with a case")
+        raise RunError(
+            "keys of a Model cannot be overridden; give the argument `set` together with a case"
+        )
     return case
 
 
@@ -105,7 +122,9 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
             text = f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread"
             raise RunError(f"{text}; leave out `threads`")
         if out is not None:
-            return with_sinks(model.case.output.sinks, lambda: RunDirectory(Path(out), model, force, resume))
+            return with_sinks(
+                model.case.output.sinks, lambda: RunDirectory(Path(out), model, force, resume)
+            )
         if resume:
             raise RunError("resume needs the run directory; give it as the argument `out`")
         return MemorySink(model)
@@ -139,9 +158,14 @@ def draw(result: Result, painter: PlotProcess) -> None:
     """Draw the pictures that are missing in a run directory; warns of pictures that cannot be drawn."""
     missing = None if result.directory is None else existing_pictures(result.directory)
     pictures, failed = [], {}
-    requests = [("history.png", "history_figure", result.history_drawn),
-              ("envelope.png", "envelope_figure", result.envelope_drawn)]  # fmt: skip
-    requests += [(f"run_up-{name}.png", "run_up_figure", partial(result.run_up_drawn, name)) for name in result.run_up]
+    requests = [
+        ("history.png", "history_figure", result.history_drawn),
+        ("envelope.png", "envelope_figure", result.envelope_drawn),
+    ]
+    requests += [
+        (f"run_up-{name}.png", "run_up_figure", partial(result.run_up_drawn, name))
+        for name in result.run_up
+    ]
     for name, function, drawn in requests:
         if missing is None or name in missing:
             continue
@@ -181,7 +205,9 @@ def _result(model, summary, sink, begun: float) -> Result:
     facts |= claims(model, summary, result)
     facts["versions"] = identity(model.case)
     facts["continued"] = list(sink.continued)
-    facts["warnings"] += [Notice("continued", "numerics", change_text(item)).plain() for item in sink.continued]
+    facts["warnings"] += [
+        Notice("continued", "numerics", change_text(item)).plain() for item in sink.continued
+    ]
     facts["ended"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     if sink.folder is not None:
         facts["files"] = sink.files()

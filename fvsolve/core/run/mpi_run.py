@@ -33,7 +33,9 @@ def world():
         raise FvsolveError(f"{text}; {EXTRA} installs mpi4py") from None
     if MPI.COMM_WORLD.size < 2:
         text = f"MPI started {count} processes, but the MPI of mpi4py sees each of them as a single process"
-        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs an MPI")
+        raise FvsolveError(
+            f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs an MPI"
+        )
     return MPI.COMM_WORLD
 
 

@@ -39,9 +39,11 @@ class CacheState:
 
 
 def warm(
-    cases: Sequence[Path], whole: bool, jobs: int | None = None,
+    cases: Sequence[Path],
+    whole: bool,
+    jobs: int | None = None,
     progress: Callable[[int, int, str], None] = lambda done, total, task: None,
-) -> CacheState:  # fmt: skip
+) -> CacheState:
     """Compile the code that some cases need, in several processes, and return the state of the cache.
 
     cases : paths of case files; whole : True to compile the steps and linear algebra of all kinds of methods too
@@ -59,9 +61,13 @@ def warm(
     _all(case_tasks, count, lambda done, task: progress(len(tasks) + done, total, task))
     after = code_files(folder)
     return CacheState(
-        str(folder), store.target()["name"], len(after.keys() - before.keys()), len(after), sum(after.values()),
+        str(folder),
+        store.target()["name"],
+        len(after.keys() - before.keys()),
+        len(after),
+        sum(after.values()),
         time.perf_counter() - began,
-    )  # fmt: skip
+    )
 
 
 def _folder() -> Path:

@@ -19,8 +19,11 @@ from fvsolve.compile.child_process import safe_path
 from fvsolve.errors import RunError
 
 READY = "ready"
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # threads of linear algebra in every process
-NOT_STARTED = 'a worker process could not be started; a script that uses jobs needs if __name__ == "__main__"'
+# threads of linear algebra in every process
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+NOT_STARTED = (
+    'a worker process could not be started; a script that uses jobs needs if __name__ == "__main__"'
+)
 
 
 class WorkerLost(Exception):

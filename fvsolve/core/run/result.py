@@ -54,7 +54,8 @@ class Result(Displayable):
         self.summary = summary
         self.units = {name: probe["unit"] for name, probe in summary["probes"].items()}
         self.directory = directory
-        self.places: list[list[dict]] | None = None  # rows of every limit (`verdicts.places`); None if read from files
+        # rows of every limit (`verdicts.places`); None if read from files
+        self.places: list[list[dict]] | None = None
         self._read_table = table
         self._read_envelope, self._read_maxima = envelope, maxima
 
@@ -87,7 +88,8 @@ class Result(Displayable):
     def extremes(self) -> dict[str, Extremes]:
         """Least and greatest value of each probe, with times."""
         return {
-            name: Extremes(*(row[key] for key in Extremes._fields)) for name, row in self.summary["extremes"].items()
+            name: Extremes(*(row[key] for key in Extremes._fields))
+            for name, row in self.summary["extremes"].items()
         }
 
     @property
@@ -133,8 +135,14 @@ class Result(Displayable):
     def run_up(self) -> dict:
         """Run-up of `[output]` -> its columns in m and degrees : float64[sectors], NaN where nothing became wet."""
         tables = self.summary.get("run_up", {})
-        return {name: {key: np.array(values, float) for key, values in table.items() if isinstance(values, list)}
-                for name, table in tables.items()}  # fmt: skip
+        return {
+            name: {
+                key: np.array(values, float)
+                for key, values in table.items()
+                if isinstance(values, list)
+            }
+            for name, table in tables.items()
+        }
 
     @cached_property
     def routes(self) -> dict:
@@ -176,7 +184,9 @@ class Result(Displayable):
 
     def _known(self, probe: str) -> str:
         if not isinstance(probe, str) or probe not in self.units:
-            raise FvsolveError(f"no probe {show(probe)}{did_you_mean(str(probe), self.units)}; see Result.probes")
+            raise FvsolveError(
+                f"no probe {show(probe)}{did_you_mean(str(probe), self.units)}; see Result.probes"
+            )
         return probe
 
     def frame(self) -> Any:
@@ -200,12 +210,23 @@ class Result(Displayable):
         """Arguments for the function `history_figure`; empty without probes."""
         if not self.probes:
             return {}
-        marks = [(self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks]
-        marks += [(self.t[0], f"{item.place} {item.kind}") for item in self.warnings if not item.ok and len(self.t)]
+        marks = [
+            (self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks
+        ]
+        marks += [
+            (self.t[0], f"{item.place} {item.kind}")
+            for item in self.warnings
+            if not item.ok and len(self.t)
+        ]
         return {
-            "t": self.t, "values": self._table[:, 1:], "probes": list(self.units.items()),
-            "time_unit": self._time.unit, "marks": marks, "measured": self._measured(), "title": self.summary["title"],
-        }  # fmt: skip
+            "t": self.t,
+            "values": self._table[:, 1:],
+            "probes": list(self.units.items()),
+            "time_unit": self._time.unit,
+            "marks": marks,
+            "measured": self._measured(),
+            "title": self.summary["title"],
+        }
 
     @validated(path=PATH)
     def plot_envelope(self, path: str | Path | None = None) -> Any:
@@ -219,8 +240,10 @@ class Result(Displayable):
         if not self.envelope:
             return {}
         return {
-            "envelope": self.envelope, "units": self.summary["envelope_units"], "title": self.summary["title"],
-        }  # fmt: skip
+            "envelope": self.envelope,
+            "units": self.summary["envelope_units"],
+            "title": self.summary["title"],
+        }
 
     @validated(name=TEXT, path=PATH)
     def plot_run_up(self, name: str, path: str | Path | None = None) -> Any:
@@ -228,7 +251,9 @@ class Result(Displayable):
         from fvsolve.report.draw.plot import run_up_figure
 
         if name not in self.run_up:
-            raise FvsolveError(f"no run-up {show(name)}{did_you_mean(name, self.run_up)}; see Result.run_up")
+            raise FvsolveError(
+                f"no run-up {show(name)}{did_you_mean(name, self.run_up)}; see Result.run_up"
+            )
         return save_if_path(run_up_figure(**self.run_up_drawn(name)), path)
 
     def run_up_drawn(self, name: str) -> dict[str, Any]:
@@ -237,7 +262,11 @@ class Result(Displayable):
 
     @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
     def view(
-        self, time: float | None = None, field: str | None = None, path: str | Path | None = None, contours: int = 0
+        self,
+        time: float | None = None,
+        field: str | None = None,
+        path: str | Path | None = None,
+        contours: int = 0,
     ) -> Path:
         """Draw the quantity `field` at the frame nearest to `time` [s] (default: last); return the path of the picture.
 
@@ -254,9 +283,13 @@ class Result(Displayable):
         return self._draw([t], field, path, ".png", contours)
 
     @validated(path=PATH, field=TEXT, contours=COUNT_FROM_ZERO)
-    def animate(self, path: str | Path | None = None, field: str | None = None, contours: int = 0) -> Path:
+    def animate(
+        self, path: str | Path | None = None, field: str | None = None, contours: int = 0
+    ) -> Path:
         """Draw all frames as `view` does into an animation, a .gif or .mp4 file; return the path."""
-        return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
+        return self._draw(
+            list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours
+        )
 
     @property
     def _kinds(self) -> set[str]:
@@ -281,7 +314,9 @@ class Result(Displayable):
             return "[output] fields is 0; run again with --set output.fields=20 --force"
         return f"{self.directory / 'fields.pvd'} is missing; run again with --force"
 
-    def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
+    def _draw(
+        self, times: list[float], field: str | None, path, suffix: str, contours: int
+    ) -> Path:
         from fvsolve.core.run.plot_scene import scene_of
         from fvsolve.report.draw.view import view
 
@@ -289,7 +324,11 @@ class Result(Displayable):
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
             basins = [self.case.nodes[name] for name in self.case.meshes]
             bodies = any(node.kind == "body" for node in self.case.nodes.values())
-            field = "pressure" if pipes or not basins else next(iter(basins[0].physics_type.fields), "pressure")
+            field = (
+                "pressure"
+                if pipes or not basins
+                else next(iter(basins[0].physics_type.fields), "pressure")
+            )
             field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"view-{field}{suffix}"
         frames = self._frames() if times else []
@@ -302,7 +341,10 @@ class Result(Displayable):
         measured = {}
         for series in compared.values():
             name = series.probe.text
-            measured[name] = self._time.from_si(series.t + series.shift), self.column(name).from_si(series.v)
+            measured[name] = (
+                self._time.from_si(series.t + series.shift),
+                self.column(name).from_si(series.v),
+            )
         return measured
 
     def column(self, probe: str) -> UnitColumn:
@@ -310,7 +352,11 @@ class Result(Displayable):
 
         Raises FvsolveError for an unknown probe.
         """
-        return UnitColumn(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
+        return UnitColumn(
+            self._known(probe),
+            **self.summary["probes"][probe],
+            ambient=self.summary["ambient_pressure"],
+        )
 
     def si(self, probe: str) -> np.ndarray:
         """Values of a probe in SI, pressures absolute: float64[rows]."""
@@ -318,9 +364,13 @@ class Result(Displayable):
 
     def summary_line(self) -> str:
         summary = self.summary
-        return f"{summary['case']!r}: {self.reason}, t = {summary['t']:g} s, {len(self.units)} probes"
+        return (
+            f"{summary['case']!r}: {self.reason}, t = {summary['t']:g} s, {len(self.units)} probes"
+        )
 
     def table_columns(self) -> dict[str, list]:
         """Columns of a table of the probes: name, unit, least and greatest value, and their times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
-        return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}
+        return columns | {
+            key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields
+        }

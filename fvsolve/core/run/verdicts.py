@@ -13,11 +13,14 @@ from fvsolve.core.output.summary_shape import FAILS, HOLDS, OPEN, Comparison
 from fvsolve.core.output.unit_columns import UnitColumn, column, probe_columns
 
 ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
-ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
+# relative to a limit and the typical size of its quantity; a smaller excess is within the limit
+ROUNDING = 1e-9
 SIZES = {"pressure": 1e5, "gauge_pressure": 1e5, "head": 10.0, "pressure_head": 10.0}
 MAGNITUDES = ("velocity", "force")  # quantities of which a limit bounds the magnitude
-FEWEST_COMMON, COMMON = 3, 0.1  # least number of common times of two compared runs, and share in the shorter run
-NEAR = 1e-3  # relative to a vapour pressure, within which a limit counts as equal to it: a cavity keeps about that much
+# least number of common times of two compared runs, and share in the shorter run
+FEWEST_COMMON, COMMON = 3, 0.1
+# relative to a vapour pressure, within which a limit counts as equal to it: a cavity keeps about that much
+NEAR = 1e-3
 WORST = 10  # places that a limit lists
 STATES = (FAILS, OPEN, HOLDS)  # worst first
 SHARED = ("name", "quantity", "until")  # keys with one value for all places of a limit
@@ -62,27 +65,42 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
             # probes of which only extremes are recorded
             fraction = np.array([probe.fraction for probe in rows[name]])
             distance = fraction * model.case.links[name].length
-            height = pipes[name].height(distance) if name in pipes else model.case.axis_elevation(name, fraction)
+            height = (
+                pipes[name].height(distance)
+                if name in pipes
+                else model.case.axis_elevation(name, fraction)
+            )
             found = np.array([summary.watched[probe.text] for probe in rows[name]])
             parts.append(PartExtremes("links", name, distance, height, *found.T))
         else:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             extremes = summary.watched[f"{group}.{name}.{quantity}"]
-            parts.append(PartExtremes(group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T))
+            parts.append(
+                PartExtremes(
+                    group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T
+                )
+            )
     isolated = model.isolated if is_pressure else ()
     known = []
     for part in parts:
-        recorded = not np.all(part.minimum == np.inf)  # if something determined the pressure of an isolated node
+        # if something determined the pressure of an isolated node
+        recorded = not np.all(part.minimum == np.inf)
         if recorded and f"{part.group}.{part.part}" not in isolated:
             known.append(part)
     parts = known or parts
-    return parts if np.isinf(summary.invalid_from) else [valid(probe, summary.invalid_from) for probe in parts]
+    return (
+        parts
+        if np.isinf(summary.invalid_from)
+        else [valid(probe, summary.invalid_from) for probe in parts]
+    )
 
 
 def valid(part: PartExtremes, until: float) -> PartExtremes:
     """Copy of the extremes of a part, with nan for those that occurred at the time `until` [s] or later."""
-    sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
-             for side in ("minimum", "maximum")}  # fmt: skip
+    sides = {
+        side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
+        for side in ("minimum", "maximum")
+    }
     return part._replace(**sides)
 
 
@@ -150,16 +168,26 @@ def places(model, summary, margins=True) -> list[list[dict[str, Any]]]:
     margins : True if the rows are to have the margins at all positions, `PLACES_KEY`
     """
     chainage = Chainages(model.case)
-    complete = bool(summary.ok and not summary.marks and not any(notice.kind == "end" for notice in model.case.notices))
+    complete = bool(
+        summary.ok
+        and not summary.marks
+        and not any(notice.kind == "end" for notice in model.case.notices)
+    )
     tables = []
     for limit in model.case.limits.values():
         extent = limit.extent
-        shown = column(extent.quantity, "head" if extent.quantity == "pressure_head" else extent.dimension, model.case)
+        shown = column(
+            extent.quantity,
+            "head" if extent.quantity == "pressure_head" else extent.dimension,
+            model.case,
+        )
         shared = {"name": limit.name, "quantity": extent.quantity, "until": float(summary.t)}
         rows = []
         for part in part_extremes(model, summary, extent):
             for row in nearest(model, summary, limit, part, complete):
-                all_places = {PLACES_KEY: place_margins(model, extent, shown, row)} if margins else {}
+                all_places = (
+                    {PLACES_KEY: place_margins(model, extent, shown, row)} if margins else {}
+                )
                 rows.append(row_of(row, shown, chainage, extent) | shared | all_places)
         tables.append(rows)
     return tables
@@ -168,8 +196,15 @@ def places(model, summary, margins=True) -> list[list[dict[str, Any]]]:
 def verdict(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Verdict on a limit, from its rows of `places`: the worst row, with the list `worst` of the worst rows added."""
     rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in rows]
-    rows.sort(key=lambda row: (STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]))
-    listed = [{key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)]
+    rows.sort(
+        key=lambda row: (
+            STATES.index(row["state"]),
+            -math.inf if row["margin"] is None else row["margin"],
+        )
+    )
+    listed = [
+        {key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)
+    ]
     return {**rows[0], "ok": rows[0]["state"] == HOLDS, "worst": listed}
 
 
@@ -193,14 +228,35 @@ def nearest(model, summary, limit, part: PartExtremes, complete: bool):
         if bounds is None:
             continue
         bounds = np.broadcast_to(np.asarray(bounds, float), values.shape)
-        margin, tolerance = sign * (values - bounds), ROUNDING * (abs(bounds) + SIZES.get(quantity, 0.0))
+        margin = sign * (values - bounds)
+        tolerance = ROUNDING * (abs(bounds) + SIZES.get(quantity, 0.0))
         unknown = np.isnan(margin) | (margin == np.inf)
         at = int(np.argmin(np.where(unknown, -tolerance, margin)))
-        state = FAILS if margin[at] < -tolerance[at] else HOLDS if complete and not unknown[at] else OPEN
-        if state == FAILS and bound == "minimum" and bounds[at] == cavity_of(model, quantity, part.elevation[at]):
+        state = (
+            FAILS
+            if margin[at] < -tolerance[at]
+            else HOLDS
+            if complete and not unknown[at]
+            else OPEN
+        )
+        if (
+            state == FAILS
+            and bound == "minimum"
+            and bounds[at] == cavity_of(model, quantity, part.elevation[at])
+        ):
             at = first_cavity(summary, part, margin, at)
-        yield Nearest(float(margin[at]), float(values[at]), float(bounds[at]), bound, float(times[at]), part, at, state,
-                      margin, bounds)  # fmt: skip
+        yield Nearest(
+            float(margin[at]),
+            float(values[at]),
+            float(bounds[at]),
+            bound,
+            float(times[at]),
+            part,
+            at,
+            state,
+            margin,
+            bounds,
+        )
 
 
 def place_margins(model, extent, shown: UnitColumn, row: Nearest) -> PlaceMargins:
@@ -211,9 +267,14 @@ def place_margins(model, extent, shown: UnitColumn, row: Nearest) -> PlaceMargin
     part, above = row.part, extent.quantity == "pressure_head"
     text = f"{part.group}.{part.part}.{'head' if above else extent.quantity}"
     shares = part.distance / getattr(model.case.links.get(part.part), "length", np.nan)
-    texts = [text if np.isnan(share) else f"{text}@{min(max(float(share), 0.0), 1.0)!r}" for share in shares]
+    texts = [
+        text if np.isnan(share) else f"{text}@{min(max(float(share), 0.0), 1.0)!r}"
+        for share in shares
+    ]
     limits = row.limits + (part.elevation if above else 0.0)
-    return PlaceMargins(texts, np.asarray(shown.from_si(limits)), np.asarray(shown.span_from_si(row.margins)))
+    return PlaceMargins(
+        texts, np.asarray(shown.from_si(limits)), np.asarray(shown.span_from_si(row.margins))
+    )
 
 
 def allowed(model, limit, bound: str, part: PartExtremes):
@@ -222,7 +283,9 @@ def allowed(model, limit, bound: str, part: PartExtremes):
     Under `cavitation` no pressure falls below the vapour pressure. A minimum at or below it is replaced by the pressure
     below which a position counts as a cavity.
     """
-    case, quantity, value = model.case, limit.extent.quantity, getattr(limit, bound)
+    case = model.case
+    quantity = limit.extent.quantity
+    value = getattr(limit, bound)
     if bound == "maximum" and limit.class_fraction is not None:
         value = limit.class_fraction * case.links[part.part].allowable_pressure
         return in_quantity(model, quantity, value + case.ambient_pressure, part.elevation)
@@ -231,7 +294,10 @@ def allowed(model, limit, bound: str, part: PartExtremes):
         return in_quantity(model, quantity, pressure, part.elevation)
     if value is None or bound == "maximum" or quantity not in OF_PRESSURE or not case.law.cavitates:
         return value
-    above = pressure_of(model, quantity, value, part.elevation) > (1.0 + NEAR) * case.properties.vapor_pressure
+    above = (
+        pressure_of(model, quantity, value, part.elevation)
+        > (1.0 + NEAR) * case.properties.vapor_pressure
+    )
     return np.where(above, value, cavity_of(model, quantity, part.elevation))
 
 
@@ -248,7 +314,12 @@ def cavity_of(model, quantity: str, elevation):
 def first_cavity(summary, part: PartExtremes, margin: np.ndarray, at: int) -> int:
     """Index of the position where the first cavity of a pipe opened, if the limit is exceeded there; else `at`."""
     distance = next(
-        (cavity.distance for cavity in summary.cavities if cavity.place == f"{part.group}.{part.part}"), np.nan
+        (
+            cavity.distance
+            for cavity in summary.cavities
+            if cavity.place == f"{part.group}.{part.part}"
+        ),
+        np.nan,
     )
     place = int(np.argmin(abs(part.distance - distance))) if math.isfinite(distance) else at
     return place if margin[place] < 0.0 else at
@@ -261,15 +332,18 @@ def extremes(model, quantity: str, part: PartExtremes):
     """
     if quantity in OF_PRESSURE:
         low, high = (
-            in_quantity(model, quantity, pressures, part.elevation) for pressures in (part.minimum, part.maximum)
+            in_quantity(model, quantity, pressures, part.elevation)
+            for pressures in (part.minimum, part.maximum)
         )
         return (low, part.t_min), (high, part.t_max)
     if quantity not in MAGNITUDES:
         return (part.minimum, part.t_min), (part.maximum, part.t_max)
-    changes_sign, reversed = (part.minimum <= 0.0) & (part.maximum >= 0.0), -part.minimum > part.maximum
+    changes_sign = (part.minimum <= 0.0) & (part.maximum >= 0.0)
+    reversed = -part.minimum > part.maximum
     low = np.where(changes_sign, 0.0, np.minimum(abs(part.minimum), abs(part.maximum)))
     t_low = np.where(changes_sign, np.nan, np.where(reversed, part.t_max, part.t_min))
-    high, t_high = np.where(reversed, -part.minimum, part.maximum), np.where(reversed, part.t_min, part.t_max)
+    high = np.where(reversed, -part.minimum, part.maximum)
+    t_high = np.where(reversed, part.t_min, part.t_max)
     return (low, t_low), (high, t_high)
 
 
@@ -287,7 +361,11 @@ class Chainages:
         """
         if part.group == "links":
             distance = part.distance[at]
-            return float(self.leg(part.part, on).chainage(distance)) if math.isfinite(distance) else None
+            return (
+                float(self.leg(part.part, on).chainage(distance))
+                if math.isfinite(distance)
+                else None
+            )
         for name in self.ordered(on):
             for leg in self.legs[name]:
                 link = self.case.links[leg.pipe]
@@ -297,24 +375,37 @@ class Chainages:
 
     def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
         """Leg (pipe with chainages and direction) of a pipe for chainages; on : names of routes in the limit."""
-        result = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
+        result = next(
+            (leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None
+        )
         return pipe_leg(pipe, self.case.links) if result is None else result
 
     def ordered(self, on: tuple[str, ...]) -> list[str]:
         """Names of all routes in order of preference: routes that the limit names first, those of a cut pipe last."""
-        return sorted(self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on))
+        return sorted(
+            self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on)
+        )
 
 
 def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
     """Dict for a position: part, chainage and elevation [m], time [s]; value, limit, margin in the unit of `shown`."""
-    part, at, known = row.part, row.at, not math.isnan(row.margin)
+    part = row.part
+    at = row.at
+    known = not math.isnan(row.margin)
     return {
-        "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
-        "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
-        "value": finite(shown.from_si(row.value)), "limit": finite(shown.from_si(row.limit)),
-        "margin": finite(shown.span_from_si(row.margin)), "unit": shown.unit, "error": None, "reason": None,
+        "place": part.part,
+        "chainage": chainage.of(part, at, extent.on) if known else None,
+        "elevation": finite(part.elevation[at]),
+        "time": finite(row.time) if known else None,
+        "bound": row.bound,
+        "value": finite(shown.from_si(row.value)),
+        "limit": finite(shown.from_si(row.limit)),
+        "margin": finite(shown.span_from_si(row.margin)),
+        "unit": shown.unit,
+        "error": None,
+        "reason": None,
         "state": row.state,
-    }  # fmt: skip
+    }
 
 
 def finite(value) -> float | None:
@@ -387,8 +478,10 @@ def _note(t: np.ndarray, theirs: np.ndarray) -> str:
     if count >= max(FEWEST_COMMON, COMMON * min(len(t), len(theirs))):
         return f"the rows of both runs differ: compared at their {count} common times of {len(t)} and {len(theirs)}"
     widest = float(np.diff(theirs).max(initial=0.0))
-    return (f"the runs have {count} common times: values of the second run are interpolated between rows up to "
-            f"{widest:.3g} s apart, so differences include those of this interpolation")  # fmt: skip
+    return (
+        f"the runs have {count} common times: values of the second run are interpolated between rows up to "
+        f"{widest:.3g} s apart, so differences include those of this interpolation"
+    )
 
 
 def common_rows(t: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -414,22 +507,32 @@ def common_rows(t: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def _difference(a, b, probe: str) -> dict:
     column = a.column(probe)
     other = b[probe] if a.units[probe] == b.units[probe] else column.from_si(b.si(probe))
-    t, ours, theirs = a.seconds, a[probe], b.seconds
+    t = a.seconds
+    ours = a[probe]
+    theirs = b.seconds
     if not len(theirs):  # a run that stopped at its start
-        t, ours, theirs = t[:0], ours[:0], theirs[:0]
+        t = t[:0]
+        ours = ours[:0]
+        theirs = theirs[:0]
     elif not np.array_equal(t, theirs):
         mine, same = common_rows(t, theirs)
         if len(mine) >= max(FEWEST_COMMON, COMMON * min(len(t), len(theirs))):
-            t, ours, other = t[mine], ours[mine], other[same]
+            t = t[mine]
+            ours = ours[mine]
+            other = other[same]
         else:
             within = (t >= theirs[0]) & (t <= theirs[-1])
             t, ours = t[within], ours[within]
             other = interpolated(theirs, other, t)
     difference = other - ours
     worst = int(np.argmax(np.abs(difference))) if len(t) else 0
-    return {"unit": column.unit, "rows": len(t), "greatest": float(difference[worst]) if len(t) else None,
-            "t_greatest": float(t[worst]) if len(t) else None,
-            "rms": float(np.sqrt(np.mean(difference**2))) if len(t) else None}  # fmt: skip
+    return {
+        "unit": column.unit,
+        "rows": len(t),
+        "greatest": float(difference[worst]) if len(t) else None,
+        "t_greatest": float(t[worst]) if len(t) else None,
+        "rms": float(np.sqrt(np.mean(difference**2))) if len(t) else None,
+    }
 
 
 def claims(model, summary, result) -> dict:
@@ -440,7 +543,10 @@ def claims(model, summary, result) -> dict:
     return {
         "expectations": expectations(model, summary, result),
         "verdicts": [verdict(rows) for rows in result.places],
-        "comparisons": [comparison(compare, columns[compare.probe.text], result) for compare in case.compare.values()],
+        "comparisons": [
+            comparison(compare, columns[compare.probe.text], result)
+            for compare in case.compare.values()
+        ],
     }
 
 
@@ -473,11 +579,23 @@ def expectation(text: str, expect, column: UnitColumn, value: float, complete: b
     """
     tolerance = expect.atol + expect.rtol * abs(expect.value)
     known = math.isfinite(value)
-    state = FAILS if known and abs(value - expect.value) > tolerance else HOLDS if known and complete else OPEN
-    return {"text": text, "claimed": float(column.from_si(expect.value)),
-            "found": float(column.from_si(value)) if known else None,
-            "tolerance": float(column.span_from_si(tolerance)), "unit": column.unit, "state": state,
-            "ok": state == HOLDS, "error": None}  # fmt: skip
+    state = (
+        FAILS
+        if known and abs(value - expect.value) > tolerance
+        else HOLDS
+        if known and complete
+        else OPEN
+    )
+    return {
+        "text": text,
+        "claimed": float(column.from_si(expect.value)),
+        "found": float(column.from_si(value)) if known else None,
+        "tolerance": float(column.span_from_si(tolerance)),
+        "unit": column.unit,
+        "state": state,
+        "ok": state == HOLDS,
+        "error": None,
+    }
 
 
 def _at_places(model, summary, expect) -> tuple[float, float]:
@@ -491,7 +609,9 @@ def _at_places(model, summary, expect) -> tuple[float, float]:
         extreme = part.minimum if low else part.maximum
         times.append(part.t_min if low else part.t_max)
         values.append(
-            in_quantity(model, extent.quantity, extreme, part.elevation) if extent.quantity in OF_PRESSURE else extreme
+            in_quantity(model, extent.quantity, extreme, part.elevation)
+            if extent.quantity in OF_PRESSURE
+            else extreme
         )
     at = int((np.argmin if low else np.argmax)(np.concatenate(values)))
     return float(np.concatenate(values)[at]), float(np.concatenate(times)[at])
@@ -515,7 +635,9 @@ def _at_probe(expect, probe: str, summary, result) -> tuple[float, float]:
         return float(values[-1]), summary.t
     if expect.function == "at":
         inside = t[0] <= expect.time <= t[-1]
-        return float(interpolated(t, values, np.array([expect.time]))[0]) if inside else math.nan, expect.time
+        return float(
+            interpolated(t, values, np.array([expect.time]))[0]
+        ) if inside else math.nan, expect.time
     span = t[-1] - t[0]
     area = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
     return float(area / span) if span > 0.0 else float(values[0]), summary.t

@@ -16,7 +16,9 @@ from fvsolve.errors import FvsolveError
 from fvsolve.units import show
 
 
-def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
+def advance(
+    model: Model, state: State, until: float, inputs: dict[str, float] | None = None
+) -> State:
     """Advance `state` to the time `until` [s], with named inputs held at constant values; returns the new state.
 
     inputs : SI values, such as {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}
@@ -24,11 +26,17 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     the time of the state, and a run that cannot continue.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
-        raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
+        raise FvsolveError(
+            f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}"
+        )
     if inputs is not None and not isinstance(inputs, Mapping):
-        raise FvsolveError(f"inputs = {show(inputs)} is not a dict; expected a number for each name of an input")
+        raise FvsolveError(
+            f"inputs = {show(inputs)} is not a dict; expected a number for each name of an input"
+        )
     if isinstance(until, bool) or not isinstance(until, Real):
-        raise FvsolveError(f"until = {show(until)} is not a time; expected a finite number of seconds")
+        raise FvsolveError(
+            f"until = {show(until)} is not a time; expected a finite number of seconds"
+        )
     if not math.isfinite(until):
         raise FvsolveError(f"until = {until} is not a time; expected a finite number of seconds")
     if not until >= state.t:
@@ -54,7 +62,10 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
             code = loop.run(NO_LIMIT)
         if code != loop_records.DONE:
             raise FvsolveError(f"advance stopped: {loop.failure_text(code)}")
-    memory = {"step": np.array([loop.state["step"], loop.state["error_old"]]), "armed": loop.armed.copy()}
+    memory = {
+        "step": np.array([loop.state["step"], loop.state["error_old"]]),
+        "armed": loop.armed.copy(),
+    }
     memory |= {name: array.copy() for name, array in loop.run_data.arrays().items() if array.size}
     end = State(loop.t, loop.now.copy(), memory)
     if reused.is_reusable:

@@ -17,7 +17,17 @@ import numpy as np
 
 from fvsolve.core.kernels import energy_supply
 from fvsolve.core.kernels.calls import POWER, compile_as
-from fvsolve.core.kernels.energy_supply import EXCESS, HEADER, INTERVAL, NEXT, PLACE, RATIO, TIME, T, WatchArrays
+from fvsolve.core.kernels.energy_supply import (
+    EXCESS,
+    HEADER,
+    INTERVAL,
+    NEXT,
+    PLACE,
+    RATIO,
+    TIME,
+    T,
+    WatchArrays,
+)
 from fvsolve.core.kernels.table_handle import boxed
 from fvsolve.core.model import RunData
 from fvsolve.core.model.energy_accounts import Accounts, available_energy, terms_of
@@ -27,12 +37,15 @@ from fvsolve.errors import FvsolveError, Notice
 from fvsolve.jit import COMPILING, compile_once
 
 FIRST_INTERVAL = 64.0  # steps between the first states; it doubles from time to time
-FIRST_BY_POWER = 8.0  # the same with sources other than nodes, whose powers have an unknown range at first
-MOST_JUMPS = 100  # jumps of schedules, at each of which two states are needed, above which nothing is watched
+# the same with sources other than nodes, whose powers have an unknown range at first
+FIRST_BY_POWER = 8.0
+# jumps of schedules, at each of which two states are needed, above which nothing is watched
+MOST_JUMPS = 100
 # Energy that may appear, as a fraction of the energy exchanged so far; times this plus a multiple of `rtol`.
 ALLOWED = 0.05
 TOLERANCES = 10.0
-ROUNDING = 1e-10  # rounding of states, relative to their scales, and of the available energy at the start
+# rounding of states, relative to their scales, and of the available energy at the start
+ROUNDING = 1e-10
 
 
 class EnergyTerms(NamedTuple):
@@ -74,14 +87,20 @@ def energy_terms(model: Model) -> EnergyTerms | None:
     held, stored_rows, holding_signs = accounts.stored_terms
     rounding = ROUNDING * available + energy_of_rounding(run_data, accounts)
     return EnergyTerms(
-        [account.place for account in accounts.stored_accounts], (accounts.power_count, accounts.stores),
-        np.column_stack([source, power_rows]).reshape(-1), signs, nodes,
+        [account.place for account in accounts.stored_accounts],
+        (accounts.power_count, accounts.stores),
+        np.column_stack([source, power_rows]).reshape(-1),
+        signs,
+        nodes,
         np.array([spread(model, int(i)) for i in nodes], dtype=np.float64),
-        np.column_stack([held, stored_rows]).reshape(-1), holding_signs,
-        sum(part.energy_of_waves(part.deviations(model.start)) for part in model.meshed), rounding,
-        calls_without_network(model) if (power_rows[nodes[source] < 0] >= accounts.network_rows).all()
+        np.column_stack([held, stored_rows]).reshape(-1),
+        holding_signs,
+        sum(part.energy_of_waves(part.deviations(model.start)) for part in model.meshed),
+        rounding,
+        calls_without_network(model)
+        if (power_rows[nodes[source] < 0] >= accounts.network_rows).all()
         else model.functions.calls,
-    )  # fmt: skip
+    )
 
 
 def calls_without_network(model: Model) -> np.ndarray:
@@ -96,9 +115,13 @@ def calls_without_network(model: Model) -> np.ndarray:
 
 def energy_of_rounding(run_data: RunData, accounts: Accounts) -> float:
     """Energy that a change of all states of the start by rounding stores [J]."""
-    model, t, out = run_data.model, run_data.model.case.numerics.start, run_data.model.new_out()
+    model = run_data.model
+    t = run_data.model.case.numerics.start
+    out = run_data.model.new_out()
     none, rows = np.zeros(0), np.zeros((2, accounts.stores))
-    for y, stored in zip((model.start.copy(), model.start + ROUNDING * model.scale), rows, strict=True):
+    for y, stored in zip(
+        (model.start.copy(), model.start + ROUNDING * model.scale), rows, strict=True
+    ):
         model.functions.rhs(t, y, none, out, run_data.handle)
         accounts.stored(t, y, none, out, run_data.handle, stored)
     return float(np.abs(rows[1] - rows[0]).sum())
@@ -142,24 +165,42 @@ class EnergyWatch:
             own.for_energy()
         count, masses, (powers, stores) = terms.nodes.size, len(model.tables.nodes), terms.rows
         self.restart_data = np.zeros(HEADER + 4 * count + 2 * masses + stores)
-        parts = np.split(self.restart_data, np.cumsum([HEADER, count, count, count, count, masses, masses]))
+        parts = np.split(
+            self.restart_data, np.cumsum([HEADER, count, count, count, count, masses, masses])
+        )
         self.record, self.supplied, _, least, greatest, self.entered, self.left, _ = parts
         least[:], greatest[:] = np.inf, -np.inf
-        self.record[NEXT] = self.record[INTERVAL] = FIRST_INTERVAL if (terms.nodes >= 0).all() else FIRST_BY_POWER
+        self.record[NEXT] = self.record[INTERVAL] = (
+            FIRST_INTERVAL if (terms.nodes >= 0).all() else FIRST_BY_POWER
+        )
         self.record[T] = np.nan
         allowed = ALLOWED + TOLERANCES * (numerics.rtol or 0.0)
         limits = np.array([allowed, terms.exchanged, terms.rounding])
         self.arrays = WatchArrays(
-            np.zeros(0, dtype=np.int64), np.zeros(model.y_size), model.new_out(), np.zeros(powers), np.zeros(stores),
-            np.zeros(len(terms.places)), np.zeros(count), terms.sources, terms.signs, terms.nodes, terms.spreads,
-            terms.holders, terms.holding_signs, limits, self.restart_data,
-        )  # fmt: skip
+            np.zeros(0, dtype=np.int64),
+            np.zeros(model.y_size),
+            model.new_out(),
+            np.zeros(powers),
+            np.zeros(stores),
+            np.zeros(len(terms.places)),
+            np.zeros(count),
+            terms.sources,
+            terms.signs,
+            terms.nodes,
+            terms.spreads,
+            terms.holders,
+            terms.holding_signs,
+            limits,
+            self.restart_data,
+        )
         self.watch_state = watch_state()
         self.link()
 
     def link(self) -> None:
         """Make the handle of the watch from the present arrays of its run data."""
-        own = self.run_data.linked_handle(self.run_data.written, (self.terms.calls, self.model.functions.hooks))
+        own = self.run_data.linked_handle(
+            self.run_data.written, (self.terms.calls, self.model.functions.hooks)
+        )
         self.arrays = self.arrays._replace(own=own if COMPILING else boxed(own))
         self.handle = energy_supply.handle_of_watch(self.arrays)
 
@@ -184,8 +225,10 @@ class EnergyWatch:
         if loop.team is not None:
             return max(1.0, self.record[NEXT] - loop.state["steps"])
         loop.stepper.watcher, loop.stepper.watch, loop.control["watch_at"] = (
-            self.watch_state, self.handle, self.record[NEXT]
-        )  # fmt: skip
+            self.watch_state,
+            self.handle,
+            self.record[NEXT],
+        )
         return np.inf
 
     def follow(self, loop) -> None:
@@ -213,8 +256,15 @@ class EnergyWatch:
         """Pass the present state of a `RunLoop` to `watch_state`; begins : see there."""
         self.follow(loop)
         state, stepper = loop.state, loop.stepper
-        self.watch_state(float(state["t"]), float(state["steps"]), loop.now.copy(), stepper.ledger,
-                         loop.run_data.handle, self.handle, begins)  # fmt: skip
+        self.watch_state(
+            float(state["t"]),
+            float(state["steps"]),
+            loop.now.copy(),
+            stepper.ledger,
+            loop.run_data.handle,
+            self.handle,
+            begins,
+        )
 
     def notice(self) -> Notice | None:
         """Notice if more energy appeared than the method's own error explains, otherwise None."""
@@ -224,9 +274,11 @@ class EnergyWatch:
         place = self.terms.places[int(self.record[PLACE])]
         excess, when = float(self.record[EXCESS]), amount(float(self.record[TIME]), "time", 6)
         limit = excess / float(self.record[RATIO])
-        text = (f"{place}: at {when} the case stores {amount(excess, 'energy', 4)} more than it had at the "
-                f"start and than its sources supplied, most of it here; {amount(limit, 'energy', 4)} at most are "
-                "errors of steps; the numbers are not to be trusted; halve the step or try another method")  # fmt: skip
+        text = (
+            f"{place}: at {when} the case stores {amount(excess, 'energy', 4)} more than it had at the "
+            f"start and than its sources supplied, most of it here; {amount(limit, 'energy', 4)} at most are "
+            "errors of steps; the numbers are not to be trusted; halve the step or try another method"
+        )
         return Notice("energy", place, text, None, excess, limit, False)
 
 

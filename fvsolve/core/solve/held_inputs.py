@@ -28,25 +28,38 @@ class HeldModel:
         for name in self.names:
             if name not in known:
                 near = nearest(str(name), known)
-                hint = f'; did you mean "{near}"?' if near else f"; expected one of {', '.join(known)}"
+                hint = (
+                    f'; did you mean "{near}"?' if near else f"; expected one of {', '.join(known)}"
+                )
                 raise FvsolveError(f"no input named {show(name)}{hint}")
         self.targets, tables = [known[name] for name in self.names], model.tables
-        self.fixed = bool(self.targets) and (bool(model.meshed) or any(target.scalar >= 0 for target in self.targets))
-        schedules, nodes, first = tables.schedules.copy(), tables.nodes.copy(), len(tables.pieces)
-        used = [at for target in self.targets if target.held is None
-                for at in (target.schedule, *(part[0] for part in target.parts))]  # fmt: skip
+        self.fixed = bool(self.targets) and (
+            bool(model.meshed) or any(target.scalar >= 0 for target in self.targets)
+        )
+        schedules = tables.schedules.copy()
+        nodes = tables.nodes.copy()
+        first = len(tables.pieces)
+        used = [
+            at
+            for target in self.targets
+            if target.held is None
+            for at in (target.schedule, *(part[0] for part in target.parts))
+        ]
         pieces = np.vstack([tables.pieces, *[[-np.inf, *[0.0] * 6]] * len(used)])
         for row, schedule in enumerate(used, first):
             schedules[schedule] = row, 1
         for target in self.targets:
-            if target.node >= 0 and not self.linear:  # under the linear law a head becomes a pressure
+            # under the linear law a head becomes a pressure
+            if target.node >= 0 and not self.linear:
                 nodes["head_given"][target.node] = target.sort is HEAD
         scalars, features = tables.scalars.copy(), [feature.to_hold() for feature in model.features]
         changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces}
         # views that stay writable, while the tables of a model are read-only
         self.values, self.bounds = pieces[first:, 3], scalars[:]
         self.of_features = {feature.slot: values for feature, values in features}
-        self.model = replace(model, tables=tables._replace(**changed), features=[feature for feature, _ in features])
+        self.model = replace(
+            model, tables=tables._replace(**changed), features=[feature for feature, _ in features]
+        )
 
     def write(self, inputs: Mapping[str, float]) -> None:
         """Write the values of all inputs [SI], in the order of `names`; raises FvsolveError for one out of range."""
@@ -64,7 +77,10 @@ class HeldModel:
             row += len(values)
             if target.scalar >= 0:  # values of a scalar are limited to its bounds
                 bounds = self.bounds[target.scalar]
-                bounds["least"], bounds["greatest"] = min(bounds["least"], number), max(bounds["greatest"], number)
+                bounds["least"], bounds["greatest"] = (
+                    min(bounds["least"], number),
+                    max(bounds["greatest"], number),
+                )
 
 
 def hold(model: Model, inputs: Mapping[str, float]) -> Model:
@@ -84,7 +100,9 @@ def checked(name: str, value: float, target: Input) -> float:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is not a number; expected {target.sort.expected}")
+        raise FvsolveError(
+            f"{name} = {show(value)} is not a number; expected {target.sort.expected}"
+        )
     number = float(value)
     if not math.isfinite(number):
         raise FvsolveError(f"{name} = {number} is not finite; expected {target.sort.expected}")
@@ -92,7 +110,9 @@ def checked(name: str, value: float, target: Input) -> float:
         raise FvsolveError(f"{name} = {number:g} is out of range; expected {target.sort.expected}")
     pressure = target.scale * number + target.offset
     if target.node >= 0 and not pressure > 0.0:
-        text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
+        text = f"{name} = {number:g}" + (
+            f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum"
+        )
         raise FvsolveError(f"{text}; expected {target.sort.expected}")
     return number
 
@@ -100,8 +120,14 @@ def checked(name: str, value: float, target: Input) -> float:
 def input_value(model: Model, t: float, y: np.ndarray, target: Input) -> float:
     """Value [SI] of an input that is no output of a control, at time t [s] in the state y."""
     if target.node >= 0:
-        pressure = float(model.tables.nodes[target.node]["pressure"]
-                         + model.evaluate(t, y)[1][model.layout["pressure"] + target.node])  # fmt: skip
+        pressure = float(
+            model.tables.nodes[target.node]["pressure"]
+            + model.evaluate(t, y)[1][model.layout["pressure"] + target.node]
+        )
         place = model.node_names[target.node]
-        return pressure if target.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
+        return (
+            pressure
+            if target.sort is PRESSURE
+            else float(model.head(pressure, model.elevation[place]))
+        )
     return float(value_at(model.tables, target.schedule, t, np.inf) / target.scale)

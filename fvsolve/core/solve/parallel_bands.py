@@ -39,10 +39,23 @@ from fvsolve.core.steppers import loop_records
 from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.core.steppers.run_handle import JOIN
 
-COPIED = ("state", "control", "progress", "ledger", "carry", "g", "g_new", "pace", "out", "out_row", "values",
-          "ledger_rates")  # fmt: skip
+COPIED = (
+    "state",
+    "control",
+    "progress",
+    "ledger",
+    "carry",
+    "g",
+    "g_new",
+    "pace",
+    "out",
+    "out_row",
+    "values",
+    "ledger_rates",
+)
 WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "accepted")
-ABORT_DELAY = 0.5  # seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
+# seconds between a message and the end of all ranks: `mpiexec` loses what it has not yet forwarded
+ABORT_DELAY = 0.5
 
 
 def yield_address() -> int:
@@ -77,8 +90,15 @@ class BandWorker:
         own = np.zeros(band_exchange.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
         own[[band_exchange.BAND, band_exchange.BAND_COUNT]] = k, cut.count
         own[[band_exchange.YIELD, band_exchange.PROCESS_CALL]] = team.yield_address, team.callback
-        own[[band_exchange.BOARD, band_exchange.SUM_BUFFER]] = team.board.ctypes.data, team.buffer.ctypes.data
-        own[[band_exchange.COMMON_SPANS, band_exchange.STATES, band_exchange.FLOWS]] = common, len(states), len(flows)
+        own[[band_exchange.BOARD, band_exchange.SUM_BUFFER]] = (
+            team.board.ctypes.data,
+            team.buffer.ctypes.data,
+        )
+        own[[band_exchange.COMMON_SPANS, band_exchange.STATES, band_exchange.FLOWS]] = (
+            common,
+            len(states),
+            len(flows),
+        )
         own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
         self.stepper.structure = blocked_sums(cut, k)
         self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.structure}
@@ -90,7 +110,10 @@ class BandWorker:
         for begin, stop, *_ in blocks:
             own_states[begin:stop] = True
         owned = own_states[at[::3]]
-        stepper.bounded_states, stepper.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
+        stepper.bounded_states, stepper.bounds = (
+            np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(),
+            bounds[owned],
+        )
 
     def open(self) -> None:
         """Make the handle of the arrays that the run writes; repeated when an array of a feature has grown."""
@@ -112,7 +135,10 @@ class BandWorker:
             self.store(name, getattr(self.loop.run_data.written, name))
         for name, array in self.loop.run_data.arrays().items():
             self.run_data.set_array(name, array.copy())
-        self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
+        self.stepper.times, self.stepper.largest = (
+            self.loop.stepper.times,
+            self.loop.stepper.largest,
+        )
         now = self.loop.progress["now"]
         for rows in states:
             self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
@@ -137,8 +163,14 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 
     The two share only arrays that steps do not change.
     """
-    copy = Integrator(stepper.method, stepper.scale.size, stepper.ledger_rates.shape[1], stepper.jacobian_structure,
-                      stepper.scale, stepper.damped)  # fmt: skip
+    copy = Integrator(
+        stepper.method,
+        stepper.scale.size,
+        stepper.ledger_rates.shape[1],
+        stepper.jacobian_structure,
+        stepper.scale,
+        stepper.damped,
+    )
     copy.stored, copy.carry = stepper.stored, stepper.carry.copy()
     for name in ("out", "out_row", "values", "g", "g_new", "pace", "inner", "rows"):
         setattr(copy, name, getattr(stepper, name).copy())
@@ -155,18 +187,29 @@ class ThreadTeam:
     """Threads that step the bands of a run, one worker in each; the calling thread waits for them."""
 
     def __init__(self, loop, cut: Partition) -> None:
-        self.loop, self.cut, self.yield_address, self.callback, self.seconds = loop, cut, yield_address(), 0, 0.0
+        self.loop, self.cut, self.yield_address, self.callback, self.seconds = (
+            loop,
+            cut,
+            yield_address(),
+            0,
+            0.0,
+        )
         self.functions, self.join = band_functions(cut)
         self.board = aligned_zeros(band_exchange.LINE * cut.count)
         self.buffer = aligned_zeros(2 * cut.sum_count)
         self.members = [BandWorker(self, 0, loop.run_data, loop.stepper)]
         for k in range(1, cut.count):
-            self.members.append(BandWorker(self, k, RunData(loop.model), copy_integrator(loop.stepper)))
+            self.members.append(
+                BandWorker(self, k, RunData(loop.model), copy_integrator(loop.stepper))
+            )
         self.stale = True  # True where the workers do not have the present rows of the loop
         self.requests = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
         tasks = zip(self.members, self.requests, strict=True)
-        self.threads = [threading.Thread(target=self.serve, args=task, daemon=True, name="band") for task in tasks]
+        self.threads = [
+            threading.Thread(target=self.serve, args=task, daemon=True, name="band")
+            for task in tasks
+        ]
         for thread in self.threads:
             thread.start()
 
@@ -235,7 +278,9 @@ class Exchange:
         """Exchange entries of the array `values` between all ranks; received entries are written into it."""
         from mpi4py import MPI
 
-        requests = [self.comm.Irecv(self.buffers[k], k) for k, at in self.received.items() if at.size]
+        requests = [
+            self.comm.Irecv(self.buffers[k], k) for k, at in self.received.items() if at.size
+        ]
         requests += [self.comm.Isend(values[at], k) for k, at in self.sent.items() if at.size]
         MPI.Request.Waitall(requests)
         for k, at in self.received.items():
@@ -245,7 +290,9 @@ class Exchange:
 def places(runs: np.ndarray, owner: int) -> np.ndarray:
     """All indices in the ranges of `runs` that belong to the rank `owner` : int64[n]."""
     mine = runs[runs[:, 0] == owner]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)])
+    return np.concatenate(
+        [np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)]
+    )
 
 
 class MpiRanks:
@@ -254,16 +301,27 @@ class MpiRanks:
     def __init__(self, loop, cut: Partition, comm) -> None:
         self.loop, self.cut, self.comm, self.seconds = loop, cut, comm, 0.0
         self.functions, self.join = band_functions(cut)
-        self.callback_object = CALLBACK(self.exchange)  # kept as long as compiled code has its address
-        self.callback, self.yield_address = ctypes.cast(self.callback_object, ctypes.c_void_p).value, yield_address()
+        # kept as long as compiled code has its address
+        self.callback_object = CALLBACK(self.exchange)
+        self.callback, self.yield_address = (
+            ctypes.cast(self.callback_object, ctypes.c_void_p).value,
+            yield_address(),
+        )
         self.board = self.buffer = np.zeros(0)
         self.member = BandWorker(self, comm.rank, loop.run_data, loop.stepper)
         ranks = range(comm.size)
-        self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
+        self.exchanges = (
+            Exchange(comm, [cut.states(k) for k in ranks]),
+            Exchange(comm, [cut.flows(k) for k in ranks]),
+        )
         self.others, common = np.ones(cut.sum_count, dtype=bool), len(cut.common_states())
-        for _, _, first, count, _ in self.member.stepper.row_blocks[common if comm.rank > 0 else 0 :]:
+        for _, _, first, count, _ in self.member.stepper.row_blocks[
+            common if comm.rank > 0 else 0 :
+        ]:
             self.others[first : first + count] = False
-        self.rows = [[slice(*block[:2]) for block in cut.row_blocks(k)[common:].tolist()] for k in ranks]
+        self.rows = [
+            [slice(*block[:2]) for block in cut.row_blocks(k)[common:].tolist()] for k in ranks
+        ]
         self.maxima_rows = [cut.maxima_rows(k) for k in ranks]
         self.stale = True
 

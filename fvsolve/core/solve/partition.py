@@ -68,14 +68,18 @@ class Partition:
         for rows, part in zip(self.firsts, self.divided, strict=True):
             for q in range(part.states_per_cell):
                 states = part.states_of_rows(q, int(rows[k]), int(rows[k + 1]))
-                blocks.append((*states, first + int(rows[k]), int(rows[k + 1] - rows[k]), part.row_size))
+                blocks.append(
+                    (*states, first + int(rows[k]), int(rows[k + 1] - rows[k]), part.row_size)
+                )
                 first += part.row_count
         return np.array(blocks, dtype=np.int64)
 
     def maxima_rows(self, k: int) -> list[slice]:
         """Ranges of the array `maxima` that band k writes in the divided parts."""
         pairs = zip(self.firsts, self.divided, strict=True)
-        return [own for rows, part in pairs for own in part.maxima_of_rows(*rows[k : k + 2].tolist())]
+        return [
+            own for rows, part in pairs for own in part.maxima_of_rows(*rows[k : k + 2].tolist())
+        ]
 
     def bands(self, k: int) -> np.ndarray:
         """First row and last row + 1 of band k in each part, cells for meshes that are not grids : int64[2 parts].
@@ -157,7 +161,14 @@ def single_thread_reason(model: Model) -> str:
         return f"method {method} may change to a method that solves for all states at once; {EXPLICIT_ONLY}"
     if not method_named(method).explicit:
         return f"method {method} solves for all states at once; {EXPLICIT_ONLY}"
-    if reason := next((feature.single_thread_reason for feature in model.features if feature.single_thread_reason), ""):
+    if reason := next(
+        (
+            feature.single_thread_reason
+            for feature in model.features
+            if feature.single_thread_reason
+        ),
+        "",
+    ):
         return reason
     meshes = model.case.meshes
     for probe in (*model.probes, *model.watched):
@@ -170,7 +181,9 @@ def single_thread_reason(model: Model) -> str:
 
 def undivided_parts(model: Model) -> str:
     """Text with the parts that every thread steps completely, and the reasons."""
-    return "; ".join(f"{part.name}: {part.undivided_reason}" for part in model.meshed if part.undivided_reason)
+    return "; ".join(
+        f"{part.name}: {part.undivided_reason}" for part in model.meshed if part.undivided_reason
+    )
 
 
 def divisible_rows(model: Model) -> dict:
@@ -185,7 +198,13 @@ def divisible_rows(model: Model) -> dict:
     rows = {part.name: part.row_count for part in divided}
     texts = {part.name: part.row_text(part.row_count) for part in divided}
     undivided = {part.name: part.undivided_reason for part in model.meshed if part.undivided_reason}
-    return {"rows": rows, "texts": texts, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
+    return {
+        "rows": rows,
+        "texts": texts,
+        "whole": undivided,
+        "most": min(rows.values(), default=1),
+        "why": reason,
+    }
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
@@ -197,7 +216,14 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
         return 1, []
     divisible = divisible_rows(model)
     if reason := divisible["why"]:
-        return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
+        return 1, [
+            Notice(
+                "threads",
+                "numerics",
+                f"threads = {threads}, but one thread is used: {reason}",
+                "threads",
+            )
+        ]
     few = [name for name, rows in divisible["rows"].items() if rows < threads]
     if few:
         counts = listing(f"{name} has {divisible['texts'][name]}" for name in few)
@@ -209,7 +235,8 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
 
 # Cells of a block of `stage_sums`: their arrays and the work arrays of the rates fit into a second-level cache.
 CACHED_CELLS = 4096
-LEAST_STATES = 2**17  # least number of states of a mesh: smaller ones stay in the second-level cache during a step
+# least number of states of a mesh: smaller ones stay in the second-level cache during a step
+LEAST_STATES = 2**17
 
 
 def blocked_sums(cut: Partition, k: int) -> np.ndarray:
@@ -223,7 +250,9 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
     blocked = [b for b in forming if parts[b].states_per_cell * parts[b].n >= LEAST_STATES]
     if not blocked:
         return np.zeros(0, dtype=np.int64)
-    others, common_cells, edges = list(cut.common_states()), [], []
+    others = list(cut.common_states())
+    common_cells = []
+    edges = []
     for rows, b in zip(cut.firsts, cut.parts, strict=True):
         part, (first, stop) = parts[b], (int(row) for row in rows[k : k + 2])
         for q in range(part.states_per_cell):
@@ -234,10 +263,16 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
             edges.append(part.states_of_rows(q, max(stop - part.margin, first), stop))
             common_cells += cells_at(model, part, q, first, stop)
     head = np.zeros(stage_sums.HEAD + len(parts), dtype=np.int64)
-    head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = len(others), len(common_cells), len(edges)
+    head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = (
+        len(others),
+        len(common_cells),
+        len(edges),
+    )
     head[stage_sums.BASINS], head[stage_sums.CELLS] = len(parts), CACHED_CELLS
     head[[stage_sums.HEAD + b for b in blocked]] = 1
-    return np.concatenate([head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()])
+    return np.concatenate(
+        [head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()]
+    )
 
 
 def cells_at(model, part, q: int, first: int, stop: int) -> list[tuple[int, int]]:
@@ -247,7 +282,9 @@ def cells_at(model, part, q: int, first: int, stop: int) -> list[tuple[int, int]
     """
     begin, end = part.states_of_rows(q, first, stop)
     at = part.first_state + q * part.n
-    cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *part.common_cells(model.tables)]))
+    cells = at + np.unique(
+        np.concatenate([np.zeros(0, dtype=np.int64), *part.common_cells(model.tables)])
+    )
     cells = cells[(cells >= begin) & (cells < end)]
     if not cells.size:
         return []

@@ -30,16 +30,26 @@ class ReusedLoop:
         # the structure of the Jacobian does not depend on values of inputs
         self.loop = loop = RunLoop(self.model, lambda: model.structure)
         loop.on_switch = lambda: loop.stop_columns(loop.control["end"])
-        written, stepper = loop.run_data.written, dict(zip(RunArrays._fields, all_arrays(loop.stepper), strict=True))
+        written = loop.run_data.written
+        stepper = dict(zip(RunArrays._fields, all_arrays(loop.stepper), strict=True))
         arrays = [array for name, array in written._asdict().items() if name not in HANDLES]
         arrays += [array for name, array in stepper.items() if name not in UNUSED]
         pairs = zip(loop.run_data.tables, self.model.tables, strict=True)
-        arrays += [own for own, shared in pairs if own is not shared]  # a run changes its own copies
+        # a run changes its own copies
+        arrays += [own for own, shared in pairs if own is not shared]
         # words of 8 bytes of all arrays
-        words = [array.reshape(-1).view(np.int64) for array in arrays if array.size and array.flags.writeable]
+        words = [
+            array.reshape(-1).view(np.int64)
+            for array in arrays
+            if array.size and array.flags.writeable
+        ]
         uniform = [bool((word == word[0]).all()) for word in words]
-        self.fills = [(word, int(word[0])) for word, alike in zip(words, uniform, strict=True) if alike]
-        self.copies = [(word, word.copy()) for word, alike in zip(words, uniform, strict=True) if not alike]
+        self.fills = [
+            (word, int(word[0])) for word, alike in zip(words, uniform, strict=True) if alike
+        ]
+        self.copies = [
+            (word, word.copy()) for word, alike in zip(words, uniform, strict=True) if not alike
+        ]
         self.histories = {name: array.copy() for name, array in loop.run_data.arrays().items()}
         self.state: State | None = None  # state in which the loop is, as `advance` returned it
 
@@ -80,7 +90,9 @@ class ReusedLoop:
             self.model.checked(state.t, state.y)
             self.start(state)
         run_data, self.state = self.loop.run_data, None  # flags may change
-        return run_data.observe(state.t, state.y, run_data.evaluate_checked(state.t, state.y, np.inf)[1])
+        return run_data.observe(
+            state.t, state.y, run_data.evaluate_checked(state.t, state.y, np.inf)[1]
+        )
 
 
 def reused_loop(model: Model, inputs: Mapping[str, float]) -> ReusedLoop:

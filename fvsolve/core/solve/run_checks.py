@@ -28,8 +28,10 @@ from fvsolve.core.steppers.integrator import Integrator
 from fvsolve.core.steppers.tableau import method_named
 from fvsolve.errors import Notice
 
-GROWTH_LIMIT = 1e6  # largest state, in units of its forcing range: beyond it the state has grown by instability
-NO_GROWTH = 10.0  # in the same units: waves that add up may reach it, so a smaller state is no sign of growth
+# largest state, in units of its forcing range: beyond it the state has grown by instability
+GROWTH_LIMIT = 1e6
+# in the same units: waves that add up may reach it, so a smaller state is no sign of growth
+NO_GROWTH = 10.0
 LEDGER_TOLERANCE = 1e-8  # greatest remainder of a ledger, relative to its largest term
 
 
@@ -64,12 +66,20 @@ class RunChecks:
         """True if the restart data have counts and numbers of places that a run can have."""
         own = self.step_doubling.restart_data[:4]
         is_valid = bool(np.isfinite(own).all() and own.min() >= 0.0)
-        return is_valid and (self.step_doubling.states.size > 0 or own[0] == 0.0) and self.energy.has_valid_place
+        return (
+            is_valid
+            and (self.step_doubling.states.size > 0 or own[0] == 0.0)
+            and self.energy.has_valid_place
+        )
 
     @property
     def largest_if_needed(self) -> np.ndarray:
         """Array `largest` if the step exceeds a predicted limit, so that the time loop checks growth; else empty."""
-        return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
+        return (
+            np.array(np.broadcast_to(self.largest, self.model.y_size))
+            if self.predicted
+            else np.zeros(0)
+        )
 
     def check(self, t: float, y: np.ndarray) -> str:
         """Check state y at time t [s], and update the wave rates of meshes; returns the reason to stop, or ""."""
@@ -84,10 +94,14 @@ class RunChecks:
             return ""
         worst = int(np.argmax(ratio))
         name, times = self.model.state_names[worst], GROWTH_LIMIT * float(ratio[worst])
-        text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
-                f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
-                "halve the step")  # fmt: skip
-        place, size, limit = name.partition("[")[0], float(abs(y[worst])), float(self.largest[worst])
+        text = (
+            f"{name} has grown to {times:.3g} times the range of its forcing at t = "
+            f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
+            "halve the step"
+        )
+        place = name.partition("[")[0]
+        size = float(abs(y[worst]))
+        limit = float(self.largest[worst])
         self.grown = Notice("growth", place, text, None, size, limit, False)
         return f"stopped: {text}"
 
@@ -96,9 +110,13 @@ class RunChecks:
         notices = list(self.predicted)
         # repeat the prediction with the wave rates and step errors of the run
         doubling = self.step_doubling
-        if doubling.over_limit or (self.model.case.numerics.step is not None and (notices or self.moving)):
+        if doubling.over_limit or (
+            self.model.case.numerics.step is not None and (notices or self.moving)
+        ):
             error = np.inf if self.grown else doubling.worst()[1]
-            notices = step_limits(self.model, self.rates, error, cell_error=doubling.worst_in_cells())
+            notices = step_limits(
+                self.model, self.rates, error, cell_error=doubling.worst_in_cells()
+            )
         step_error = self.step_doubling.notice()
         notices += [] if step_error is None else [step_error]
         energy = self.energy.notice()
@@ -106,7 +124,9 @@ class RunChecks:
         notices += [notice for own in self.run_data.features for notice in own.notices()]
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
-        return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]
+        return notices + [
+            notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)
+        ]
 
 
 def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
@@ -117,10 +137,12 @@ def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
-    text = (f"{counts['parted']} of {counts['steps']} steps were too long for Newton's method, for a disc that shuts "
-            "on a rigid column, for a contact with an end-stop, or for a part with storage beside delay lines, and "
-            "were taken in parts that end where the full step would have ended; give a smaller "
-            f"numerics.{key}, or rtol instead")  # fmt: skip
+    text = (
+        f"{counts['parted']} of {counts['steps']} steps were too long for Newton's method, for a disc that shuts "
+        "on a rigid column, for a contact with an end-stop, or for a part with storage beside delay lines, and "
+        "were taken in parts that end where the full step would have ended; give a smaller "
+        f"numerics.{key}, or rtol instead"
+    )
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 
@@ -160,7 +182,11 @@ class SloshingCheck:
 
             basin = case.nodes[name]
             modal = basin.on is not None and basin.sloshing == "modes"
-            free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
+            free = (
+                basin.on is not None
+                and basin.physics_type.has_modes
+                and any(free_joints(basin.on, case.nodes))
+            )
             if modal or (free and not basin.lumped):
                 place = np.array(basin.place) + basin.rotation[:, :2] @ mesh.centroid
                 about = frames_of(model).index(basin.on), place, basin.rotation[:, 2]
@@ -172,7 +198,9 @@ class SloshingCheck:
         if not self.tanks:
             return ""
         out = self.model.evaluate(t, y)[1]
-        for (name, modal, about, *lifting), record in zip(self.tanks, self.restart_data, strict=True):
+        for (name, modal, about, *lifting), record in zip(
+            self.tanks, self.restart_data, strict=True
+        ):
             if modal:
                 keep_greatest(record[RISE], rise(y, *lifting), t)
             weight, reference = self.weight(out, *about, modal)
@@ -195,7 +223,9 @@ class SloshingCheck:
 
         row = out[int(self.model.layout["body"]) + BODY_OUT * i :][:BODY_OUT]
         turn, gravity = row[frame.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
-        spin, arm, up = row[frame.SPIN :][:3], turn @ place, turn @ normal
+        spin = row[frame.SPIN :][:3]
+        arm = turn @ place
+        up = turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
         weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
@@ -214,7 +244,9 @@ class SloshingCheck:
             if height > SMALL_WAVE:
                 text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
                 text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'
-                notices.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL_WAVE))
+                notices.append(
+                    Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL_WAVE)
+                )
             if change > WEIGHT_CHANGE:
                 text = f"{name}: at {amount(change_time, 'time')} the vertical acceleration of its body changes the "
                 text += f"weight of its water by a fraction of {change:.2g}; the waves do not include this change"
@@ -233,10 +265,17 @@ def rises(model, name: str) -> tuple:
     lifts = np.zeros((2, len(modes)))
     lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
     at, start = [row.y for row in rows], np.array([row.position for row in rows])
-    return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
+    return (
+        np.array(at),
+        start,
+        lifts / sloshing.depth_of(basin, mesh),
+        sloshing.outline_of(mesh).is_round,
+    )
 
 
-def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool) -> float:
+def rise(
+    y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool
+) -> float:
     """Greatest rise of the water at the wall of a basin, as a fraction of its depth.
 
     at : int64[modes]  indices of the amplitudes of the sloshing modes in the state y
@@ -254,11 +293,13 @@ def keep_greatest(record: np.ndarray, value: float, t: float) -> None:
         record[:] = value, t
 
 
-EXPLICIT_CHECKS, IMPLICIT_CHECKS = 32, 16  # number of checks in a run of explicit steps, of implicit steps
+# number of checks in a run of explicit steps, of implicit steps
+EXPLICIT_CHECKS, IMPLICIT_CHECKS = 32, 16
 # Least number of explicit steps between two checks, which costs a twentieth; least number of checks in short runs.
 STEPS_BETWEEN_CHECKS, FEWEST_CHECKS = 50.0, 8
 LEAST_RANGE = 0.1  # least range of a state, in units of its small deviation
-FULL_STEP = 0.99  # fraction of a full step: steps that an event or a kink has shortened are not checked
+# fraction of a full step: steps that an event or a kink has shortened are not checked
+FULL_STEP = 0.99
 PEAK_SHARE = 0.1  # weight of the greatest error in cells beside the mean error
 STEP_ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure r
 
@@ -280,7 +321,8 @@ class StepDoubling:
         model, self.step = run_data.model, float(run_data.clock["step"])
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
-        lines = model.tables.pipes["y"][model.tables.pipes["cells"] == 0]  # their states do not affect other states
+        # their states do not affect other states
+        lines = model.tables.pipes["y"][model.tables.pipes["cells"] == 0]
         self.over_limit = exceeds_limit_of_cells(model)
         outside = states_outside_cells(model)
         all_states = self.over_limit or not method.explicit
@@ -294,12 +336,18 @@ class StepDoubling:
         self.restart_data[3], self.stepper, self.implicit = 1.0, None, not method.explicit
         if self.states.size:
             size = self.step or first_step(model)
-            dry = STEPS_BETWEEN_CHECKS * EXPLICIT_CHECKS  # no wave sets the first step: their number is not known
+            # no wave sets the first step: their number is not known
+            dry = STEPS_BETWEEN_CHECKS * EXPLICIT_CHECKS
             steps = (numerics.end - numerics.start) / size if size > 0.0 else dry
             self.interval = max(1.0, steps // IMPLICIT_CHECKS)
             if method.explicit:
-                self.interval = max(1.0, steps // EXPLICIT_CHECKS, min(STEPS_BETWEEN_CHECKS, steps // FEWEST_CHECKS))
-            self.restart_data[1], self.small = self.interval, state_ranges(model, LEAST_RANGE)[self.states]
+                self.interval = max(
+                    1.0, steps // EXPLICIT_CHECKS, min(STEPS_BETWEEN_CHECKS, steps // FEWEST_CHECKS)
+                )
+            self.restart_data[1], self.small = (
+                self.interval,
+                state_ranges(model, LEAST_RANGE)[self.states],
+            )
 
     def begin(self, steps: float) -> None:
         """Order a check of the first step of a segment if the method is implicit, or the steps exceed a limit of cells.
@@ -325,7 +373,8 @@ class StepDoubling:
         divided = 0.0 < loop.control["dividing_rate"] < loop.out[rec.RATE]
         self.restart_data[1] = steps + (self.interval if divided else 1.0)
         end = loop.control["end"]
-        full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])  # 0: any step is checked
+        # 0: any step is checked
+        full_step = self.step if loop.t < end else min(self.step, end - memory["t_mark"])
         # A step in which a jump in a delay line corrected contents of storing nodes or flows of columns is not checked,
         # because half steps have no such correction. The mark is removed when the corrected state is recorded again.
         # Neither is a step that ends at an event, because half steps would follow the equations after it.
@@ -362,9 +411,12 @@ class StepDoubling:
             self.restart_data[3] = remaining if remaining < 1.0 else 1.0
         remaining = self.restart_data[3]
         power = remaining ** (steps - 1.0)
-        sum_of_powers = steps - 1.0 if remaining > 1.0 - STEP_ROUNDING else (1.0 - power) / (1.0 - remaining)
+        sum_of_powers = (
+            steps - 1.0 if remaining > 1.0 - STEP_ROUNDING else (1.0 - power) / (1.0 - remaining)
+        )
         self.accumulated_error[:] = (
-            remaining * (power * self.accumulated_error + sum_of_powers * np.fmin(own, self.error)) + own
+            remaining * (power * self.accumulated_error + sum_of_powers * np.fmin(own, self.error))
+            + own
         )
         self.error[:] = own
         self.sums += self.accumulated_error
@@ -377,13 +429,21 @@ class StepDoubling:
         """
         if self.stepper is None:
             model = self.model
-            self.stepper = Integrator(loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure,
-                                      model.scale.copy(), model.damped)  # fmt: skip
+            self.stepper = Integrator(
+                loop.stepper.method,
+                model.y_size,
+                model.ledgers,
+                lambda: model.structure,
+                model.scale.copy(),
+                model.damped,
+            )
             self.stepper.out = model.new_out()
         if first:
             self.stepper.discard_history()
         self.stepper.control[0] = loop.control
-        return self.stepper.single_step(loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y)
+        return self.stepper.single_step(
+            loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y
+        )
 
     def widths(self) -> np.ndarray:
         """Greatest minus least value so far of each checked state, at least its `state_ranges` with the share 0.1."""
@@ -417,12 +477,15 @@ class StepDoubling:
     def notice(self) -> Notice | None:
         """Notice at the end of a run if the mean error is 0.5 % or more of the range of a state, otherwise None."""
         place, share = self.worst()
-        if not DOUBTFUL <= share < np.inf or not self.step:  # a state that is not finite has stopped the run
+        # a state that is not finite has stopped the run
+        if not DOUBTFUL <= share < np.inf or not self.step:
             return None
         ok = share < WRONG
         verdict = "the results may be wrong" if ok else "the numbers are not to be trusted"
         steps = self.model.case.step_amount(self.step)
-        text = (f"{place}: steps of {steps} give a mean error of about {100 * share:.2g} % of its range, by "
-                f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
+        text = (
+            f"{place}: steps of {steps} give a mean error of about {100 * share:.2g} % of its range, by "
+            f"comparison with two half steps; {verdict}; halve the step"
+        )
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)

@@ -38,7 +38,8 @@ FAILURES = {  # reason for the return of the loop -> text
     loop_records.BAD_VALUE: "a value is not finite{place} at {when}; the step is too long for the method: "
     "halve the step",
 }
-NEAR_VAPOR = 5e3  # [Pa]; at a junction whose pressure is less above the vapour pressure there is a cavity
+# [Pa]; at a junction whose pressure is less above the vapour pressure there is a cavity
+NEAR_VAPOR = 5e3
 STATUS_FAILURES = {  # status of the right-hand side -> text
     rec.NO_SOLUTION: "the demand{place} cannot be supplied at {when}; all connections to its node are shut, or pass "
     "a flow that its pressure does not change: open one, give a machine a leakage, or replace the node by a chamber",
@@ -70,7 +71,9 @@ class RunLoop:
     comm : MPI communicator of all ranks, in place of threads
     """
 
-    def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
+    def __init__(
+        self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None
+    ) -> None:
         numerics = model.case.numerics
         self.model, self.run_data = model, RunData(model)
         method = method_named(automatic.first_method(numerics.method))
@@ -80,24 +83,38 @@ class RunLoop:
         # times of the last events
         self.recent_events: deque[float] = deque(maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size)
         self.span = SPAN * (numerics.end - numerics.start)
-        self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
+        # called after every event, before the next step
+        self.on_switch: Callable[[], None] = lambda: None
         call = model.functions
-        self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
+        self.rhs, self.observe, self.record, self.events = (
+            call.rhs,
+            call.observe,
+            call.record,
+            call.events,
+        )
         self.fused_step = fused_step_function(fused_allowed := fused_step_allowed(model, method))
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
-        self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
+        self.stepper = stepper = Integrator(
+            method, model.y_size, ledgers, structure, model.scale.copy(), model.damped
+        )
         stepper.stored = stored_states(model)
         stepper.carry = np.zeros(len(stepper.stored))
         stepper.bounded_states, stepper.bounds = state_bounds(model)
         stepper.out, stepper.out_row = model.new_out(), model.new_out()
         stepper.values = np.zeros(len(model.tables.probes))
         self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
-        self.changed_at_events = [(device, row) for (_, _, device), row in
-                                  zip(model.devices, model.tables.devices, strict=True)
-                                  if type(device).apply_event is not Device.apply_event]  # fmt: skip
+        self.changed_at_events = [
+            (device, row)
+            for (_, _, device), row in zip(model.devices, model.tables.devices, strict=True)
+            if type(device).apply_event is not Device.apply_event
+        ]
         stepper.prepare_events(self.armed.size)
         stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
-        self.state, self.control, self.progress = stepper.state[0], stepper.control[0], stepper.progress[0]
+        self.state, self.control, self.progress = (
+            stepper.state[0],
+            stepper.control[0],
+            stepper.progress[0],
+        )
         self.out, control = stepper.out, self.control
         control["step_max"] = longest_step(model)
         control["stop_at"], control["allow_fused"] = NO_LIMIT, fused_allowed
@@ -109,7 +126,9 @@ class RunLoop:
         if numerics.courant is not None and not method.explicit:
             control["mode"], control["size"] = loop_records.FIXED_STEP, step_of_waves(model)
         longest = step_within_delays(model)
-        control["step_max"] = min(control["step_max"], longest / (STEPS_IN_DELAY if numerics.rtol is not None else 1))
+        control["step_max"] = min(
+            control["step_max"], longest / (STEPS_IN_DELAY if numerics.rtol is not None else 1)
+        )
         if control["mode"] == loop_records.FIXED_STEP:
             control["size"] = min(control["size"], longest)
         if control["mode"] == loop_records.FIXED_STEP and method.explicit:
@@ -120,7 +139,10 @@ class RunLoop:
             stepper.structure = blocked_sums(single_band, 0)
             self.run_data.written = self.run_data.written._replace(sums=stepper.structure)
         if numerics.rtol is not None:  # errors are summed by rows
-            stepper.row_blocks, stepper.sums = single_band.row_blocks(0), np.zeros(single_band.sum_count)
+            stepper.row_blocks, stepper.sums = (
+                single_band.row_blocks(0),
+                np.zeros(single_band.sum_count),
+            )
         if comm is not None:
             from fvsolve.core.solve.parallel_bands import MpiRanks
 
@@ -145,7 +167,9 @@ class RunLoop:
     @property
     def given_step(self) -> float:
         """Given step [s]; 0 under error control and where it depends on the wave rate."""
-        return float(self.control["size"]) if self.control["mode"] == loop_records.FIXED_STEP else 0.0
+        return (
+            float(self.control["size"]) if self.control["mode"] == loop_records.FIXED_STEP else 0.0
+        )
 
     @property
     def t(self) -> float:
@@ -175,7 +199,11 @@ class RunLoop:
         while (capacity := self.run_data.history_capacity()) < budget:
             code = self.steps(capacity)
             left, budget = self.control["budget"], budget - capacity
-            if code != loop_records.BUDGET_SPENT or left != 0.0 or automatic.is_change_due(self.stepper):
+            if (
+                code != loop_records.BUDGET_SPENT
+                or left != 0.0
+                or automatic.is_change_due(self.stepper)
+            ):
                 return code
         return self.steps(budget)
 
@@ -191,14 +219,18 @@ class RunLoop:
             else:
                 code = self.team.call(functions, where)
             if code == loop_records.SWITCHED:
-                code = loop_records.SWITCHED if self.handle_events(before) else loop_records.CHATTERING
+                code = (
+                    loop_records.SWITCHED if self.handle_events(before) else loop_records.CHATTERING
+                )
                 self.on_switch()
         return code
 
     @property
     def functions(self) -> tuple:
         """Tuple of the compiled functions that the time loop calls, and index of the first ledger rate in `out`."""
-        return (self.fused_step, self.observe, self.record, self.events, self.rhs), int(self.model.layout["supply"])
+        return (self.fused_step, self.observe, self.record, self.events, self.rhs), int(
+            self.model.layout["supply"]
+        )
 
     def close(self) -> None:
         """End the threads or ranks."""
@@ -220,7 +252,9 @@ class RunLoop:
         self.apply_events()
         if any(own.changes_flags for own in self.run_data.features):
             more = (armed > earlier) & ~now
-            self.switched += [(self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]]
+            self.switched += [
+                (self.t, int(k)) for k in more.nonzero()[0] if self.model.events[k][1]
+            ]
 
     def apply_events(self) -> None:
         """Apply the immediate effects of events: limits of tank levels, and sudden changes of states of devices.
@@ -230,7 +264,9 @@ class RunLoop:
         held = self.armed[: tanks.EVENTS * self.tanks.size].any()  # a tank at a limit
         for i in self.tanks if held else ():
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
-            part = tanks.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
+            part = tanks.overshoot_correction(
+                node, self.armed, float(node["mass"] + self.now[node["y"]])
+            )
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for device, row in self.changed_at_events:
@@ -270,7 +306,9 @@ class RunLoop:
             if self.armed.size:  # events to record
                 self.evaluate(limit)
             return []
-        stopped, out, layout = [], self.evaluate(limit), self.model.layout
+        stopped = []
+        out = self.evaluate(limit)
+        layout = self.model.layout
         places = shut_places(self.model, out)
         while (event := separate(self.run_data, self.t, self.now, out, places)) is not None:
             before = self.armed.copy()
@@ -307,14 +345,18 @@ class RunLoop:
 
         For BAD_VALUE and BAD_STATUS the loop returns to the state before the last step, see `step_back`.
         """
-        model, text, names = self.model, FAILURES.get(code, ""), {}
+        model = self.model
+        text = FAILURES.get(code, "")
+        names = {}
         names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
         if code == loop_records.CHATTERING and self.event_fault:
             return f"{self.event_fault} at {names['when']}"
         if code == loop_records.CHATTERING:
             return self.chattering_text(names["when"])
         if code == loop_records.STOPPED:
-            names["event"] = "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+            names["event"] = (
+                "a cavity opened" if model.cavitates else "pressure fell below vapour pressure"
+            )
         elif code == loop_records.NEWTON_STUCK:
             names["worst"] = model.state_names[int(self.state["worst"])]
         elif code == loop_records.BAD_VALUE:
@@ -325,12 +367,20 @@ class RunLoop:
             index, status = int(self.out[rec.WHERE]), int(self.out[rec.STATUS])
             if status == rec.NOT_CONVERGED and (cavity := self.cavity_of_cluster(index)) >= 0:
                 index, status = cavity, rec.NO_LIQUID
-            text = STATUS_FAILURES.get(status, "Newton did not converge{place} at {when}; try a smaller step")
+            text = STATUS_FAILURES.get(
+                status, "Newton did not converge{place} at {when}; try a smaller step"
+            )
             if status == rec.NOT_CONVERGED and (values := self.demand_above_outflow(index)):
                 text, names = CONDUITS_EXHAUSTED, names | values
-            if status == rec.NO_SOLUTION and index >= 0 and self.out[model.layout["supply"] + index] >= 0.0:
+            if (
+                status == rec.NO_SOLUTION
+                and index >= 0
+                and self.out[model.layout["supply"] + index] >= 0.0
+            ):
                 text = NO_WAY_OUT if self.out[model.layout["supply"] + index] > 0.0 else NO_BALANCE
-            told = ChainMap(*(own.explanation(status, index, self.out) for own in self.run_data.features))
+            told = ChainMap(
+                *(own.explanation(status, index, self.out) for own in self.run_data.features)
+            )
             if status == rec.NO_WEIGHT:
                 waters = [*(part.name for part in model.meshed), *model.node_names]
                 names["name"] = waters[index].removesuffix(".inside")
@@ -348,13 +398,23 @@ class RunLoop:
 
         index : number of a node in its cluster, which is solved at once
         """
-        model, tables, found = self.model, self.model.tables, {}
+        model = self.model
+        tables = self.model.tables
+        found = {}
         links = (tables.valves, tables.pipes, tables.columns)
         for cluster in tables.clusters:
-            nodes = tables.integers[cluster["first_node"] : cluster["first_node"] + cluster["nodes"]]
-            for i in nodes[self.out[model.layout["supply"] + nodes] < 0.0] if index in nodes else ():
-                limits = [limit for own in self.run_data.features for limit in own.critical_outflows(i)]
-                joined = sum(np.count_nonzero(t[end] == i) for t in links for end in ("from_node", "to_node"))
+            nodes = tables.integers[
+                cluster["first_node"] : cluster["first_node"] + cluster["nodes"]
+            ]
+            for i in (
+                nodes[self.out[model.layout["supply"] + nodes] < 0.0] if index in nodes else ()
+            ):
+                limits = [
+                    limit for own in self.run_data.features for limit in own.critical_outflows(i)
+                ]
+                joined = sum(
+                    np.count_nonzero(t[end] == i) for t in links for end in ("from_node", "to_node")
+                )
                 if joined != len(limits):
                     continue
                 available = sum(limits)
@@ -373,7 +433,9 @@ class RunLoop:
         if not self.model.cavitates or index < 0:
             return -1
         for cluster in tables.clusters:
-            nodes = tables.integers[cluster["first_node"] : cluster["first_node"] + cluster["nodes"]]
+            nodes = tables.integers[
+                cluster["first_node"] : cluster["first_node"] + cluster["nodes"]
+            ]
             p = tables.nodes["pressure"][nodes] + self.out[self.model.layout["pressure"] + nodes]
             low = nodes[p < tables.settings[0]["floor"] + NEAR_VAPOR]
             if index in nodes and low.size:
@@ -391,9 +453,14 @@ class RunLoop:
     def chattering_text(self, when: str) -> str:
         """Text with the devices that change their states without end, and a remedy; when : time of the failure."""
         model = self.model
-        first = self.t if self.at_once > 1 else self.recent_events[0]  # at the same time, or within a short span
+        # at the same time, or within a short span
+        first = self.t if self.at_once > 1 else self.recent_events[0]
         names = sorted({model.events[k][0] for t, k in self.switched if t >= first})
-        remedies = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
+        remedies = {
+            device.remedy: None
+            for name, _, device in model.devices
+            if name.removesuffix(".inside") in names
+        }
         for text in (feature.remedy(name) for feature in model.features for name in names):
             remedies |= {text: None} if text else {}
         parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
@@ -416,7 +483,8 @@ def set_step_mode(control, model: Model) -> None:
     Without waves nothing is fast after a switch: steps then keep their length, which only their error limits.
     """
     numerics = model.case.numerics
-    for mode, key in enumerate(("courant", "step", "rtol")):  # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
+    # COURANT, FIXED_STEP, TOLERANCE of `loop_records`
+    for mode, key in enumerate(("courant", "step", "rtol")):
         if getattr(numerics, key) is not None:
             control["mode"], control["size"] = mode, getattr(numerics, key)
     # given steps begin anew after a switch: full steps end at multiples of the step after its beginning
@@ -429,7 +497,11 @@ def cost_of_rates(model: Model) -> float:
     They are solved together by Newton's method, which takes about a microsecond for each of them.
     """
     clusters = model.tables.clusters
-    return 1.0 + float(clusters["valves"][clusters["order"] >= 0].sum()) if model.shapes.accepted > 0 else 1.0
+    return (
+        1.0 + float(clusters["valves"][clusters["order"] >= 0].sum())
+        if model.shapes.accepted > 0
+        else 1.0
+    )
 
 
 def step_of_waves(model: Model) -> float:
@@ -471,12 +543,17 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     settings, numerics = model.tables.settings[0], model.case.numerics
     laws = model.tables.pipes["friction"]
     return bool(
-        model.case.law.linear and settings["scheme"] == rec.UPWIND and settings["from_arriving"]
-        and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and model.shapes.armed == 0
+        model.case.law.linear
+        and settings["scheme"] == rec.UPWIND
+        and settings["from_arriving"]
+        and method.explicit
+        and method.stages == 1
+        and numerics.rtol is None
+        and model.y_size == 2 * model.cells
+        and model.shapes.armed == 0
         and not model.functions.cast.features
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
-    )  # fmt: skip
+    )
 
 
 ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
@@ -484,7 +561,9 @@ ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly s
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
     """Numbers of the nodes that join only rigid columns and shut valves; out : output array of the right-hand side."""
-    places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
+    places = []
+    nodes = model.tables.nodes
+    at = model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
             places.append(int(i))
@@ -521,7 +600,9 @@ def flow_before(run_data: RunData, t: float, y: np.ndarray) -> np.ndarray:
     return before[model.layout["column"] :][: len(columns)] - columns["flow"]
 
 
-def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
+def impact_impulses(
+    model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]
+) -> np.ndarray:
     """Mass flow that the pressure impulse J [Pa s] at each node stops [kg/s]; negative where columns separate.
 
     J follows from the momentum: at each node, the sum over its columns of A / L (J - J_far) is the sum of their
@@ -532,11 +613,16 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     """
     from fvsolve.core.kernels.column_junctions import gate_inflow
 
-    sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
+    sums = np.array(
+        [model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places]
+    )
     matrix = np.zeros((len(places), len(places)))
     row = {i: r for r, i in enumerate(places)}
     for k, column in enumerate(model.tables.columns):
-        ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
+        ends = [
+            (row.get(int(column["from_node"]), -1), -1.0),
+            (row.get(int(column["to_node"]), -1), 1.0),
+        ]
         at = model.layout["column"] + k
         valve_controlled = out[model.layout["valve_controlled"] + k] != 0.0 and out[at] != 0.0
         change = out[at] - column["flow"] if valve_controlled else carried[k]
@@ -549,7 +635,9 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray, places: list[int]) -> int | None:
+def separate(
+    run_data: RunData, t: float, y: np.ndarray, out: np.ndarray, places: list[int]
+) -> int | None:
     """Number of the opening event of the air valve where columns separate fastest; None if no columns separate.
 
     run_data : data of the run; y : state at time t [s]; out : output array of the right-hand side there
@@ -561,6 +649,9 @@ def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray, places
         return None
     small = ROUNDING * model.scale[model.tables.columns["y"]].max()
     all_impulses = impact_impulses(model, flow_before(run_data, t, y), out, places)
-    separating = [(impulse, event) for impulse, event in zip(all_impulses, events, strict=True)
-                  if event is not None and impulse < -small]  # fmt: skip
+    separating = [
+        (impulse, event)
+        for impulse, event in zip(all_impulses, events, strict=True)
+        if event is not None and impulse < -small
+    ]
     return min(separating)[1] if separating else None

@@ -70,22 +70,30 @@ class Summary:
     ledgers: dict[str, dict[str, Any]] = field(default_factory=dict)
     extremes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
-    points: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # envelope at points between cells of pipes
-    watched: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)  # extremes without a probe
-    counts: dict[str, int] = field(default_factory=dict)  # steps, rejections, rhs calls, Newton iterations, ...
-    methods: list[dict[str, Any]] = field(default_factory=list)  # methods with start time and reason
+    # envelope at points between cells of pipes
+    points: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    # extremes without a probe
+    watched: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    # steps, rejections, rhs calls, Newton iterations, ...
+    counts: dict[str, int] = field(default_factory=dict)
+    # methods with start time and reason
+    methods: list[dict[str, Any]] = field(default_factory=list)
     cells: int = 0
     seconds: float = 0.0
     processor: float = 0.0  # CPU time of the steps
     seconds_setup: float = 0.0
     events: list[Event] = field(default_factory=list)
     cavities: list[Cavity] = field(default_factory=list)  # computed by the law `mixture`
-    warnings: list[Notice] = field(default_factory=list)  # notices of the run, without those of the model
+    # notices of the run, without those of the model
+    warnings: list[Notice] = field(default_factory=list)
     threads: int = 1
-    invalid_from: float = np.inf  # time from which results are invalid, because states have grown [s]
-    maxima: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # result of `find_maxima`
+    # time from which results are invalid, because states have grown [s]
+    invalid_from: float = np.inf
+    # result of `find_maxima`
+    maxima: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     run_ups: dict[str, RunUpTable] = field(default_factory=dict)  # result of `find_run_ups`
-    energy_use: dict[str, Any] = field(default_factory=dict)  # result of `energy_use` of `parts.pump`
+    # result of `energy_use` of `parts.pump`
+    energy_use: dict[str, Any] = field(default_factory=dict)
 
     @property
     def finished(self) -> bool:
@@ -114,7 +122,11 @@ def find_marks(run_data: RunData, of_features: list[Mark]) -> list[Mark]:
         return []
     pipes, nodes = model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
-    kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    kinds += [
+        (kind, f"nodes.{name}")
+        for kind in ("below vapor pressure", "dry", "spilling")
+        for name in nodes
+    ]
     kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [mark for feature in model.features for mark in feature.marks]
@@ -153,7 +165,9 @@ def scheduled_volume(schedule, start: float, end: float) -> float:
 
     inside = schedule.time[(schedule.time > start) & (schedule.time < end)]
     t = np.union1d(np.linspace(start, end, INTEGRATION_TIMES), inside)
-    return float(0.5 * np.sum((value(schedule, t[:-1]) + value(schedule, t[1:], left=True)) * np.diff(t)))
+    return float(
+        0.5 * np.sum((value(schedule, t[:-1]) + value(schedule, t[1:], left=True)) * np.diff(t))
+    )
 
 
 def spill_notices(run_data: RunData) -> list[Notice]:
@@ -177,8 +191,13 @@ def unsupplied_demands(
     The events are those losses. span : times of start and end of the run [s]
     entered : float64[nodes]  mass that has entered at each node [kg]; events : of the run
     """
-    model, marks, notices, losses = run_data.model, run_data.marks, [], []
-    nodes, valves, amount = len(model.node_names), model.valve_names, model.case.amount
+    model = run_data.model
+    marks = run_data.marks
+    notices = []
+    losses = []
+    nodes = len(model.node_names)
+    valves = model.valve_names
+    amount = model.case.amount
     shut, first, last = np.split(
         marks[marks.size - 3 * nodes - len(valves) : -nodes], len(valves) + nodes * np.arange(2)
     )
@@ -187,16 +206,32 @@ def unsupplied_demands(
         names = [model.node_names[i] for i in own]
         losses += [Event(begin, name, "loses its supply") for name in names]
         lack = sum(lacking_volume(model, name, span, entered) for name in names)
-        amounts = f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
-        causes = listing([_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6)
-        text = (f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
-                f"{amount(float(last[own].max()), 'time', 6)}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
-                "the pressure there is that of drained pipes")  # fmt: skip
-        notices.append(Notice("unsupplied", f"nodes.{names[0]}", text, "demand", lack if np.isfinite(lack) else None))
+        amounts = (
+            f"{amount(lack, 'volume', 4)} lack" if np.isfinite(lack) else "the demand is not met"
+        )
+        causes = listing(
+            [_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6
+        )
+        text = (
+            f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
+            f"{amount(float(last[own].max()), 'time', 6)}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
+            "the pressure there is that of drained pipes"
+        )
+        notices.append(
+            Notice(
+                "unsupplied",
+                f"nodes.{names[0]}",
+                text,
+                "demand",
+                lack if np.isfinite(lack) else None,
+            )
+        )
     return notices, losses
 
 
-def lacking_volume(model: Model, name: str, span: tuple[float, float], entered: np.ndarray) -> float:
+def lacking_volume(
+    model: Model, name: str, span: tuple[float, float], entered: np.ndarray
+) -> float:
     """Demand of a node over a run less the volume drawn [m3]; arguments as for `unsupplied_demands`."""
     outlet = model.case.conduits.get(f"{name}.demand")  # of a demand that depends on pressure
     demand = model.case.places[name].demand if outlet is None else outlet.opening
@@ -215,9 +250,11 @@ def undetermined_notices(run_data: RunData) -> list[Notice]:
     names += [probe.name for probe, isolated in probes if isolated and probe.part == "nodes"]
     if not names:
         return []
-    text = (f"{listing(names, 6)}: from {model.case.amount(first, 'time', 6)} on, at least for a time, only shut links "
-            "join this part of the network, which draws nothing: no flow determines its pressure, and extremes and "
-            "limits leave it out")  # fmt: skip
+    text = (
+        f"{listing(names, 6)}: from {model.case.amount(first, 'time', 6)} on, at least for a time, only shut links "
+        "join this part of the network, which draws nothing: no flow determines its pressure, and extremes and "
+        "limits leave it out"
+    )
     return [Notice("isolated", f"nodes.{names[0]}", text)]
 
 
@@ -232,22 +269,30 @@ def device_notices(run_data: RunData) -> list[Notice]:
     """Notices on devices that ran outside the given data, but within the model, such as pumps that ran down."""
     model, marks = run_data.model, run_data.marks
     times = marks[int(model.layout["device_mark"]) + len(model.devices) :]
-    return [device.passing_notice(model, name, part, float(time))
-            for (name, part, device), time in zip(model.devices, times, strict=False) if np.isfinite(time)]  # fmt: skip
+    return [
+        device.passing_notice(model, name, part, float(time))
+        for (name, part, device), time in zip(model.devices, times, strict=False)
+        if np.isfinite(time)
+    ]
 
 
 def find_cavities(run_data: RunData) -> list[Cavity]:
     """First cavity of every pipe whose pressure fell below twice the vapour pressure (more vapour than gas)."""
-    model, marks, cavities = run_data.model, run_data.marks, []
-    end = marks.size - 3 * len(model.node_names) - len(model.valve_names)  # the marks of islands follow
+    model = run_data.model
+    marks = run_data.marks
+    cavities = []
+    # the marks of islands follow
+    end = marks.size - 3 * len(model.node_names) - len(model.valve_names)
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
         share, volume, t_volume = (float(x) for x in marks[end - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
             time, distance = float(marks[k]), share * pipe.length
             amount = model.case.amount
-            text = (f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
-                    f"{amount(time, 'time', 6)}; its greatest volume is {amount(volume, 'volume', silent='l')}, "
-                    f"at {amount(t_volume, 'time', 6)}")  # fmt: skip
+            text = (
+                f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
+                f"{amount(time, 'time', 6)}; its greatest volume is {amount(volume, 'volume', silent='l')}, "
+                f"at {amount(t_volume, 'time', 6)}"
+            )
             cavities.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
     return cavities
 
@@ -271,7 +316,9 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     Pipes without an elevation profile are left out, unless a limit or expectation refers to their pressure. Each
     envelope has in addition the initial pressure, `initial_pressure` [Pa].
     """
-    model, probe_count, points = run_data.model, len(run_data.model.probes), {}
+    model = run_data.model
+    probe_count = len(run_data.model.probes)
+    points = {}
     rows: dict[str, list[int]] = {}
     for k in np.flatnonzero(np.isfinite(model.watched_start)):
         rows.setdefault(model.watched[k].name, []).append(int(k))
@@ -280,21 +327,29 @@ def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
             continue
         distance = np.array([model.watched[k].fraction * pipe.length for k in own])
         low, t_low, high, t_high = run_data.extremes[:, probe_count + np.array(own)]
-        points[pipe.name] = pressure_envelope(model, distance, pipe.height(distance), (low, t_low, high, t_high))
+        points[pipe.name] = pressure_envelope(
+            model, distance, pipe.height(distance), (low, t_low, high, t_high)
+        )
         points[pipe.name]["initial_pressure"] = model.watched_start[own]
     return points
 
 
 def find_maxima(run_data: RunData, t: float) -> dict[str, dict[str, np.ndarray]]:
     """Greatest values up to time t [s] in cells of each mesh that records them: part -> quantity -> float64[n]."""
-    return {part.name: part.maxima(t, run_data.maxima) for part in run_data.model.meshed if part.records_maxima}
+    return {
+        part.name: part.maxima(t, run_data.maxima)
+        for part in run_data.model.meshed
+        if part.records_maxima
+    }
 
 
 def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict[str, RunUpTable]:
     """Tables of the run-ups of a case by name; maxima : result of `find_maxima`"""
     meshed = {part.name: part for part in model.meshed}
-    return {name: run_up_table(spec, meshed[spec.basin], maxima[spec.basin]["max_surface"])
-            for name, spec in model.case.output.run_up.items()}  # fmt: skip
+    return {
+        name: run_up_table(spec, meshed[spec.basin], maxima[spec.basin]["max_surface"])
+        for name, spec in model.case.output.run_up.items()
+    }
 
 
 def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
@@ -302,7 +357,9 @@ def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     model, (low, t_low, high, t_high) = run_data.model, run_data.envelope
     extremes = model.cell_pressures(low), t_low, model.cell_pressures(high), t_high
     distances = np.concatenate([np.zeros(0), *(pipe.x for pipe in model.pipes)])
-    envelope, result, at = pressure_envelope(model, distances, model.cell_elevations, extremes), {}, 0
+    envelope = pressure_envelope(model, distances, model.cell_elevations, extremes)
+    result = {}
+    at = 0
     for pipe in model.pipes:
         cells = slice(at, at := at + pipe.cells)
         result[pipe.name] = {name: values[cells] for name, values in envelope.items()}
@@ -317,10 +374,15 @@ def pressure_envelope(model: Model, distance, elevation, extremes) -> dict[str, 
     """
     least, t_min, greatest, t_max = extremes
     return {
-        "distance": distance, "elevation": elevation, "min_pressure": least, "t_min": t_min,
-        "max_pressure": greatest, "t_max": t_max,
-        "min_head": model.head(least, elevation), "max_head": model.head(greatest, elevation),
-    }  # fmt: skip
+        "distance": distance,
+        "elevation": elevation,
+        "min_pressure": least,
+        "t_min": t_min,
+        "max_pressure": greatest,
+        "t_max": t_max,
+        "min_head": model.head(least, elevation),
+        "max_head": model.head(greatest, elevation),
+    }
 
 
 def relative(remainder: float, largest: float) -> float:
@@ -347,17 +409,30 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     # nodes with `made_up` and `spilled`
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]
     words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
-    names, words = [*model.ledger_names, *model.sources], words + [("inflow", "outflow")] * len(model.sources)
+    names = [*model.ledger_names, *model.sources]
+    words = words + [("inflow", "outflow")] * len(model.sources)
     nodes: dict[str, dict[str, float]] = {}
-    for name, (inflow_word, outflow_word), x, y in zip(names, words, ledger[0], ledger[1], strict=True):
+    for name, (inflow_word, outflow_word), x, y in zip(
+        names, words, ledger[0], ledger[1], strict=True
+    ):
         if x != 0.0 or y != 0.0:
             nodes.setdefault(name, {}).update({inflow_word: float(x), outflow_word: float(0.0 - y)})
-    total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
+    total = {
+        word: sum(row.get(word, 0.0) for row in nodes.values())
+        for pair in set(words)
+        for word in pair
+    }
     remainder = change - float(np.sum(ledger))
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}
     largest = max(initial, initial + change, *terms.values())
     return {
-        "initial": initial, "final": initial + change, **terms,
-        "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
-        "nodes": nodes, "remainder": remainder, "relative": relative(remainder, largest),
-    }  # fmt: skip
+        "initial": initial,
+        "final": initial + change,
+        **terms,
+        "by_node": {
+            name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row
+        },
+        "nodes": nodes,
+        "remainder": remainder,
+        "relative": relative(remainder, largest),
+    }

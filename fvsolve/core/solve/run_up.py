@@ -31,14 +31,21 @@ class RunUpTable:
     def value(self, function: str, place: float | None) -> float:
         """Value of `max`, `min` or `at` in `[expect]` [m]; place : angle [deg] or distance [m], for `at`"""
         if function == "at":
-            return float(self.run_up[sector_of(np.array(place), self.along == "angle", self.places)])
+            return float(
+                self.run_up[sector_of(np.array(place), self.along == "angle", self.places)]
+            )
         known = self.run_up[~np.isnan(self.run_up)]
         return float(known.max() if function == "max" else known.min()) if known.size else np.nan
 
     def plain(self) -> dict:
         """Entry of the summary, in m and degrees."""
         at = self.greatest
-        columns = {self.along: self.places, "run_up": self.run_up, "x": self.points[:, 0], "y": self.points[:, 1]}
+        columns = {
+            self.along: self.places,
+            "run_up": self.run_up,
+            "x": self.points[:, 0],
+            "y": self.points[:, 1],
+        }
         return {"greatest": self.run_up[at], f"greatest_{self.along}": self.places[at], **columns}
 
 
@@ -54,20 +61,32 @@ def run_up_table(spec, basin, surface: np.ndarray) -> RunUpTable:
 
     spec : `RunUp` of the case; surface : greatest elevation of the surface in each cell, NaN where never wet [m]
     """
-    centre, number, wet = basin.mesh.centre, np.arange(spec.sectors), ~np.isnan(surface)
+    centre = basin.mesh.centre
+    number = np.arange(spec.sectors)
+    wet = ~np.isnan(surface)
     if spec.about is not None:
         x, y = (centre - spec.about).T
-        places, along, unit = TURN / spec.sectors * number, "angle", "deg"
+        places = TURN / spec.sectors * number
+        along = "angle"
+        unit = "deg"
         sector = sector_of(np.degrees(np.arctan2(y, x)), True, places)
         wet &= np.hypot(x, y) <= (np.inf if spec.radius is None else spec.radius)
     else:
         start, direction = np.array(spec.from_), np.subtract(spec.to, spec.from_) / spec.length
-        places, along, unit = spec.length / spec.sectors * (number + 0.5), "distance", "m"
+        places = spec.length / spec.sectors * (number + 0.5)
+        along = "distance"
+        unit = "m"
         distance = (centre - start) @ direction
         aside = np.abs((centre - start) @ (-direction[1], direction[0]))
         sector = sector_of(distance, False, places)
-        wet &= (distance >= 0.0) & (distance <= spec.length) & (aside <= (np.inf if spec.width is None else spec.width))
-    run_up, points, cells = np.full(spec.sectors, np.nan), np.full((spec.sectors, 2), np.nan), np.flatnonzero(wet)
+        wet &= (
+            (distance >= 0.0)
+            & (distance <= spec.length)
+            & (aside <= (np.inf if spec.width is None else spec.width))
+        )
+    run_up = np.full(spec.sectors, np.nan)
+    points = np.full((spec.sectors, 2), np.nan)
+    cells = np.flatnonzero(wet)
     # rising bed; of equal beds the highest surface last, then the highest x, then y
     order = cells[np.lexsort((*centre[cells].T[::-1], surface[cells], basin.bed[cells]))]
     run_up[sector[order]] = surface[order] - (basin.part.elevation or 0.0) - basin.part.level

@@ -34,14 +34,20 @@ class MemoryMismatch(RunError):
 def initial_state(model: Model) -> State:
     """Initial state of a model: zero, as states are deviations from the steady start, except for a dam break."""
     if not isinstance(model, Model):
-        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}; expected the result of build()")
+        raise FvsolveError(
+            f"initial_state takes a Model, not {type(model).__name__}; expected the result of build()"
+        )
     return State(model.case.numerics.start, model.start.copy())
 
 
 def solve(
-    model: Model, state: State, sink: Any, progress: Callable[[float, float, int], None] | None = None,
-    threads: int = 1, comm: Any = None,
-) -> Summary:  # fmt: skip
+    model: Model,
+    state: State,
+    sink: Any,
+    progress: Callable[[float, float, int], None] | None = None,
+    threads: int = 1,
+    comm: Any = None,
+) -> Summary:
     """Run a model from `state` to the end time of its case; returns the summary of the run.
 
     sink : object that receives the output rows, field frames and checkpoints; frames are not computed for a sink with
@@ -54,16 +60,26 @@ def solve(
     MemoryMismatch for restart data of another run.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
-        raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}; "
-                           "expected the results of build() and initial_state()")  # fmt: skip
+        raise FvsolveError(
+            f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}; "
+            "expected the results of build() and initial_state()"
+        )
     if progress is not None and not callable(progress):
-        raise FvsolveError(f"progress = {progress!r} cannot be called; expected progress(t, seconds, steps)")
+        raise FvsolveError(
+            f"progress = {progress!r} cannot be called; expected progress(t, seconds, steps)"
+        )
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise FvsolveError(f"threads = {show(threads)} is not a number of threads; expected an integer of 1 or more")
+        raise FvsolveError(
+            f"threads = {show(threads)} is not a number of threads; expected an integer of 1 or more"
+        )
     if comm is not None and not callable(getattr(comm, "bcast", None)):
         text = f"comm = {show(comm)} is not an MPI communicator"
         raise FvsolveError(f"{text}; expected MPI.COMM_WORLD of mpi4py, or None")
-    missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
+    missing = [
+        name
+        for name in ("rows", "field", "checkpoint", "end")
+        if not callable(getattr(sink, name, None))
+    ]
     try:
         model.checked(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
@@ -82,7 +98,9 @@ class Run:
 
     loop_type = RunLoop
 
-    def __init__(self, model: Model, state: State, sink, progress, threads: int = 1, comm=None) -> None:
+    def __init__(
+        self, model: Model, state: State, sink, progress, threads: int = 1, comm=None
+    ) -> None:
         self.model, self.sink, self.progress = model, sink, progress
         self.threads, self.notices = threads_of(model, threads if comm is None else comm.size)
         comm = comm if self.threads > 1 else None
@@ -93,14 +111,21 @@ class Run:
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
-        self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
+        self.starts_with_jump, self.ends_with_jump = (
+            jumps.pop(self.start, False),
+            jumps.pop(self.end, False),
+        )
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
-        self.watches = [watch for part in model.meshed for watch in part.watches(part.deviations(model.start))]
+        self.watches = [
+            watch for part in model.meshed for watch in part.watches(part.deviations(model.start))
+        ]
         fields = output.fields if self.watches or getattr(sink, "takes_fields", True) else 0
         self.loop.stepper.set_control(
-            start=self.start, every=output.every or (self.end - self.start) / 1000, field_count=fields,
+            start=self.start,
+            every=output.every or (self.end - self.start) / 1000,
+            field_count=fields,
             field_every=(self.end - self.start) / fields if fields else 0.0,
-        )  # fmt: skip
+        )
         self.segment, self.fresh = 0, not state.memory
         self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
@@ -111,7 +136,8 @@ class Run:
         if self.checks.needs_frequent_checks:
             self.budget = FREQUENT_CHECK_STEPS
         self.processor = 0.0  # CPU time of the steps of this process [s]
-        self.invalid_from = np.inf  # time from which results are invalid, because states have grown [s]
+        # time from which results are invalid, because states have grown [s]
+        self.invalid_from = np.inf
         # steps left in a chunk, time of the last pause: rows, frames and new segments do not end a chunk
         self.left, self.paused = self.budget, self.saved
         self.last_stall_check: np.ndarray | None = None  # time, attempted steps
@@ -133,21 +159,26 @@ class Run:
 
     def views(self) -> dict[str, np.ndarray]:
         """Arrays of fixed size that change during the run and that a resumed run needs, by name."""
-        views = {name: getattr(self.run_data, name) for name in PERSISTENT} | self.loop.stepper.restart_arrays()
+        views = {
+            name: getattr(self.run_data, name) for name in PERSISTENT
+        } | self.loop.stepper.restart_arrays()
         views |= {f"watch {k}": watch.greatest for k, watch in enumerate(self.watches)}
         return views | {
-            "sloshing": self.checks.sloshing.restart_data, "step doubling": self.checks.step_doubling.restart_data,
+            "sloshing": self.checks.sloshing.restart_data,
+            "step doubling": self.checks.step_doubling.restart_data,
             "energy": self.checks.energy.restart_data,
-        }  # fmt: skip
+        }
 
     def memory(self) -> dict[str, np.ndarray]:
         """All data that a resumed run needs in addition to t and y, as arrays by name."""
         loop, rates = self.loop, self.checks.rates
         own = {
             "run": [self.segment, self.seconds, self.processor, loop.last_switch, loop.at_once],
-            "changes": self.changes, "switched": loop.switched, "recent events": loop.recent_events,
+            "changes": self.changes,
+            "switched": loop.switched,
+            "recent events": loop.recent_events,
             "rates": [rates.get(part.name, 0.0) for part in self.checks.moving],
-        }  # fmt: skip
+        }
         memory = {name: np.array(values, dtype=np.float64) for name, values in own.items()}
         memory |= {name: array.copy() for name, array in self.run_data.arrays().items()}
         return memory | {name: view.copy() for name, view in self.views().items()}
@@ -195,7 +226,9 @@ class Run:
         """
         out = self.loop.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.run_data.handle, self.loop.stepper.values)
-        self.sink.rows(np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy())
+        self.sink.rows(
+            np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy()
+        )
         return out
 
     def flush(self) -> None:
@@ -212,7 +245,9 @@ class Run:
         """
         least, t_min, greatest, t_max = self.run_data.extremes
         t, values = rows[:, 0], rows[:, 1:]
-        at, each, known = values.argmin(axis=0), np.arange(values.shape[1]), ~self.run_data.undetermined_probes
+        at = values.argmin(axis=0)
+        each = np.arange(values.shape[1])
+        known = ~self.run_data.undetermined_probes
         lower = ((extreme := values[at, each]) < least) & known
         if lower.any():
             least[lower], t_min[lower] = extreme[lower], t[at][lower]
@@ -280,7 +315,8 @@ class Run:
         """
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
-            at, scale = len(model.pipes) + 3 * len(model.node_names) + k, model.scale[model.tables.columns[k]["y"]]
+            at = len(model.pipes) + 3 * len(model.node_names) + k
+            scale = model.scale[model.tables.columns[k]["y"]]
             if abs(flow) > 1e-3 * scale and np.isnan(self.run_data.marks[at]):
                 self.run_data.marks[at] = t
 
@@ -320,8 +356,12 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns "", or the reason why the run cannot continue."""
         while True:
-            before, steps, busy = time.perf_counter(), self.loop.state["steps"], self.busy
-            due = min(self.checks.step_doubling.steps_left(steps), self.checks.energy.prepare(self.loop))
+            before = time.perf_counter()
+            steps = self.loop.state["steps"]
+            busy = self.busy
+            due = min(
+                self.checks.step_doubling.steps_left(steps), self.checks.energy.prepare(self.loop)
+            )
             code = self.loop.run(min(self.left, due))
             self.processor += self.busy - busy
             self.left = max(0.0, self.left - (self.loop.state["steps"] - steps))
@@ -330,7 +370,8 @@ class Run:
             self.checks.step_doubling.check(self.loop)
             self.checks.energy.check(self.loop)
             grown = self.checks.check(self.loop.t, self.loop.now)
-            if grown and code != loop_records.CHATTERING:  # the message about chattering names the parts
+            # the message about chattering names the parts
+            if grown and code != loop_records.CHATTERING:
                 self.invalid_from = self.checks.sound
                 return grown
             if code == loop_records.FIELD:
@@ -362,7 +403,9 @@ class Run:
         most = FREQUENT_CHECK_STEPS if self.checks.needs_frequent_checks else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
-            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.state["steps"]))
+            self.progress(
+                self.loop.t, time.perf_counter() - self.began, int(self.loop.state["steps"])
+            )
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
 
@@ -372,16 +415,22 @@ class Run:
         Rates with noise let Newton fail, or errors stay, at any step above the rounding of time: such a run has no end.
         """
         state, control = self.loop.state, self.loop.control
-        now = np.array([self.loop.t, state["steps"] + state["rejections"] + state["newton_failures"]])
+        now = np.array(
+            [self.loop.t, state["steps"] + state["rejections"] + state["newton_failures"]]
+        )
         if self.last_stall_check is None:
             self.last_stall_check = now
         advance, attempts = now - self.last_stall_check
         if attempts < STALLED_ATTEMPTS:
             return 0
         self.last_stall_check = now
-        if control["mode"] != loop_records.TOLERANCE or advance >= STALLED_ADVANCE * (self.end - self.start):
+        if control["mode"] != loop_records.TOLERANCE or advance >= STALLED_ADVANCE * (
+            self.end - self.start
+        ):
             return 0
-        return loop_records.NEWTON_STUCK if state["newton_failures"] > 0.0 else loop_records.TINY_STEP
+        return (
+            loop_records.NEWTON_STUCK if state["newton_failures"] > 0.0 else loop_records.TINY_STEP
+        )
 
     def save(self) -> None:
         self.sink.checkpoint(self.state())
@@ -396,8 +445,16 @@ class Run:
         """
         if code == loop_records.BAD_VALUE:
             self.invalid_from = self.checks.sound
-        numbers = code in (loop_records.BAD_VALUE, loop_records.NEWTON_STUCK, loop_records.TINY_STEP)
-        return "stopped: " + self.loop.failure_text(code) + (self.model.case.law.advice if numbers else "")
+        numbers = code in (
+            loop_records.BAD_VALUE,
+            loop_records.NEWTON_STUCK,
+            loop_records.TINY_STEP,
+        )
+        return (
+            "stopped: "
+            + self.loop.failure_text(code)
+            + (self.model.case.law.advice if numbers else "")
+        )
 
     def methods(self) -> list[dict]:
         """Time methods used in the run: dicts with start time [s], name and reason."""
@@ -423,33 +480,57 @@ class Run:
             self.watch(loop.t, loop.now)
         ledger = loop.stepper.ledger.reshape(LEDGER_ROWS, -1)[:2]
         first = int(model.layout["source"] - model.layout["supply"])
-        booked = ledger[:, [*range(len(model.node_names)), *range(first, first + len(model.sources))]]
+        booked = ledger[
+            :, [*range(len(model.node_names)), *range(first, first + len(model.sources))]
+        ]
         ledgers = {"mass": mass_ledger(model, loop.now, booked)}
         for feature in model.features:
             ledgers |= feature.ledgers(model, loop.now, ledger)
         watched = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.notices, *watched, *self.checks.warnings(ledgers)]
         warnings += found.device_notices(self.run_data) + found.spill_notices(self.run_data)
-        warnings += [notice for own in self.run_data.features for notice in own.end_notices(loop.now)]
+        warnings += [
+            notice for own in self.run_data.features for notice in own.end_notices(loop.now)
+        ]
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
-        entered, events = (
-            ledger[:, : len(model.node_names)].sum(axis=0),
-            [Event(t, *model.events[k]) for t, k in loop.switched],
+        entered = ledger[:, : len(model.node_names)].sum(axis=0)
+        events = [Event(t, *model.events[k]) for t, k in loop.switched]
+        held = [
+            mark
+            for own in self.run_data.features
+            for mark in own.held_marks(self.start, loop.t, entered)
+        ]
+        unsupplied, losses = found.unsupplied_demands(
+            self.run_data, (self.start, loop.t), entered, events
         )
-        held = [mark for own in self.run_data.features for mark in own.held_marks(self.start, loop.t, entered)]
-        unsupplied, losses = found.unsupplied_demands(self.run_data, (self.start, loop.t), entered, events)
         warnings += unsupplied + found.undetermined_notices(self.run_data)
         events = sorted([*events, *losses], key=lambda event: event.time)
         ok = reason == "finished" and not held and all(entry.ok for entry in warnings)
         extremes, watched = found.find_extremes(self.run_data)
         summary = Summary(
-            reason, ok, loop.t, found.find_marks(self.run_data, held) + held, ledgers, extremes,
-            found.find_envelope(self.run_data), found.find_point_envelopes(self.run_data), watched,
-            loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
-            self.setup, events,
-            found.find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
-            maxima := found.find_maxima(self.run_data, loop.t), found.find_run_ups(model, maxima),
+            reason,
+            ok,
+            loop.t,
+            found.find_marks(self.run_data, held) + held,
+            ledgers,
+            extremes,
+            found.find_envelope(self.run_data),
+            found.find_point_envelopes(self.run_data),
+            watched,
+            loop.stepper.counts(),
+            self.methods(),
+            model.all_cells,
+            self.seconds,
+            self.processor,
+            self.setup,
+            events,
+            found.find_cavities(self.run_data),
+            warnings,
+            self.threads,
+            self.invalid_from,
+            maxima := found.find_maxima(self.run_data, loop.t),
+            found.find_run_ups(model, maxima),
             self.pumped_energy(watched),
-        )  # fmt: skip
+        )
         self.sink.end(summary)
         return summary

@@ -48,7 +48,9 @@ def polynomial_value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
     return total
 
 
-def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction] | str | None:
+def negative_point(
+    g: Matrix, low: Fraction, high: Fraction
+) -> tuple[Fraction, Fraction] | str | None:
     """Point (x, y) with low <= x <= high, 0 <= y <= 1 where the polynomial g is negative.
 
     g : coefficients g[m][i] of x^m y^i
@@ -59,7 +61,12 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
         b, x0, x1, y0, y1 = boxes.pop()
         if all(left >= 0 for left in b.flat):
             continue
-        for corner, x, y in ((b[0, 0], x0, y0), (b[0, -1], x0, y1), (b[-1, 0], x1, y0), (b[-1, -1], x1, y1)):
+        for corner, x, y in (
+            (b[0, 0], x0, y0),
+            (b[0, -1], x0, y1),
+            (b[-1, 0], x1, y0),
+            (b[-1, -1], x1, y1),
+        ):
             if corner < 0 and polynomial_value(g, x, y) < 0:
                 return x, y
         seen += 1
@@ -91,7 +98,8 @@ def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
     a = _to_bernstein(_to_bernstein(a).T).T
     largest = max(abs(entry) for entry in a.flat) or Fraction(1)
     scaled = [
-        (entry.numerator << BITS) * largest.denominator // (entry.denominator * largest.numerator) for entry in a.flat
+        (entry.numerator << BITS) * largest.denominator // (entry.denominator * largest.numerator)
+        for entry in a.flat
     ]
     return np.array(scaled, dtype=object).reshape(a.shape)
 
@@ -102,7 +110,9 @@ def _to_bernstein(a: np.ndarray) -> np.ndarray:
     b_j = sum_i C(j, i) / C(n, i) a_i, with binomial coefficients C and the degree n.
     """
     n = a.shape[0] - 1
-    return np.array([sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)])
+    return np.array(
+        [sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)]
+    )
 
 
 def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,7 +120,9 @@ def _bisect(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     b : Bernstein coefficients on the whole box
     """
-    left, right, now = [b[0]], [b[-1]], b
+    left = [b[0]]
+    right = [b[-1]]
+    now = b
     for _ in range(b.shape[0] - 1):
         now = (now[:-1] + now[1:]) >> 1
         left.append(now[0])
@@ -125,7 +137,10 @@ def _curvature(b: np.ndarray) -> int:
     """
     if b.shape[0] < 3:
         return 0
-    return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2
+    return (
+        max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat)
+        * (b.shape[0] - 1) ** 2
+    )
 
 
 RAYS = 240  # number of waves whose roots are computed first
@@ -209,7 +224,9 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
 @declared("study")
 @validated(schemes=NAMES, methods=NAMES, courant=POSITIVE)
 def advection_limits(
-    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    courant: float | None = None,
 ) -> list[AdvectionLimit]:
     """Courant limits of all pairs of the given schemes and methods, method by method.
 
@@ -221,19 +238,31 @@ def advection_limits(
     schemes = list(dict.fromkeys(schemes or WEIGHTS))
     for name in schemes:
         weights_of(name)
-    named = [method_named(name).name for name in methods] if methods else [m.name for m in METHODS.values()]
-    return [advection_limit(scheme, name, courant) for name in dict.fromkeys(named) for scheme in schemes]
+    named = (
+        [method_named(name).name for name in methods]
+        if methods
+        else [m.name for m in METHODS.values()]
+    )
+    return [
+        advection_limit(scheme, name, courant)
+        for name in dict.fromkeys(named)
+        for scheme in schemes
+    ]
 
 
 FACE_WEIGHTS = Kind(
-    lambda given: is_row(given, lambda x: isinstance(x, Rational)) and len(given) == 5 and sum(given) == 1,
+    lambda given: (
+        is_row(given, lambda x: isinstance(x, Rational)) and len(given) == 5 and sum(given) == 1
+    ),
     "five integers or fractions with sum 1",
 )
 
 
 @declared("study")
 @validated(weights=FACE_WEIGHTS, scheme=TEXT, method=NAME, courant=POSITIVE)
-def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
+def limit_of(
+    weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None
+) -> AdvectionLimit:
     """Exact Courant limit of the linear scheme with the given face weights, and the growth at the number `courant`.
 
     weights : five weights, with sum 1, of the cells from two upstream to two downstream in the value at a face
@@ -251,9 +280,21 @@ def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: flo
         stable_there = any(low <= courant <= high for low, high in stable)
         growth, fastest = (0.0, 0.0) if stable_there else growth_of(weights, method, courant)
         steps = math.log(THOUSANDFOLD) / math.log1p(growth) if growth > 0 else None
-    theta, wave = (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
+    theta, wave = (
+        (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
+    )
     return AdvectionLimit(
-        scheme, tableau.name, limit, theta, wave, stable, proved, tableau.digits, courant, growth, steps
+        scheme,
+        tableau.name,
+        limit,
+        theta,
+        wave,
+        stable,
+        proved,
+        tableau.digits,
+        courant,
+        growth,
+        steps,
     )
 
 
@@ -269,10 +310,16 @@ def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple
         at = int(np.argmax(size))
         best, most = float(theta[at]), float(size[at]) - 1
         theta = np.linspace(theta[max(at - 1, 0)], theta[min(at + 1, theta.size - 1)], 201)
-    return (most, best) if most > LEAST_FLOAT_GROWTH else _slow_growth(weights, method, Fraction(courant))
+    return (
+        (most, best)
+        if most > LEAST_FLOAT_GROWTH
+        else _slow_growth(weights, method, Fraction(courant))
+    )
 
 
-def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) -> tuple[float, float]:
+def _slow_growth(
+    weights: Sequence[Fraction], method: str, courant: Fraction
+) -> tuple[float, float]:
     """Result of `growth_of`, computed in fractions on few waves, whose phases are refined repeatedly.
 
     With R = N / D, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)).
@@ -283,7 +330,9 @@ def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) ->
         growths = []
         for x in theta:
             t = _dyadic(math.sin(x / 2) ** 2, 60)
-            up, down = (_modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator))
+            up, down = (
+                _modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator)
+            )
             growths.append(float((up - down) / down))
         at = int(np.argmax(growths))
         low, high = theta[max(at - 1, 0)], theta[min(at + 1, len(theta) - 1)]
@@ -328,7 +377,9 @@ def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
     tolerance = Fraction(0) if exact and not tableau.digits else Fraction(1, 10**digits)
     if exact:
         return r, tolerance
-    up, down = (Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator))
+    up, down = (
+        Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator)
+    )
     return StabilityFunction(up, down), tolerance
 
 
@@ -339,7 +390,9 @@ def _fraction(x) -> Fraction:
     return (low + high) / 2
 
 
-def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
+def _e_polynomial(
+    weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction
+) -> list[list[int]]:
     """Integer coefficients g[m][i] of nu^m t^i of a positive multiple of E(nu, t), without common factors of the terms.
 
     A wave of phase theta per cell grows at the Courant number nu if E < 0 at t = sin^2(theta / 2). With the
@@ -360,9 +413,16 @@ def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: 
         row, doubt = Polynomial([]), Polynomial([])
         for k in range(max(0, m - size), m // 2 + 1):
             factor = powers[k] * c[m - 2 * k]
-            parts = [s * _coefficient(p, k) * _coefficient(p, m - k) * (1 if 2 * k == m else 2) for p, s in pairs]
+            parts = [
+                s * _coefficient(p, k) * _coefficient(p, m - k) * (1 if 2 * k == m else 2)
+                for p, s in pairs
+            ]
             row = row + sum(parts) * factor
-            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, factor.coefficients)) if tolerance else doubt
+            doubt = (
+                doubt + sum(map(abs, parts)) * Polynomial(map(abs, factor.coefficients))
+                if tolerance
+                else doubt
+            )
         rows.append(_without_rounding(row, doubt, tolerance))
     return _reduced(rows)
 
@@ -373,7 +433,8 @@ def _coefficient(p: Polynomial, k: int) -> Fraction:
 
 def _without_rounding(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> Polynomial:
     return Polynomial(
-        x if abs(x) > tolerance * _coefficient(doubt, i) else Fraction(0) for i, x in enumerate(p.coefficients)
+        x if abs(x) > tolerance * _coefficient(doubt, i) else Fraction(0)
+        for i, x in enumerate(p.coefficients)
     )
 
 
@@ -417,7 +478,9 @@ def _signs(p: Polynomial) -> set[int]:
 # ---- where it is negative
 
 
-def _stable_ranges(weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool):
+def _stable_ranges(
+    weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool
+):
     """Stable ranges of Courant numbers as pairs of `RangeEnd`, and True if they are proved.
 
     weights : face weights as in `limit_of`; r, tolerance : result of `_rational`
@@ -425,12 +488,18 @@ def _stable_ranges(weights: tuple, r: StabilityFunction, tolerance: Fraction, le
     """
     if left_half_plane and 1 not in _signs(real_part(weights)):
         return ALL_STABLE, True
-    return _cached_stable_ranges(weights, r.numerator.coefficients, r.denominator.coefficients, tolerance)
+    return _cached_stable_ranges(
+        weights, r.numerator.coefficients, r.denominator.coefficients, tolerance
+    )
 
 
 @functools.cache
-def _cached_stable_ranges(weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fraction):
-    g = _e_polynomial(weights, StabilityFunction(Polynomial(numerator), Polynomial(denominator)), tolerance)
+def _cached_stable_ranges(
+    weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fraction
+):
+    g = _e_polynomial(
+        weights, StabilityFunction(Polynomial(numerator), Polynomial(denominator)), tolerance
+    )
     if not g:
         return ALL_STABLE, True
     rays = {_dyadic(math.sin(k * math.pi / (2 * RAYS)) ** 2, 24) for k in range(RAYS + 1)}
@@ -443,7 +512,11 @@ def _cached_stable_ranges(weights: tuple, numerator: tuple, denominator: tuple, 
             return gaps, not any(counterexamples) and _fails_outside(g, gaps, rays)
         for _, t in points:
             rays |= {t, *(min(t * Fraction(k, 8), Fraction(1)) for k in (4, 6, 7, 9, 10, 16))}
-    return [gap for gap, point in zip(gaps, counterexamples, strict=True) if not isinstance(point, tuple)], False
+    return [
+        gap
+        for gap, point in zip(gaps, counterexamples, strict=True)
+        if not isinstance(point, tuple)
+    ], False
 
 
 def _counterexample(g, low: float, high: float):
@@ -459,7 +532,11 @@ def _counterexample(g, low: float, high: float):
     middle = max(start, Fraction(1))
     below = negative_point(g, start, middle) if start < middle else None
     above = negative_point(g[::-1], Fraction(0), 1 / middle) if below is None else below
-    return (1 / above[0], above[1]) if isinstance(above, tuple) and below is None and above[0] else above
+    return (
+        (1 / above[0], above[1])
+        if isinstance(above, tuple) and below is None and above[0]
+        else above
+    )
 
 
 def _fails_outside(g, gaps, rays) -> bool:
@@ -472,7 +549,9 @@ def _fails_outside(g, gaps, rays) -> bool:
         return False
     ends = [(low, 1 - MARGIN) for low, _ in gaps if low.courant > 0]
     ends += [(high, 1 + MARGIN) for _, high in gaps if math.isfinite(high.courant)]
-    return all(polynomial_value(g, Fraction(edge.courant) * factor, edge.t) < 0 for edge, factor in ends)
+    return all(
+        polynomial_value(g, Fraction(edge.courant) * factor, edge.t) < 0 for edge, factor in ends
+    )
 
 
 def _negative_at_small_nu(g, t: Fraction) -> bool:
@@ -516,7 +595,9 @@ def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
     def reach(t: Fraction) -> float:
         ranges = _negative(_coefficients_at(g, t))
         if side > 0:
-            return min((max(low, inside) for low, high in ranges if high > inside), default=math.inf)
+            return min(
+                (max(low, inside) for low, high in ranges if high > inside), default=math.inf
+            )
         return -max((min(high, inside) for low, high in ranges if low < inside), default=0.0)
 
     ends = reach(Fraction(0)), reach(Fraction(1))

@@ -38,7 +38,10 @@ def multiples(first: float, factor: float, last: float) -> Iterator[float]:
 
 
 def greatest_step(
-    fails: Callable[[float], bool], rising: Iterable[float], falling: Iterable[float] = (), **end: Any
+    fails: Callable[[float], bool],
+    rising: Iterable[float],
+    falling: Iterable[float] = (),
+    **end: Any,
 ) -> StepLimit:
     """Find the least step h [s] at which fails(h) is true, among trial steps, and then by bisection.
 
@@ -54,11 +57,17 @@ def greatest_step(
         low = high
     else:
         return StepLimit(math.inf, math.inf)
-    return step_below(fails, high, falling, **end) if low == 0.0 else bisect(fails, low, high, **end)
+    return (
+        step_below(fails, high, falling, **end) if low == 0.0 else bisect(fails, low, high, **end)
+    )
 
 
 def limit_from(
-    fails: Callable[[float], bool], first: float, far: float, ratio: float = STEP_RATIO, width: float = BRACKET_WIDTH
+    fails: Callable[[float], bool],
+    first: float,
+    far: float,
+    ratio: float = STEP_RATIO,
+    width: float = BRACKET_WIDTH,
 ) -> StepLimit:
     """Find the least step h [s] at which fails(h) is true, by a search upwards or downwards from `first`.
 
@@ -69,7 +78,9 @@ def limit_from(
     return greatest_step(fails, rising, falling, width=width)
 
 
-def step_below(fails: Callable[[float], bool], high: float, falling: Iterable[float], **end: Any) -> StepLimit:
+def step_below(
+    fails: Callable[[float], bool], high: float, falling: Iterable[float], **end: Any
+) -> StepLimit:
     """Find a limit below a step `high` [s] that fails; falling, end : as for `greatest_step`."""
     for low in falling:
         if not fails(low):
@@ -84,9 +95,13 @@ def middle_of(low: float, high: float) -> float:
 
 
 def bisect(
-    fails: Callable[[float], bool], low: float, high: float, width: float = BRACKET_WIDTH,
-    halvings: int = MOST_HALVINGS, mean: Callable[[Any, Any], Any] = middle_of,
-) -> StepLimit:  # fmt: skip
+    fails: Callable[[float], bool],
+    low: float,
+    high: float,
+    width: float = BRACKET_WIDTH,
+    halvings: int = MOST_HALVINGS,
+    mean: Callable[[Any, Any], Any] = middle_of,
+) -> StepLimit:
     """Bisect between a safe step `low` [s] and a failing step `high` [s].
 
     width : relative width at which the search ends; halvings : greatest number of steps tried
@@ -106,7 +121,9 @@ def bisect(
 # growth of modes ----------
 
 
-def modes_limit(r, s: np.ndarray, span: float, enough: float, *steps: Iterable[float], halvings: int) -> StepLimit:
+def modes_limit(
+    r, s: np.ndarray, span: float, enough: float, *steps: Iterable[float], halvings: int
+) -> StepLimit:
     """Greatest step up to which all modes grow less than `enough` times more in a run than in the exact solution.
 
     r : stability function of the method; s : eigenvalues of the modes [1/s]; span : duration of the run [s]

@@ -33,7 +33,10 @@ from fvsolve.core.steppers.analysis.stability_function import stability_function
 
 PHASES = 33  # number of phases from 0 to pi in x; with the same spacing from -pi to pi in y
 GROWTH = 1e-9  # |R| - 1 above which a wave counts as growing
-LOWEST, HIGHEST, HALVINGS = 1.0 / 64.0, 64.0, 40  # range of trial Courant numbers, number of bisections
+# range of trial Courant numbers, number of bisections
+LOWEST = 1.0 / 64.0
+HIGHEST = 64.0
+HALVINGS = 40
 FINE = 1001  # phases along a line
 MARGIN = 1.01  # margin of the Courant number: a step stable with it needs no further check
 LONG = 40  # number of cells from which the ends of a pipe reduce the limit by less than 8 %
@@ -46,7 +49,9 @@ def greatest_courant(fails: Callable[[float], bool], ratio: float) -> float:
 
     fails : function of a Courant number; ratio : ratio of the trial numbers before bisection
     """
-    return greatest_step(fails, multiples(LOWEST, ratio, HIGHEST), width=0.0, halvings=HALVINGS).step
+    return greatest_step(
+        fails, multiples(LOWEST, ratio, HIGHEST), width=0.0, halvings=HALVINGS
+    ).step
 
 
 @functools.lru_cache(maxsize=64)
@@ -62,7 +67,9 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
 
 
 @functools.lru_cache(maxsize=1024)
-def is_stable_with_margin(scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False) -> bool:
+def is_stable_with_margin(
+    scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False
+) -> bool:
     """True if no tested wave grows at a Courant number, nor at a Courant number 1 % greater.
 
     Arguments are as for `plane_limit`; with share = 1 and no waves it is advection along a line.
@@ -106,11 +113,15 @@ def pipe_limit(scheme: str, method: str, cells: int, returned: tuple[float, ...]
 
     returned : products of the pressure reflection factors at both ends; the limit holds for all of these products
     """
-    return greatest_courant(lambda courant: pipe_growth(scheme, method, cells, courant, returned) > GROWTH, RISE)
+    return greatest_courant(
+        lambda courant: pipe_growth(scheme, method, cells, courant, returned) > GROWTH, RISE
+    )
 
 
 @functools.lru_cache(maxsize=4096)
-def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: tuple[float, ...] = WORST) -> float:
+def pipe_growth(
+    scheme: str, method: str, cells: int, courant: float, returned: tuple[float, ...] = WORST
+) -> float:
     """Greatest growth factor of a mode of a pipe of `cells` cells in a step, minus 1; negative if all modes decay.
 
     scheme, method : names; courant : Courant number
@@ -126,7 +137,9 @@ def pipe_modes(scheme: str, cells: int, returned: tuple[float, ...] = WORST) -> 
 
     returned : products of the pressure reflection factors at both ends
     """
-    a, b, v = wave_matrices((SCHEMES[scheme].shorter or scheme) if cells < LEAST_CELLS else scheme, cells)
+    a, b, v = wave_matrices(
+        (SCHEMES[scheme].shorter or scheme) if cells < LEAST_CELLS else scheme, cells
+    )
     roots = [sign * np.sqrt(complex(product)) for product in returned for sign in (1.0, -1.0)]
     return np.concatenate([np.linalg.eigvals(a + s * np.outer(b, v)) for s in roots])
 
@@ -144,7 +157,10 @@ def wave_matrices(scheme: str, cells: int) -> tuple[np.ndarray, np.ndarray, np.n
     before = END_ENTERING[into, ::-1, : into + 1] @ near[: into + 1]
     beyond = END_LEAVING[out, :, : out + 1] @ far[: out + 1]
     cell = np.vstack([before, known[1:], beyond])
-    inner = [sum(w * cell[GHOSTS + i + k] for k, w in enumerate(weights, start=-2)) for i in range(cells - 1)]
+    inner = [
+        sum(w * cell[GHOSTS + i + k] for k, w in enumerate(weights, start=-2))
+        for i in range(cells - 1)
+    ]
     last = END_VALUE[out, : out + 1] @ far[: out + 1]
     face = np.vstack([known[:1], *inner, last])
     rate = face[:-1] - face[1:]

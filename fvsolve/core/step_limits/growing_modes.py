@@ -25,7 +25,12 @@ from fvsolve.core.assembly.pipe_terms import elements
 from fvsolve.core.kernels.steady_friction import drag_slope
 from fvsolve.core.model.model import once_per_model
 from fvsolve.core.schemes import SCHEMES
-from fvsolve.core.step_limits.greatest_step import excess_growth, growth_in_run, modes_limit, multiples
+from fvsolve.core.step_limits.greatest_step import (
+    excess_growth,
+    growth_in_run,
+    modes_limit,
+    multiples,
+)
 from fvsolve.core.step_limits.symbol import symbol
 from fvsolve.core.steppers.analysis.stability_function import stability_function
 from fvsolve.core.steppers.analysis.stability_properties import imaginary_interval
@@ -33,7 +38,8 @@ from fvsolve.core.steppers.tableau import Method, method_named
 from fvsolve.errors import Notice
 
 OTHER_STATES = 1e3  # further factor for states driven by more than waves: contents, amounts
-FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # scheduled keys of nodes
+# scheduled keys of nodes
+FORCING_KEYS = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}
 
 
 @once_per_model
@@ -110,13 +116,16 @@ def state_ranges(model, share: float = 1.0) -> np.ndarray:
 
 SHARE = 0.01  # fraction of the forcing range over which slopes are taken
 MOST = 300  # number of states above which no prediction is made
-LEAST_GROWTH = 10.0  # growth factor in a run below which no notice is given: some growth is unavoidable
+# growth factor in a run below which no notice is given: some growth is unavoidable
+LEAST_GROWTH = 10.0
 LEAST = 1e-15  # least step in the search for the limit, relative to the given step
 HALVINGS = 40  # number of bisections in this search
-RESOLVED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows as predicted at the start
+# |h s| up to which a mode is resolved by the steps, and grows as predicted at the start
+RESOLVED = 1.0
 PHASES = np.linspace(0.0, np.pi, 65)
 NOTICE_GROWTH = 1.01  # growth of an undamped oscillation in a run above which a notice is given
-GREATEST_DAMPING = 0.1  # greatest damping rate of a mode that counts as undamped, relative to its frequency
+# greatest damping rate of a mode that counts as undamped, relative to its frequency
+GREATEST_DAMPING = 0.1
 
 Modes = list[tuple[str, np.ndarray]]  # places and eigenvalues there [1/s]
 
@@ -153,12 +162,15 @@ def lumped_modes(model, method: str, step: float, count: float | None = None) ->
         cells += memory_modes(model)
         for feature in model.features:
             cells += feature.modes(model)
-    span = max(span, step * (count or 0.0))  # breaks of schedules shorten steps, but each still is a step
+    # breaks of schedules shorten steps, but each still is a step
+    span = max(span, step * (count or 0.0))
     candidates = [fastest_growing(r, modes, step, span, modes is own) for modes in (own, cells)]
     return [mode for mode in candidates if mode is not None]
 
 
-def fastest_growing(r, modes: Modes, step: float, span: float, own: bool, enough: float = LEAST_GROWTH) -> Mode | None:
+def fastest_growing(
+    r, modes: Modes, step: float, span: float, own: bool, enough: float = LEAST_GROWTH
+) -> Mode | None:
     """Mode with the greatest growth, if it grows by the factor `enough` in a run of `span` [s]; otherwise None.
 
     r : stability function of the method; modes : pairs of a name and eigenvalues [1/s]; step : time step [s]
@@ -187,7 +199,9 @@ def modes_outside_cells(model) -> Modes:
     states = states_outside_cells(model)
     if not 0 < states.size <= MOST:
         return []
-    t, y, width = float(model.case.numerics.start), model.start, SHARE * state_ranges(model)
+    t = float(model.case.numerics.start)
+    y = model.start
+    width = SHARE * state_ranges(model)
     out, j = model.new_out(), np.zeros((states.size, states.size))
 
     def rates(moved: np.ndarray) -> np.ndarray:
@@ -227,7 +241,12 @@ def friction_modes(model) -> Modes:
         elif g > 0.0 and row["cells"] > 0:
             z = symbols[mesh.cells]  # waves between two ends are longer than two cells
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
-            modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+            modes.append(
+                (
+                    mesh.name,
+                    np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root]),
+                )
+            )
     return modes
 
 
@@ -254,7 +273,9 @@ def memory_modes(model) -> Modes:
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
             gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
-            modes.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - friction_slope(row)])))
+            modes.append(
+                (f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - friction_slope(row)]))
+            )
         if row["elements"] > 0:
             gain, rate = elements(floats, row).T
             modes.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
@@ -266,7 +287,11 @@ def friction_slope(row) -> float:
 
     row : row of the pipe in the table of pipes
     """
-    return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
+    return float(
+        drag_slope(
+            *(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
+        )
+    )
 
 
 # undamped oscillations ----------
@@ -289,13 +314,29 @@ def undamped_notices(model, method: str, step: float, span: float) -> list[Notic
     mode = fastest_growing(stability_function(method), modes, step, span, True, NOTICE_GROWTH)
     if mode is None:
         return []
-    grows = f"by {100.0 * (mode.growth - 1.0):.3g} %" if mode.growth < 2.0 else f"{mode.growth:.3g} times"
+    grows = (
+        f"by {100.0 * (mode.growth - 1.0):.3g} %"
+        if mode.growth < 2.0
+        else f"{mode.growth:.3g} times"
+    )
     size = f"{numerics.courant * mode.limit / step:.3g}"
-    text = (f"{mode.place}: an oscillation at {mode.frequency:.4g} Hz with little damping grows {grows} in the run, at "
-            f"{math.log(mode.growth) / span:.3g} 1/s, with {method} and steps of {model.case.step_amount(step, 4)} "
-            "(estimated at the start), because the method is unstable on the imaginary axis; give "
-            f'numerics.method = "ssp-rk3", or numerics.courant = {size}, with which the growth is 1 %')  # fmt: skip
-    return [Notice("swing", mode.place, text, "courant", mode.growth, NOTICE_GROWTH, mode.growth < LEAST_GROWTH)]
+    text = (
+        f"{mode.place}: an oscillation at {mode.frequency:.4g} Hz with little damping grows {grows} in the run, at "
+        f"{math.log(mode.growth) / span:.3g} 1/s, with {method} and steps of {model.case.step_amount(step, 4)} "
+        "(estimated at the start), because the method is unstable on the imaginary axis; give "
+        f'numerics.method = "ssp-rk3", or numerics.courant = {size}, with which the growth is 1 %'
+    )
+    return [
+        Notice(
+            "swing",
+            mode.place,
+            text,
+            "courant",
+            mode.growth,
+            NOTICE_GROWTH,
+            mode.growth < LEAST_GROWTH,
+        )
+    ]
 
 
 @functools.lru_cache(maxsize=256)

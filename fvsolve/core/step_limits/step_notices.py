@@ -24,14 +24,20 @@ from fvsolve.core.step_limits.grid_limits import (
     pipe_limit,
     plane_limit,
 )
-from fvsolve.core.step_limits.growing_modes import LEAST_GROWTH, Mode, lumped_modes, undamped_notices
+from fvsolve.core.step_limits.growing_modes import (
+    LEAST_GROWTH,
+    Mode,
+    lumped_modes,
+    undamped_notices,
+)
 from fvsolve.core.step_limits.symbol import weights_of
 from fvsolve.core.steppers import automatic
 from fvsolve.core.steppers.tableau import method_named
 from fvsolve.errors import FvsolveError, Notice
 
 SLACK = 1e-9  # relative excess over the limit that rounding may cause
-EXCESS = 0.05  # relative excess over an estimated limit up to which a step is doubtful, and above which it is wrong
+# relative excess over an estimated limit up to which a step is doubtful, and above which it is wrong
+EXCESS = 0.05
 # Growth in a run from which waves that grow at every Courant number give a notice: Euler's errors are 2 % there.
 ALWAYS_GROWING = 5.0
 SINGLE_GROWTH = 0.1  # growth in a single step, minus 1, from which few steps are checked too
@@ -39,10 +45,12 @@ SINGLE_GROWTH = 0.1  # growth in a single step, minus 1, from which few steps ar
 SMOOTH_GROWTH = 1e6
 # Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
 NO_ERROR, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
-WRONG_BEYOND_LIMIT = 0.02  # WRONG of steps that exceed a limit, whose errors grow from check to check
+# WRONG of steps that exceed a limit, whose errors grow from check to check
+WRONG_BEYOND_LIMIT = 0.02
 # Quotient of the limits of a pipe without ends and of a pipe of 40 cells, at most, for all schemes and methods.
 END_MARGIN = 1.08
-MOST_CELLS = 160  # cells of a longer pipe for which modes are computed; its ends reduce the limit less
+# cells of a longer pipe for which modes are computed; its ends reduce the limit less
+MOST_CELLS = 160
 # EXCESS for limiters between few cells, which are stable up to this excess (tests/step_limits/test_ends.py)
 LIMITED_EXCESS = 0.3
 
@@ -61,10 +69,12 @@ class CourantCheck(NamedTuple):
     scheme: str  # scheme of the limit
     proved: bool
     location: str
-    allowed_excess: float = EXCESS  # relative excess over an estimate above which the numbers are wrong
+    # relative excess over an estimate above which the numbers are wrong
+    allowed_excess: float = EXCESS
     growth: float = math.inf  # growth factor in the run, where growth decides
     share: float = 1.0
-    worst_growth: float = math.inf  # growth factor with the worst reflections at the ends of a short pipe
+    # growth factor with the worst reflections at the ends of a short pipe
+    worst_growth: float = math.inf
 
 
 class Steps(NamedTuple):
@@ -96,9 +106,12 @@ def steps_of(model, given: float) -> Steps:
 
 
 def step_limits(
-    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: RunData | None = None,
+    model,
+    rates: dict[str, float] | None = None,
+    step_error: float | None = None,
+    run_data: RunData | None = None,
     cell_error: float | None = None,
-) -> list[Notice]:  # fmt: skip
+) -> list[Notice]:
     """Notices for the worst pipe, the meshes, delay lines and other modes for which the step exceeds the limit.
 
     rates : greatest wave rate of each part in the run so far, by name [1/s]; default: the initial rates
@@ -125,16 +138,23 @@ def step_limits(
     except FvsolveError:  # a method without a stability function
         return lines
     wrong = cell_error is not None and cell_error >= WRONG_BEYOND_LIMIT
-    noticed = [check for check in exceeded if wrong or check.worst_growth >= LEAST_GROWTH or check.limit == 0.0]
+    noticed = [
+        check
+        for check in exceeded
+        if wrong or check.worst_growth >= LEAST_GROWTH or check.limit == 0.0
+    ]
     notices = [courant_notice(model, check, method.name, wrong) for check in noticed]
     jumps = any(jump for _, jump in model.breaks)
     for mode in modes:
-        if mode.outside_cells or not exceeded:  # modes of cells that come with waves have a notice already
+        # modes of cells that come with waves have a notice already
+        if mode.outside_cells or not exceeded:
             notices.append(mode_notice(model.case, h, mode, method.name, step_error, jumps))
     return notices + growing + lines
 
 
-def exceeded_checks(model, method: str, rates: dict[str, float], steps: Steps) -> list[CourantCheck]:
+def exceeded_checks(
+    model, method: str, rates: dict[str, float], steps: Steps
+) -> list[CourantCheck]:
     """Checks of pipes and meshes in which the longest step of a run exceeds the limit, whether or not waves grow much.
 
     method : name of an explicit method; rates : as for `step_limits`; steps : steps of the run
@@ -145,13 +165,16 @@ def exceeded_checks(model, method: str, rates: dict[str, float], steps: Steps) -
 
 def exceeds_limit_of_cells(model) -> bool:
     """True if the steps of a run, without error control, exceed a limit of pipes or meshes at the start."""
-    method, numerics = method_named(automatic.first_method(model.case.numerics.method)), model.case.numerics
+    method = method_named(automatic.first_method(model.case.numerics.method))
+    numerics = model.case.numerics
     if numerics.rtol is not None or not method.explicit:
         return False
     key = exceeds_limit_of_cells
     if key not in model.computed:
         try:
-            model.computed[key] = bool(exceeded_checks(model, method.name, {}, steps_of(model, first_step(model))))
+            model.computed[key] = bool(
+                exceeded_checks(model, method.name, {}, steps_of(model, first_step(model)))
+            )
         except FvsolveError:  # a method without a stability function
             model.computed[key] = False
     return model.computed[key]
@@ -191,7 +214,9 @@ def given_step(model) -> float:
     return step_at_start(model) if numerics.step is not None else numerics.courant / model.wave_rate
 
 
-def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
+def mode_notice(
+    case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool
+) -> Notice:
     """Notice for a mode that grows with steps of h [s].
 
     mode : from `lumped_modes`; method : name of the method
@@ -207,19 +232,26 @@ def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | Non
     elif not mode.outside_cells and not jumps:
         enough = SMOOTH_GROWTH
     wrong = seen and mode.growth >= enough
-    doubt = "the results may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
+    doubt = (
+        "the results may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
+    )
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, remedy = shorter_step(numerics, mode.limit, h)
-    text = (f"{mode.place}: deviations grow by a factor of {mode.growth:.3g} in the run with {method} and steps of "
-            f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
-            f"{ends}; {remedy}")  # fmt: skip
+    text = (
+        f"{mode.place}: deviations grow by a factor of {mode.growth:.3g} in the run with {method} and steps of "
+        f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
+        f"{ends}; {remedy}"
+    )
     return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
 
 
 def shorter_step(numerics, limit: float, used: float) -> tuple[str, str]:
     """(key that gives the step, text that proposes a value of it); the step is too long by the factor used / limit."""
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
-    return key, f"give numerics.{key} = {rounded_down(getattr(numerics, key) * limit / used):.4g}{unit} or less"
+    return (
+        key,
+        f"give numerics.{key} = {rounded_down(getattr(numerics, key) * limit / used):.4g}{unit} or less",
+    )
 
 
 def pipe_checks(model, method: str, steps: Steps) -> list[CourantCheck]:
@@ -243,8 +275,13 @@ def pipe_checks(model, method: str, steps: Steps) -> list[CourantCheck]:
     # at the ends of short pipes the order of limited schemes is lower
     long = cells >= (LEAST_CELLS if scheme.limited and scheme.shorter else LONG)
     short = np.flatnonzero(own & ~long)
-    checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k]), steps))]
-    inner = own & (cells >= LEAST_CELLS if proved(model) else long)  # waves of a long pipe grow in few cells, too
+    checks = [
+        check
+        for k in short
+        if (check := short_pipe(model, method, int(k), float(courant[k]), steps))
+    ]
+    # waves of a long pipe grow in few cells, too
+    inner = own & (cells >= LEAST_CELLS if proved(model) else long)
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
         checks += long_pipe(model, method, k, float(courant[k]), steps)
@@ -253,8 +290,13 @@ def pipe_checks(model, method: str, steps: Steps) -> list[CourantCheck]:
     if not_few.any() and not (scheme.limited and scheme.shorter):
         k = int(np.argmax(np.where(not_few, courant, -1.0)))
         if not is_stable_with_margin(scheme.smooth.name, method, END_MARGIN * float(courant[k])):
-            checks += [check] if (check := short_pipe(model, method, k, float(courant[k]), steps)) else []
-    return sorted(checks, key=lambda check: (not only_doubtful(check), check.courant / max(check.limit, 1e-300)))[-1:]
+            checks += (
+                [check] if (check := short_pipe(model, method, k, float(courant[k]), steps)) else []
+            )
+    return sorted(
+        checks,
+        key=lambda check: (not only_doubtful(check), check.courant / max(check.limit, 1e-300)),
+    )[-1:]
 
 
 def long_pipe(model, method: str, k: int, courant: float, steps: Steps) -> list[CourantCheck]:
@@ -334,7 +376,9 @@ def reflection_products(model, k: int) -> tuple[float, ...]:
     A junction joined to valves too has two possible factors: that of the pipes alone and -1 (open end). Any node other
     than a junction has -1.
     """
-    row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
+    row = model.tables.pipes[k]
+    nodes = model.tables.nodes
+    valves = model.tables.valves
     ends = []
     for i in (row["from_node"], row["to_node"]):
         plain = nodes[i]["kind"] == rec.JUNCTION
@@ -361,7 +405,9 @@ def mesh_checks(model, method: str, rates: dict[str, float], steps: Steps) -> li
         courant *= steps.share
         scheme, limited = smooth_scheme(part.scheme)
         share = round(share, 2) if part.is_grid else 1.0
-        if is_stable_with_margin(scheme, method, courant / factor, share, part.is_grid and part.has_waves):
+        if is_stable_with_margin(
+            scheme, method, courant / factor, share, part.is_grid and part.has_waves
+        ):
             continue
         if part.is_grid:
             limit = plane_limit(scheme, method, share, part.has_waves)
@@ -372,8 +418,18 @@ def mesh_checks(model, method: str, rates: dict[str, float], steps: Steps) -> li
         fixed = part.is_grid and part.has_constant_speed
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / factor, steps.count)
         if grows >= ALWAYS_GROWING:
-            checks.append(CourantCheck(f"nodes.{part.name}", courant, limit * factor, scheme, fixed and not limited,
-                              "in a wide basin", growth=grows, share=steps.share))  # fmt: skip
+            checks.append(
+                CourantCheck(
+                    f"nodes.{part.name}",
+                    courant,
+                    limit * factor,
+                    scheme,
+                    fixed and not limited,
+                    "in a wide basin",
+                    growth=grows,
+                    share=steps.share,
+                )
+            )
     return checks
 
 
@@ -393,7 +449,9 @@ def only_doubtful(check: CourantCheck) -> bool:
     Reasons are a small excess over an estimated limit, or small growth in the run.
     """
     enough = LEAST_GROWTH**2 if check.limit > 0.0 else ALWAYS_GROWING
-    return not check.proved and (check.courant <= check.limit * (1.0 + check.allowed_excess) or check.growth < enough)
+    return not check.proved and (
+        check.courant <= check.limit * (1.0 + check.allowed_excess) or check.growth < enough
+    )
 
 
 def courant_notice(model, check: CourantCheck, method: str, wrong: bool) -> Notice:

@@ -28,7 +28,9 @@ def weights_of(scheme: str) -> Weights:
         return WEIGHTS[scheme]
     linear = ", ".join(WEIGHTS)
     if scheme in LIMITED:
-        raise FvsolveError(f'scheme "{scheme}" is not linear and has no exact limit; linear schemes are {linear}')
+        raise FvsolveError(
+            f'scheme "{scheme}" is not linear and has no exact limit; linear schemes are {linear}'
+        )
     near = nearest(scheme, [*WEIGHTS, *LIMITED])
     hint = f'did you mean "{near}"?' if near else f"linear schemes are {linear}"
     raise FvsolveError(f'no scheme named "{scheme}"; {hint}')
@@ -72,7 +74,9 @@ def _cosines(waves: dict[int, Fraction]) -> Polynomial:
     The cosines follow from cos theta = 1 - 2 t by the recurrence T_m+1 = 2 (1 - 2 t) T_m - T_m-1.
     """
     cosine = Polynomial([1, -2])
-    before, now, total = cosine, Polynomial([1]), Polynomial([])
+    before = cosine
+    now = Polynomial([1])
+    total = Polynomial([])
     for m in range(max(abs(m) for m in waves) + 1):
         total = total + now * (waves.get(m, Fraction(0)) + (waves.get(-m, Fraction(0)) if m else 0))
         before, now = now, 2 * cosine * now - before

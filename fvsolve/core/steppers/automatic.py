@@ -42,7 +42,8 @@ def watch(stepper: Integrator, structure: Structure, work: float = 1.0) -> None:
     work : as for `step_cost_ratio`
     """
     stepper.set_control(watch=1, price=step_cost_ratio(structure, work))
-    if stepper.control[0]["keeps_step"]:  # without waves: the rates may bend at levels of tanks, see `hidden_stiffness`
+    # without waves: the rates may bend at levels of tanks, see `hidden_stiffness`
+    if stepper.control[0]["keeps_step"]:
         stepper.returns = np.zeros((2, structure.n))
 
 
@@ -64,19 +65,27 @@ def change(stepper: Integrator) -> tuple[float, float, float]:
     return float(state["t"]), float(state["radius"]), float(state["last"])
 
 
-def method_history(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
+def method_history(
+    start: float, changes: list[tuple[float, float, float]], price: float, rtol: float
+) -> list[dict]:
     """List of the methods used in a run with the method `auto`, each a dict with start time, method and reason.
 
     start : start time of the run; changes : results of `change`
     price : cost of an implicit step in explicit steps; rtol : tolerance of the run
     """
-    entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
+    entries = [
+        {"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}
+    ]
     for k, (t, radius, h) in enumerate(changes):
         if k % 2 == 0:
-            reason = (f"stability limited explicit steps to {h:.3g} s"
-                   + (f", at rates of about {radius:.3g} 1/s" if radius > 0 else "")
-                   + f"; an implicit step costs about {price:.2g} explicit steps")  # fmt: skip
+            reason = (
+                f"stability limited explicit steps to {h:.3g} s"
+                + (f", at rates of about {radius:.3g} 1/s" if radius > 0 else "")
+                + f"; an implicit step costs about {price:.2g} explicit steps"
+            )
         else:
             reason = f"rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s again"
-        entries.append({"time": t, "method": EXPLICIT if k % 2 else implicit_method(rtol), "why": reason})
+        entries.append(
+            {"time": t, "method": EXPLICIT if k % 2 else implicit_method(rtol), "why": reason}
+        )
     return entries

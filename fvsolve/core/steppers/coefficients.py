@@ -27,12 +27,18 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
     """
     if method.kind == "linear":
         return method.coefficients
-    a, b, c, dense = method.a, method.b, method.c, method.dense
+    a = method.a
+    b = method.b
+    c = method.c
+    dense = method.dense
     error = method.error if method.adaptive else np.zeros(len(b))
     # Steps begin with f at their start: other methods receive it as a further stage of weight 0.
     if a[0].any() or c[0] != 0.0 or damped:
         a = np.block([[0.0, np.zeros(len(b))], [np.zeros((len(b), 1)), a]])
-        b, c, error = (np.concatenate(([x], part)) for x, part in ((0.0, b), (0.0, c), (method.start_error, error)))
+        b, c, error = (
+            np.concatenate(([x], part))
+            for x, part in ((0.0, b), (0.0, c), (method.start_error, error))
+        )
         dense = np.vstack([np.zeros((1, dense.shape[1])), dense]) if dense.size else dense
     flat = [a.ravel(), b, c, error]
     if method.kind == "full":
@@ -118,7 +124,10 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
             t[:, at], blocks[at, at], at = v.real, values[i].real, at + 1
         else:  # A^-1 (u - i w) = (a + i b) (u - i w): in the basis u, w A^-1 is [[a, -b], [b, a]]
             t[:, at], t[:, at + 1] = v.real, -v.imag
-            blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
+            blocks[at : at + 2, at : at + 2] = [
+                [values[i].real, -values[i].imag],
+                [values[i].imag, values[i].real],
+            ]
             at += 2
     # A basis that is nearly singular would amplify rounding.
     if at < q or np.linalg.cond(t) > 1e8:

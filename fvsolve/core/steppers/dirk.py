@@ -45,7 +45,11 @@ def solve_stage(handle, r, t, h_gamma, i):
     The stored stage is exactly f + J d with the last increment d, so it conserves the quantities that f and the
     Jacobian J conserve.
     """
-    d, before, status, shift, ki = r.increment, 0.0, iterations.FAILED, 1.0 / h_gamma, r.k[i]
+    d = r.increment
+    before = 0.0
+    status = iterations.FAILED
+    shift = 1.0 / h_gamma
+    ki = r.k[i]
     for turn in range(iterations.MOST):
         iterations.evaluate_stage(handle, r, t, h_gamma, ki, d)
         call_solve(r.calls[REAL_SOLVE], r.structure, r.factors, d)
@@ -70,8 +74,13 @@ def try_stages(handle, r, t, h, now):
 
     A stage that fails is solved again by damped Newton if the Jacobian is of this step. Arguments as for `attempt`.
     """
-    state, k, y, base, s = r.state[0], r.k, r.y[now], r.base, r.k.shape[0]
-    fresh, adaptive = r.newton[0]["jacobian_step"] == state["steps"], r.control[0]["mode"] == rec.TOLERANCE
+    state = r.state[0]
+    k = r.k
+    y = r.y[now]
+    base = r.base
+    s = r.k.shape[0]
+    fresh = r.newton[0]["jacobian_step"] == state["steps"]
+    adaptive = r.control[0]["mode"] == rec.TOLERANCE
     c, b = nodes_of(r.coefficients, s), weights_of(r.coefficients, s)
     for i in range(1, s):
         row, ki = row_of(r.coefficients, s, i), k[i]
@@ -110,7 +119,10 @@ def attempt(handle, run, t, h, now, new):
     fresh Jacobian. Arguments as for `erk.attempt`.
     """
     r = open_run(run)
-    k, y, state, newton = r.k, r.y[now], r.state[0], r.newton[0]
+    k = r.k
+    y = r.y[now]
+    state = r.state[0]
+    newton = r.newton[0]
     s, error = k.shape[0], error_of(r.coefficients, k.shape[0])
     iterations.begin(r, now)
     while True:

@@ -22,8 +22,21 @@ from fvsolve.core.kernels.stage_sums import (
 )
 from fvsolve.core.steppers import loop_records as rec
 from fvsolve.core.steppers.coefficients import nodes_of, row_of, weights_of
-from fvsolve.core.steppers.run_handle import evaluate, note_stage, open_run, stage_rates, store_ledger_rates
-from fvsolve.core.steppers.step_operations import BEGIN, STOP, combine, copy, error_of_bands, error_scale
+from fvsolve.core.steppers.run_handle import (
+    evaluate,
+    note_stage,
+    open_run,
+    stage_rates,
+    store_ledger_rates,
+)
+from fvsolve.core.steppers.step_operations import (
+    BEGIN,
+    STOP,
+    combine,
+    copy,
+    error_of_bands,
+    error_scale,
+)
 from fvsolve.jit import njit
 
 CHUNK = 512  # number of states of a vector loop whose operands stay in the cache
@@ -47,7 +60,9 @@ def quotient(f_new, f, y_new, y, scale):
 @njit
 def form_sum(r, h, weights, count, now, target):
     """Write y[now] + h sum over j < count of weights[j] k[j] to `target`, for all states of this band."""
-    row_blocks, k, y = r.row_blocks, r.k, r.y[now]
+    row_blocks = r.row_blocks
+    k = r.k
+    y = r.y[now]
     for m in range(row_blocks.shape[0]):
         combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y, h, weights, count, k, target)
 
@@ -62,8 +77,13 @@ def attempt(handle, run, t, h, now, new):
     `structure` describes stage sums that rhs forms in blocks, see `kernels.stage_sums`; it is empty if rhs forms none.
     """
     r = open_run(run)
-    control, k, structure, y = r.control[0], r.k, r.structure, r.y[now]
-    s, b, c = k.shape[0], weights_of(r.coefficients, k.shape[0]), nodes_of(r.coefficients, k.shape[0])
+    control = r.control[0]
+    k = r.k
+    structure = r.structure
+    y = r.y[now]
+    s = k.shape[0]
+    b = weights_of(r.coefficients, k.shape[0])
+    c = nodes_of(r.coefficients, k.shape[0])
     last_is_new, blocked = control["fsal"] == 1, structure.size > 0
     for i in range(1, s):
         last, row = i == s - 1, row_of(r.coefficients, s, i)
@@ -119,13 +139,11 @@ def second_order_correction(begin, end, b, damping, k, means):
     means : float64[n], work space
     """
     last = b.size - 1
-    q, mean, early, late, final = (
-        damping[begin:end],
-        means[begin:end],
-        k[1, begin:end],
-        k[2, begin:end],
-        k[last, begin:end],
-    )
+    q = damping[begin:end]
+    mean = means[begin:end]
+    early = k[1, begin:end]
+    late = k[2, begin:end]
+    final = k[last, begin:end]
     # Most blocks have no fast decay: then the correction is zero, and its passes are saved.
     if not any_nonzero(q):
         return
@@ -149,11 +167,19 @@ def damped_attempt(handle, run, t, h, now, new):
     Arguments as for `attempt`.
     """
     r = open_run(run)
-    k, row_blocks, ledger_rates, n = r.k, r.row_blocks, r.ledger_rates, r.scale.size
-    s, b, c = k.shape[0], weights_of(r.coefficients, k.shape[0]), nodes_of(r.coefficients, k.shape[0])
+    k = r.k
+    row_blocks = r.row_blocks
+    ledger_rates = r.ledger_rates
+    n = r.scale.size
+    s = k.shape[0]
+    b = weights_of(r.coefficients, k.shape[0])
+    c = nodes_of(r.coefficients, k.shape[0])
     early, late = r.factors[:n], r.factors[n:]
     for m in range(row_blocks.shape[0]):
-        copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
+        copy(
+            k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]],
+            k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]],
+        )
     # The ledger has the rates of the equations, without damping.
     copy(ledger_rates[0], ledger_rates[1])
     damp_in_turn(h, r.y[now], k[1], early, handle)

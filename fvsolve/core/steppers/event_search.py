@@ -13,9 +13,11 @@ from fvsolve.core.steppers.output_rows import limit_to_bounds
 from fvsolve.core.steppers.step_operations import BEGIN, STOP, copy, interpolate
 from fvsolve.jit import njit
 
-NEAR, NEAR_AFTER_BREAK = 2.0, 20.0  # distance to zero at which a step is searched, in changes at the pace
+# distance to zero at which a step is searched, in changes at the pace
+NEAR, NEAR_AFTER_BREAK = 2.0, 20.0
 FADING = 0.8  # of the pace per step, where an event function changes more slowly than before
-MARGIN, MOVED = 0.1, 0.25  # least bound, in changes within the step; least change within the step, in those at the pace
+# least bound, in changes within the step; least change within the step, in those at the pace
+MARGIN, MOVED = 0.1, 0.25
 # Greatest bend of a function that ends at zero, in its fall; a parabola with a bend above 0.25 has an earlier zero.
 STRAIGHT = 0.1
 MOST_TURNS = 10  # of the search in an interval
@@ -27,9 +29,13 @@ NOWHERE = 1.0  # in place of a fraction: no event
 @njit
 def update_pace(r):
     """Update the pace of all event functions [1/s], their greatest rate of change in the last steps, after a step."""
-    pace, g, g_new, h = r.pace, r.g, r.g_new, r.state[0]["last"]
+    pace = r.pace
+    g = r.g
+    g_new = r.g_new
+    h = r.state[0]["last"]
     for i in range(g.size):
-        if abs(g[i]) < rec.UNKNOWN_PACE and abs(g_new[i]) < rec.UNKNOWN_PACE:  # a time that never comes is infinite
+        # a time that never comes is infinite
+        if abs(g[i]) < rec.UNKNOWN_PACE and abs(g_new[i]) < rec.UNKNOWN_PACE:
             rate = abs(g_new[i] - g[i]) / h
             pace[i] = max(rate, FADING * pace[i]) if pace[i] < rec.UNKNOWN_PACE else rate
 
@@ -88,13 +94,19 @@ def needs_end_rates(r):
 @njit
 def interpolated_events(handle, r, h, theta, f_new, now, new, values):
     """Write the event functions at an inner time to `values`, from the dense output; f_new : rates at the end."""
-    y, y_new, out, row_blocks, s = r.y[now], r.y[new], r.y_out, r.row_blocks, r.k.shape[0]
+    y = r.y[now]
+    y_new = r.y[new]
+    out = r.y_out
+    row_blocks = r.row_blocks
+    s = r.k.shape[0]
     start_slope = start_slope_of(r.coefficients, s)
     for m in range(row_blocks.shape[0]):
         begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
         interpolate(begin, end, theta, h, y, r.f_old, y_new, f_new, r.k, r.dense, start_slope, out)
     limit_to_bounds(r.bounded_states, r.bounds, y, y_new, out, False)
-    run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"] + theta * h, out, handle, values)
+    run_handle.call_events(
+        r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"] + theta * h, out, handle, values
+    )
 
 
 @njit
@@ -110,7 +122,9 @@ def events_at(handle, run, r, h, theta, f_new, now, new, values):
     e = run_handle.call_attempt(r.calls[run_handle.STEP], handle, run, t, theta * h, now, at)
     if e == rec.NEWTON_FAILED:
         return False
-    run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], t + theta * h, r.y[at], handle, values)
+    run_handle.call_events(
+        r.calls[run_handle.EVENT_FUNCTIONS], t + theta * h, r.y[at], handle, values
+    )
     return True
 
 
@@ -137,7 +151,9 @@ def is_excluded(r, h, middle, far):
             moved = abs(middle[i] - g[i]) + abs(g_new[i] - middle[i])
             # The line through one end and the middle, extended to the other end, bounds the function there.
             least = min(middle[i], 2.0 * middle[i] - g[i], 2.0 * middle[i] - g_new[i])
-            ends_there = g_new[i] <= 0.0 and abs(middle[i] - 0.5 * (g[i] + g_new[i])) <= STRAIGHT * g[i]
+            ends_there = (
+                g_new[i] <= 0.0 and abs(middle[i] - 0.5 * (g[i] + g_new[i])) <= STRAIGHT * g[i]
+            )
             if not (least > MARGIN * moved or ends_there):
                 return False
             if r.pace[i] < rec.UNKNOWN_PACE and moved < MOVED * h * r.pace[i]:
@@ -168,25 +184,42 @@ def search_interval(handle, run, r, h, i, j, f_new, now, new):
     Event function i is taken as convex: lines through neighbouring values give the lower bound of its minimum, where
     the next value is computed, until a bound is above zero.
     """
-    inner, a, b = r.inner, 0.25 * j, 0.25 * (j + 1)
+    inner = r.inner
+    a = 0.25 * j
+    b = 0.25 * (j + 1)
     at_a, at_b = inner[j, i], inner[j + 1, i]
     own = 4.0 * (at_b - at_a)
     # at the ends of the step, slopes of a parabola with twice the bend
     fall = 4.0 * (at_a - inner[j - 1, i]) if j > 0 else 2.0 * own - 4.0 * (inner[2, i] - at_b)
-    rise = 4.0 * (inner[j + 2, i] - at_b) if j < END - 1 else 2.0 * own - 4.0 * (at_a - inner[END - 2, i])
+    rise = (
+        4.0 * (inner[j + 2, i] - at_b)
+        if j < END - 1
+        else 2.0 * own - 4.0 * (at_a - inner[END - 2, i])
+    )
     for _ in range(MOST_TURNS):
         x, bound = lower_bound(a, at_a, fall, b, at_b, rise)
-        if bound > 0.0 or not a < x < b or not events_at(handle, run, r, h, x, f_new, now, new, inner[OTHER]):
+        if (
+            bound > 0.0
+            or not a < x < b
+            or not events_at(handle, run, r, h, x, f_new, now, new, inner[OTHER])
+        ):
             return NOWHERE
         if reaches_zero(r.g, inner[OTHER]):
             return x
         value = inner[OTHER, i]
         before, after = (value - at_a) / (x - a), (at_b - value) / (b - x)
         # Continue in the part that may contain the lower value.
-        if lower_bound(a, at_a, fall, x, value, after)[1] < lower_bound(x, value, before, b, at_b, rise)[1]:
-            b, at_b, rise = x, value, after
+        if (
+            lower_bound(a, at_a, fall, x, value, after)[1]
+            < lower_bound(x, value, before, b, at_b, rise)[1]
+        ):
+            b = x
+            at_b = value
+            rise = after
         else:
-            a, at_a, fall = x, value, before
+            a = x
+            at_a = value
+            fall = before
     return NOWHERE
 
 
@@ -198,7 +231,9 @@ def zero_within(handle, run, r, h, t_new, now, new):
     Returns its fraction of the step, or NOWHERE, and True if shorter steps were taken, which have changed `k`. The data
     that event functions write belong to another time afterwards.
     """
-    g, inner, far = r.g, r.inner, reach(r)
+    g = r.g
+    inner = r.inner
+    far = reach(r)
     if needs_end_rates(r):
         run_handle.evaluate(handle, r, t_new, r.y[new], r.y[3])
     f_new = r.y[3] if needs_end_rates(r) else r.k[r.k.shape[0] - 1]

@@ -11,7 +11,8 @@ from fvsolve.core.steppers.step_operations import error_scale
 from fvsolve.jit import njit
 
 WINDOW = 20  # steps after which both sums are compared
-PRODUCTS = 10.0  # difference of both sums, in the greatest products of the window, above which steps return
+# difference of both sums, in the greatest products of the window, above which steps return
+PRODUCTS = 10.0
 TOLERANCES = 10.0  # the same in tolerances of the state: smaller differences are rounding
 SUM, GREATEST = 0, 1  # rows of the array `returns`
 
@@ -22,8 +23,13 @@ def has_returned(r, h, now, new):
 
     r : open handle of the run; h : length of the step; now, new : rows of y at its start and end
     """
-    returns, state, size = r.returns, r.state[0], r.control[0]["size"]
-    k, y, y_new, scale = r.k, r.y[now], r.y[new], r.scale
+    returns = r.returns
+    state = r.state[0]
+    size = r.control[0]["size"]
+    k = r.k
+    y = r.y[now]
+    y_new = r.y[new]
+    scale = r.scale
     for e in range(scale.size):
         product = h * k[0, e]
         returns[SUM, e] += product - (y_new[e] - y[e])

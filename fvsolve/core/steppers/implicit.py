@@ -93,7 +93,11 @@ declare_each(
         | 3/4   1/4
     """,
     },
-    also={"implicit-euler": "radau-iia-1", "implicit-midpoint": "gauss-2", "trapezoid": "lobatto-iiia-2"},
+    also={
+        "implicit-euler": "radau-iia-1",
+        "implicit-midpoint": "gauss-2",
+        "trapezoid": "lobatto-iiia-2",
+    },
 )
 
 # The weight of f(t, y) in the embedded solution is the real eigenvalue of A, (6 + 81^(1/3) - 9^(1/3)) / 30.
@@ -303,7 +307,8 @@ class Rosenbrock(Method):
         s = len(a)
         # Gamma^-1 = diag(1 / gamma) - C
         inverse = [
-            [(1 / Fraction(self.gamma) if i == j else Fraction(0)) - c[i][j] for j in range(s)] for i in range(s)
+            [(1 / Fraction(self.gamma) if i == j else Fraction(0)) - c[i][j] for j in range(s)]
+            for i in range(s)
         ]
         gamma = _inverse(inverse)
         # The new state is y+ = y_s + u_s, the embedded solution is y_s.
@@ -317,8 +322,13 @@ class Rosenbrock(Method):
     def exact(self) -> Array:
         """Butcher array, A = alpha + Gamma, of the diagonally implicit method that is equal on y' = lambda y."""
         alpha, gamma, b, embedded = self.forms
-        beta = tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(alpha, gamma, strict=True))
-        return Array(beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ())
+        beta = tuple(
+            tuple(x + y for x, y in zip(*rows, strict=True))
+            for rows in zip(alpha, gamma, strict=True)
+        )
+        return Array(
+            beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ()
+        )
 
     @functools.cached_property
     def _conditions(self) -> Conditions:
@@ -395,7 +405,11 @@ def declare_rosenbrock(name: str, text: str, source: str, gamma: str) -> None:
     METHODS[name] = Rosenbrock(name, source, text, given_digits=DIGITS, gamma=gamma)
 
 
-declare_rosenbrock("rodas-4", gamma="0.25", source="Hairer and Wanner 1996, IV.7; RODAS", text="""
+declare_rosenbrock(
+    "rodas-4",
+    gamma="0.25",
+    source="Hairer and Wanner 1996, IV.7; RODAS",
+    text="""
     0     0.25    |
     0.386 -0.1043 | 1.544
     0.21  0.1035  | 0.9466785280815826 0.2557011698983284
@@ -412,9 +426,14 @@ declare_rosenbrock("rodas-4", gamma="0.25", source="Hairer and Wanner 1996, IV.7
     --------------+---------------------------------------------------------------------------------
                   | 10.12623508344586 -7.487995877610167 -34.80091861555747 -7.992771707568823 1.025137723295662
                   | -0.6762803392801253 6.087714651680015 16.43084320892478 24.76722511418386 -6.594389125716872
-""")  # fmt: skip
+""",
+)
 
-declare_rosenbrock("rodas-5p", gamma="0.21193756319429014", source="Steinebach 2023, BIT 63, 27", text="""
+declare_rosenbrock(
+    "rodas-5p",
+    gamma="0.21193756319429014",
+    source="Steinebach 2023, BIT 63, 27",
+    text="""
     0                  0.21193756319429014  |
     0.6358126895828704 -0.42387512638858027 | 3
     0.4095798393397535 -0.3384627126235924  | 2.849394379747939 0.45842242204463923
@@ -436,4 +455,5 @@ declare_rosenbrock("rodas-5p", gamma="0.21193756319429014", source="Steinebach 2
         | 25.948786856663858 -2.5579724845846235 10.433815404888879 -2.3679251022685204 0.524948541321073 1.1241088310450404 0.4272876194431874 -0.17202221070155493
         | -9.91568850695171 -0.9689944594115154 3.0438037242978453 -24.495224566215796 20.176138334709044 15.98066361424651 -6.789040303419874 -6.710236069923372
         | 11.419903575922262 2.8879645146136994 72.92137995996029 80.12511834622643 -52.072871366152654 -59.78993625266729 -0.15582684282751913 4.883087185713722
-""")  # fmt: skip
+""",
+)

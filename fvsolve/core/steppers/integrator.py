@@ -43,9 +43,14 @@ class Integrator:
     """
 
     def __init__(
-        self, method: Method, n: int, ledgers: int, jacobian_structure: Callable[[], Structure], scale: np.ndarray,
+        self,
+        method: Method,
+        n: int,
+        ledgers: int,
+        jacobian_structure: Callable[[], Structure],
+        scale: np.ndarray,
         damped=False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.jacobian_structure, self.scale, self.damped = jacobian_structure, scale, damped
         self.run_steps, self.linked, self.run = compiled(), None, None
         self.state, self.control, self.progress, self.newton = (
@@ -53,11 +58,19 @@ class Integrator:
         )
         # Row 0 of y is the present state, row 1 the last one; the third row receives the new state.
         self.progress["old"] = 1
-        self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(LEDGER_ROWS * ledgers)
+        self.y, self.f_old, self.ledger = (
+            np.zeros((4, n)),
+            np.zeros(n),
+            np.zeros(LEDGER_ROWS * ledgers),
+        )
         self.no_floats, self.no_integers = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.no_integers, np.zeros(0), self.no_floats
         self.largest = self.no_floats  # largest allowed states, where growth is checked
-        self.out, self.out_row, self.values = np.zeros(rec.OUT_HEAD), np.zeros(rec.OUT_HEAD), np.zeros(0)
+        self.out, self.out_row, self.values = (
+            np.zeros(rec.OUT_HEAD),
+            np.zeros(rec.OUT_HEAD),
+            np.zeros(0),
+        )
         self.out[rec.JUMP_TIME] = rec.NO_JUMP
         self.armed = self.no_floats
         self.prepare_events(0)
@@ -65,12 +78,18 @@ class Integrator:
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.bounded_states, self.bounds = self.no_integers, np.zeros((0, 4))
         self.watcher, self.watch = no_watch(), self.no_integers
-        self.join, self.row_blocks, self.sums = no_exchange(), np.array([[0, n, 0, 1, n]]), np.zeros(1)
+        self.join, self.row_blocks, self.sums = (
+            no_exchange(),
+            np.array([[0, n, 0, 1, n]]),
+            np.zeros(1),
+        )
         self.use(method)
 
     def use(self, method: Method) -> None:
         """Use `method` for the following steps: allocate its arrays and select its compiled functions."""
-        n, ledgers, control = self.scale.size, self.ledger.size // LEDGER_ROWS, self.control[0]
+        n = self.scale.size
+        ledgers = self.ledger.size // LEDGER_ROWS
+        control = self.control[0]
         self.method = method
         self.coefficients, self.dense, s = coefficients(method, self.damped)
         self.algebra, self.calls, self.spare = no_algebra(), self.no_integers, self.no_integers
@@ -91,13 +110,21 @@ class Integrator:
         control["fsal"] = method.explicit and method.first_same_as_last
         control["kind"] = KINDS[method.kind][1]
         # A last stage at the end of the step gives the slope there without a new call of f.
-        ends_at_stage = np.array_equal(self.coefficients[s * (s - 1) : s * s], self.coefficients[s * s : s * s + s])
-        control["stage_slope"] = control["kind"] == rec.NEWTON_SOLVED and not self.dense.size and ends_at_stage
+        ends_at_stage = np.array_equal(
+            self.coefficients[s * (s - 1) : s * s], self.coefficients[s * s : s * s + s]
+        )
+        control["stage_slope"] = (
+            control["kind"] == rec.NEWTON_SOLVED and not self.dense.size and ends_at_stage
+        )
         self.restart_segment()
 
     def prepare_events(self, count: int) -> None:
         """Allocate the arrays of `count` event functions."""
-        self.g, self.g_new, self.inner = np.zeros(count), np.zeros(count), np.zeros((INNER_ROWS, count))
+        self.g, self.g_new, self.inner = (
+            np.zeros(count),
+            np.zeros(count),
+            np.zeros((INNER_ROWS, count)),
+        )
         self.pace = np.full(count, rec.UNKNOWN_PACE)
 
     def restart_segment(self) -> None:
@@ -116,7 +143,11 @@ class Integrator:
         reals, pairs : numbers of stored factors for real and complex shifts
         """
         ledgers, size = self.ledger_rates.shape[1], int(self.newton["factor_size"][0])
-        self.product, self.buffer, self.ledger_slopes = np.zeros(n + ledgers), np.zeros(q * q), np.zeros(ledgers)
+        self.product, self.buffer, self.ledger_slopes = (
+            np.zeros(n + ledgers),
+            np.zeros(q * q),
+            np.zeros(ledgers),
+        )
         for name in IMPLICIT_VECTORS:
             setattr(self, name, np.zeros(n))
         self.last_stages, self.transformed = np.zeros((len(self.k), n)), np.zeros((3 * q, n))
@@ -132,11 +163,15 @@ class Integrator:
             from fvsolve.core.steppers.irk import pairs_of
 
             q, pairs = len(self.k) - 1, pairs_of(self.method)
-        reals = max(q - 2 * pairs, 1)  # stages that are solved one by one need a real factor, whatever the method
+        # stages that are solved one by one need a real factor, whatever the method
+        reals = max(q - 2 * pairs, 1)
         self.newton["factor_size"], self.structure = structure.store_size, structure.shape
         self.allocate_newton(structure.n, q, reals, pairs)
         self.jacobian = np.zeros(structure.nnz)
-        self.algebra = *structure.functions(), *(structure.functions(complex=True) if pairs else no_algebra()[2:])
+        self.algebra = (
+            *structure.functions(),
+            *(structure.functions(complex=True) if pairs else no_algebra()[2:]),
+        )
         newton.reset(self.newton[0])
 
     @property
@@ -160,7 +195,11 @@ class Integrator:
             return rec.ALWAYS_SEPARATE
         if method.explicit:
             return rec.NEVER_SEPARATE
-        solved = method.kind == "linear" or method.stiffly_accurate and not (self.dense.size and method.c[0] == 0.0)
+        solved = (
+            method.kind == "linear"
+            or method.stiffly_accurate
+            and not (self.dense.size and method.c[0] == 0.0)
+        )
         return rec.SEPARATE_AT_START if solved else rec.ALWAYS_SEPARATE
 
     @property
@@ -171,7 +210,11 @@ class Integrator:
         exists, with which `row_substeps.defect` estimates its error.
         """
         method, implicit = self.method, not self.method.explicit
-        if self.dense_order + 1 < method.order or implicit and self.separate_rows == rec.ALWAYS_SEPARATE:
+        if (
+            self.dense_order + 1 < method.order
+            or implicit
+            and self.separate_rows == rec.ALWAYS_SEPARATE
+        ):
             return True
         if method.kind != "full":
             return False
@@ -182,7 +225,9 @@ class Integrator:
     def discard_history(self) -> None:
         """Discard the step size, the last error, the stiffness count and the Jacobian, for a start after a kink."""
         kept = ("step",) if self.control["keeps_step"][0] else ()
-        for name in {"step", "error_old", "switch_count", "split_remainder", "window"}.difference(kept):
+        for name in {"step", "error_old", "switch_count", "split_remainder", "window"}.difference(
+            kept
+        ):
             self.state[name] = 0.0
         self.returns[:] = 0.0
         if self.control["kind"] != rec.EXPLICIT:
@@ -226,21 +271,35 @@ class Integrator:
         """Make the handle `spare`, with other arrays of a step, if rows may need separate steps or substeps."""
         control = self.control[0]
         adaptive = control["mode"] == rec.TOLERANCE
-        if control["separate_rows"] == rec.NEVER_SEPARATE and (control["kind"] == rec.EXPLICIT or not adaptive):
+        if control["separate_rows"] == rec.NEVER_SEPARATE and (
+            control["kind"] == rec.EXPLICIT or not adaptive
+        ):
             return
         # A spare step writes to its own arrays, so that it leaves no trace in those of the run.
-        own = ("newton", "k", "ledger_rates", "jacobian", "product", "buffer", "ledger_slopes", "factors")
+        own = (
+            "newton",
+            "k",
+            "ledger_rates",
+            "jacobian",
+            "product",
+            "buffer",
+            "ledger_slopes",
+            "factors",
+        )
         own += ("complex_factors", "last_stages", "transformed", *IMPLICIT_VECTORS)
         if adaptive:
             if control["end_at_rows"] and not control["dense_steps"]:
                 return
             own += () if control["end_at_rows"] else ("state", "progress", "y", "f_old")
         arrays = {name: getattr(self, name) for name in own}
-        empty = {name: np.zeros(array.shape, array.dtype) for name, array in arrays.items()}  # no memory before use
+        # no memory before use
+        empty = {name: np.zeros(array.shape, array.dtype) for name, array in arrays.items()}
         self.spare_arrays = RunArrays(*all_arrays(self))._replace(**empty, out=self.out_row)
         self.spare = boxed_run(self.spare_arrays)
 
-    def single_step(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
+    def single_step(
+        self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray
+    ) -> np.ndarray:
         """State after a single step of length h from state y at time t; NaN if its stages cannot be solved.
 
         Only an object whose time loop (`call`) has not run may be used: then the step depends on earlier single steps
@@ -251,14 +310,26 @@ class Integrator:
         self.state["steps"] += 1.0
         self.control["ledger_offset"] = ledger_offset
         if not self.calls.size:  # a single step calls no observers
-            self.calls = addresses((self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join, self.watcher))
+            self.calls = addresses(
+                (self.attempt, rhs, rhs, rhs, rhs, rhs, *self.algebra, self.join, self.watcher)
+            )
         # The first stage is the rate at the start, which otherwise the time loop provides.
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.ledger_rates[0] = self.out[ledger_offset : ledger_offset + self.ledger_rates.shape[1]]
         error = self.attempt(handle, self.handle(False), t, h, 0, 1)
         return self.y[1].copy() if error != rec.NEWTON_FAILED else np.full(y.size, np.nan)
 
-    def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
+    def call(
+        self,
+        fused_step,
+        observe,
+        record,
+        events,
+        rhs,
+        handle,
+        ledger_offset: int,
+        armed: np.ndarray,
+    ) -> int:
         """Continue the time loop; returns a code of `loop_records`, from DONE to SWITCHED.
 
         fused_step : complete step (t, h, y, y_new, out, handle, values) of a one-stage method that ends at t, with
@@ -270,7 +341,17 @@ class Integrator:
         ledger_offset : index of the first ledger rate in `out`
         """
         calls = addresses(
-            (self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join, self.watcher)
+            (
+                self.attempt,
+                fused_step,
+                observe,
+                record,
+                events,
+                rhs,
+                *self.algebra,
+                self.join,
+                self.watcher,
+            )
         )
         # In place, because the handle contains the address of this array.
         self.calls = self.calls if self.calls.size else calls

@@ -40,12 +40,17 @@ def base_of_stage(r, low, h, i, y):
 
     low : as in `sweep`; y : state at the start of the step
     """
-    s, k, base, row = r.k.shape[0], r.k, r.base, row_of(r.coefficients, r.k.shape[0], i)
+    s = r.k.shape[0]
+    k = r.k
+    base = r.base
+    row = row_of(r.coefficients, r.k.shape[0], i)
     first = (i - 1) * (s - 1)
     for e in range(y.size):
         base[e] = y[e] + h * row[0] * k[0, e]
     for j in range(1, s):
-        c_ij, slope, last = low[first + j - 1], k[j], r.transformed[j - 1]
+        c_ij = low[first + j - 1]
+        slope = k[j]
+        last = r.transformed[j - 1]
         lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
         for e in range(y.size):
             base[e] += lead * slope[e] + lag * last[e]
@@ -57,19 +62,28 @@ def sweep_once(handle, r, low, t, h, now, turn):
 
     turn : number of the sweep, from 0; other arguments as for `sweep`
     """
-    k, y, base, weights, c = r.k, r.y[now], r.base, r.weights, nodes_of(r.coefficients, r.k.shape[0])
+    k = r.k
+    y = r.y[now]
+    base = r.base
+    weights = r.weights
+    c = nodes_of(r.coefficients, r.k.shape[0])
     s, total = k.shape[0], 0.0
     # All slopes of the last sweep are stored first, because stages read those of later stages.
     for i in range(1, s):
         copy(k[i], r.transformed[i - 1])
     for i in range(1, s):
-        own, ki, last = h * low[(i - 1) * s], k[i], r.transformed[i - 1]
+        own = h * low[(i - 1) * s]
+        ki = k[i]
+        last = r.transformed[i - 1]
         base_of_stage(r, low, h, i, y)
         if turn == 0:
             # The first sweep starts from the state at the start of the step.
             for e in range(y.size):
                 ki[e] = (y[e] - base[e]) / own
-        if iterations.solve_stage_from_start(handle, r, t + c[i] * h, own, i, y) == iterations.FAILED:
+        if (
+            iterations.solve_stage_from_start(handle, r, t + c[i] * h, own, i, y)
+            == iterations.FAILED
+        ):
             return -1.0
         for e in range(y.size):
             change = h * (ki[e] - last[e]) * weights[e]
@@ -85,7 +99,9 @@ def sweep(handle, r, low, t, h, now):
     The rows of `transformed` receive the slopes before a sweep, their changes, and the slopes after it.
     handle, r : handle of the model, open handle of the run; t, h, now : as for `irk.attempt`
     """
-    k, s, n = r.k, r.k.shape[0], r.k.shape[1]
+    k = r.k
+    s = r.k.shape[0]
+    n = r.k.shape[1]
     q = s - 1
     enough, rounded, floor = iterations.damped_limits(r.control[0])
     settled = floor if r.control[0]["mode"] == rec.TOLERANCE else rounded
@@ -117,19 +133,32 @@ def extrapolate(r, weight):
     d, d_before : changes in this and in the last sweep; K_last : result of the last sweep before its extrapolation
     weight : 1 to extrapolate, 0 to store only
     """
-    k, rows, weights, dot, square = r.k, r.transformed, r.weights, 0.0, 0.0
+    k = r.k
+    rows = r.transformed
+    weights = r.weights
+    dot = 0.0
+    square = 0.0
     q = k.shape[0] - 1
     for i in range(q):
-        ki, last, change = k[i + 1], rows[i], rows[q + i]
+        ki = k[i + 1]
+        last = rows[i]
+        change = rows[q + i]
         for e in range(weights.size):
             d = (ki[e] - last[e]) * weights[e]
             difference = d - change[e] * weights[e]
             dot += d * difference
             square += difference * difference
     # A difference of zero, or values that are not finite, leave the slopes as they are.
-    g = weight * max(dot / square, -GREATEST_EXTRAPOLATION) if square > 0.0 and square < np.inf else 0.0
+    g = (
+        weight * max(dot / square, -GREATEST_EXTRAPOLATION)
+        if square > 0.0 and square < np.inf
+        else 0.0
+    )
     for i in range(q):
-        ki, last, change, swept = k[i + 1], rows[i], rows[q + i], rows[2 * q + i]
+        ki = k[i + 1]
+        last = rows[i]
+        change = rows[q + i]
+        swept = rows[2 * q + i]
         for e in range(weights.size):
             new = ki[e]
             change[e] = new - last[e]
@@ -141,7 +170,8 @@ def extrapolate(r, weight):
 T, T_INVERSE, BLOCKS, SLOPES, EXTRAPOLATION, CROUT, START = range(7)
 # Rows of the array `transformed`, q rows each: W, F, and the residuals, replaced by the solution dW.
 W, F, R = range(3)
-DEFECT_POINTS = (-0.1, -1e-2, -1e-3, -1e-4)  # points before a kink, in steps from it, where the defect is checked
+# points before a kink, in steps from it, where the defect is checked
+DEFECT_POINTS = (-0.1, -1e-2, -1e-3, -1e-4)
 # Weight of that defect in the error: Newton residual and method error contribute less than a hundred tolerances.
 DEFECT_WEIGHT = 1e-2
 
@@ -172,8 +202,12 @@ def blend(base_weight, base, m, at, q, first, rows, target):
     n = target.size
     for j in range(0, q, 3):
         # A missing row is replaced by the last one with weight 0: each pass adds three terms.
-        v0, v1, v2 = rows[first + j], rows[first + min(j + 1, q - 1)], rows[first + min(j + 2, q - 1)]
-        c0, c1, c2 = m[at + j], m[at + j + 1] if j + 1 < q else 0.0, m[at + j + 2] if j + 2 < q else 0.0
+        v0 = rows[first + j]
+        v1 = rows[first + min(j + 1, q - 1)]
+        v2 = rows[first + min(j + 2, q - 1)]
+        c0 = m[at + j]
+        c1 = m[at + j + 1] if j + 1 < q else 0.0
+        c2 = m[at + j + 2] if j + 2 < q else 0.0
         if j > 0:
             for e in range(n):
                 target[e] += c0 * v0[e] + (c1 * v1[e] + c2 * v2[e])
@@ -194,7 +228,9 @@ def predict(r, h):
 
     Z : increments of the implicit stages over the start of the step; T : see `coefficients.transformed`
     """
-    s, h_last, buffer = r.k.shape[0], r.state[0]["last"], r.buffer
+    s = r.k.shape[0]
+    h_last = r.state[0]["last"]
+    buffer = r.buffer
     q, c = s - 1, nodes_of(r.coefficients, s)
     back, ahead = matrix(r.coefficients, s, T_INVERSE), matrix(r.coefficients, s, EXTRAPOLATION)
     for e in range(q * q):
@@ -219,7 +255,11 @@ def factor_blocks(r, h):
     L : block diagonal matrix of `coefficients.transformed`; J : Jacobian
     Returns the number of factors, or 0 if a block has no good pivot.
     """
-    q, b, real, pair, count = r.k.shape[0] - 1, 0, 0, r.scale.size, 0
+    q = r.k.shape[0] - 1
+    b = 0
+    real = 0
+    pair = r.scale.size
+    count = 0
     blocks, size = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"])
     while b < q:
         shift = blocks[b * q + b] / h
@@ -227,12 +267,20 @@ def factor_blocks(r, h):
         if is_pair(blocks, q, b):
             pair_shift = complex(shift, blocks[(b + 1) * q + b] / h)
             pair_factors, address = r.complex_factors[pair:], r.calls[run_handle.PAIR_FACTOR]
-            if run_handle.call_factor_complex(address, r.structure, r.jacobian, pair_shift, pair_factors) != 0:
+            if (
+                run_handle.call_factor_complex(
+                    address, r.structure, r.jacobian, pair_shift, pair_factors
+                )
+                != 0
+            ):
                 return 0
             b, pair = b + 2, pair + size
         else:
             address = r.calls[run_handle.REAL_FACTOR]
-            if run_handle.call_factor(address, r.structure, r.jacobian, shift, r.factors[real:]) != 0:
+            if (
+                run_handle.call_factor(address, r.structure, r.jacobian, shift, r.factors[real:])
+                != 0
+            ):
                 return 0
             b, real = b + 1, real + size
         count += 1
@@ -245,8 +293,14 @@ def solve_blocks(r):
 
     L : block diagonal matrix of `coefficients.transformed`; J : Jacobian; x : Kronecker product
     """
-    q, n, b, real, pair = r.k.shape[0] - 1, r.scale.size, 0, 0, r.scale.size
-    blocks, size, both = matrix(r.coefficients, q + 1, BLOCKS), int(r.newton[0]["factor_size"]), r.complex_factors[:n]
+    q = r.k.shape[0] - 1
+    n = r.scale.size
+    b = 0
+    real = 0
+    pair = r.scale.size
+    blocks = matrix(r.coefficients, q + 1, BLOCKS)
+    size = int(r.newton[0]["factor_size"])
+    both = r.complex_factors[:n]
     while b < q:
         u = r.transformed[R * q + b]
         if is_pair(blocks, q, b):
@@ -270,7 +324,11 @@ def evaluate_stages(handle, r, t, h, now):
 
     `out` receives the status of the last stage whose rates are not valid.
     """
-    q, y_stage, rows, status, where = r.k.shape[0] - 1, r.y[3], r.transformed, 0.0, -1.0
+    q = r.k.shape[0] - 1
+    y_stage = r.y[3]
+    rows = r.transformed
+    status = 0.0
+    where = -1.0
     c, t_matrix = nodes_of(r.coefficients, q + 1), matrix(r.coefficients, q + 1, T)
     for i in range(q):
         blend(1.0, r.y[now], t_matrix, i * q, q, W * q, rows, y_stage)
@@ -287,7 +345,9 @@ def evaluate_stages(handle, r, t, h, now):
 @inline
 def residuals(r, h):
     """Write the residuals R = T^-1 (F - K) of all implicit stages to `transformed`."""
-    rows, q, n = r.transformed, r.k.shape[0] - 1, r.scale.size
+    rows = r.transformed
+    q = r.k.shape[0] - 1
+    n = r.scale.size
     back, blocks = matrix(r.coefficients, q + 1, T_INVERSE), matrix(r.coefficients, q + 1, BLOCKS)
     start = matrix(r.coefficients, q + 1, START)
     # R = T^-1 F + T^-1 A^-1 a_0 k_0 - L W / h, row by row; a row of a pair has two terms of L.
@@ -299,7 +359,9 @@ def residuals(r, h):
         elif i > 0 and blocks[i * q + i - 1] != 0.0:
             j = i - 1
         own, other = -blocks[i * q + i] / h, -blocks[i * q + j] / h if j != i else 0.0
-        residual, wi, wj = rows[R * q + i], rows[W * q + i], rows[W * q + j]
+        residual = rows[R * q + i]
+        wi = rows[W * q + i]
+        wj = rows[W * q + j]
         for e in range(n):
             residual[e] += own * wi[e] + other * wj[e]
 
@@ -307,7 +369,10 @@ def residuals(r, h):
 @inline
 def add_increments(r):
     """Add the increments dW to W; returns the norm of dW in units of the tolerance."""
-    rows, weights, q, total = r.transformed, r.weights, r.k.shape[0] - 1, 0.0
+    rows = r.transformed
+    weights = r.weights
+    q = r.k.shape[0] - 1
+    total = 0.0
     for e in range(weights.size):
         per, part = weights[e], 0.0
         for i in range(q):
@@ -325,7 +390,11 @@ def iterate(handle, r, t, h, now):
     W is stored in `transformed`, in place of its prediction.
     Z : increments of the implicit stages over the start of the step; T : see `coefficients.transformed`
     """
-    rows, f, q, before, status = r.transformed, r.rate, r.k.shape[0] - 1, 0.0, iterations.FAILED
+    rows = r.transformed
+    f = r.rate
+    q = r.k.shape[0] - 1
+    before = 0.0
+    status = iterations.FAILED
     for turn in range(iterations.MOST):
         evaluate_stages(handle, r, t, h, now)
         residuals(r, h)
@@ -351,7 +420,9 @@ def try_stages(handle, r, t, h, now):
 
     Arguments as for `attempt`.
     """
-    newton, state, q = r.newton[0], r.state[0], r.k.shape[0] - 1
+    newton = r.newton[0]
+    state = r.state[0]
+    q = r.k.shape[0] - 1
     if newton["shift"] != 1.0 / h:
         # A restored shift is negative: its factors were counted before the restart.
         known = newton["shift"] == -1.0 / h
@@ -378,8 +449,14 @@ def finish(r, h):
 
     W : transformed increments of `iterate`
     """
-    k, d, buffer, rows, s = r.k, r.increment, r.buffer, r.transformed, r.k.shape[0]
-    q, slopes, start = s - 1, matrix(r.coefficients, s, SLOPES), matrix(r.coefficients, s, START)
+    k = r.k
+    d = r.increment
+    buffer = r.buffer
+    rows = r.transformed
+    s = r.k.shape[0]
+    q = s - 1
+    slopes = matrix(r.coefficients, s, SLOPES)
+    start = matrix(r.coefficients, s, START)
     # K = T L W / h - A^-1 a_0 k_0
     for e in range(q * q):
         buffer[e] = slopes[e] / h
@@ -400,8 +477,16 @@ def filtered_error(handle, r, t, now, new, retry):
     f(t, y + e)
     Other arguments as for `attempt`.
     """
-    k, d, f, y, y_new, stage, scale = r.k, r.increment, r.rate, r.y[now], r.y[new], r.y[3], r.scale
-    error, s, size = error_of(r.coefficients, r.k.shape[0]), r.k.shape[0], r.control[0]["size"]
+    k = r.k
+    d = r.increment
+    f = r.rate
+    y = r.y[now]
+    y_new = r.y[new]
+    stage = r.y[3]
+    scale = r.scale
+    error = error_of(r.coefficients, r.k.shape[0])
+    s = r.k.shape[0]
+    size = r.control[0]["size"]
     shift, norm = matrix(r.coefficients, s, BLOCKS)[0], 0.0
     for turn in range(2):
         for e in range(y.size):
@@ -426,9 +511,18 @@ def filtered_error(handle, r, t, now, new, retry):
 @inline
 def defect_at(handle, r, t, h, new, x):
     """Defect of the collocation polynomial at the time x h after the end of the step, as in `defect_before_end`."""
-    k, buffer, d, f, scale, y, stage = r.k, r.buffer, r.increment, r.rate, r.scale, r.y[new], r.y[3]
-    q, size, total = r.k.shape[0] - 1, r.control[0]["size"], 0.0
-    ahead, step = matrix(r.coefficients, q + 1, EXTRAPOLATION), h / matrix(r.coefficients, q + 1, BLOCKS)[0]
+    k = r.k
+    buffer = r.buffer
+    d = r.increment
+    f = r.rate
+    scale = r.scale
+    y = r.y[new]
+    stage = r.y[3]
+    q = r.k.shape[0] - 1
+    size = r.control[0]["size"]
+    total = 0.0
+    ahead = matrix(r.coefficients, q + 1, EXTRAPOLATION)
+    step = h / matrix(r.coefficients, q + 1, BLOCKS)[0]
     for j in range(q):
         buffer[j], buffer[q + j] = 0.0, 0.0
         for m in range(q - 1, -1, -1):
@@ -494,7 +588,10 @@ def attempt(handle, run, t, h, now, new):
     sweeps of `irk` fail. Arguments as for `erk.attempt`.
     """
     r = open_run(run)
-    y, state, newton, s = r.y[now], r.state[0], r.newton[0], r.k.shape[0]
+    y = r.y[now]
+    state = r.state[0]
+    newton = r.newton[0]
+    s = r.k.shape[0]
     # a repeated step, or the first after a kink
     retry = newton["stages_step"] == state["steps"] or newton["stages_step"] < 0.0
     iterations.begin(r, now)

@@ -15,7 +15,8 @@ NOISE = 1e-12
 # Likewise below this fraction of the sum of the larger side, where the rates at both ends have the same sign: a
 # negative weight or the Newton residual causes it.
 WRONG_SIGN = 1e-6
-NEAR = 1e-5  # tolerance of the time of zero rate, in steps; the error of the amount goes with its square
+# tolerance of the time of zero rate, in steps; the error of the amount goes with its square
+NEAR = 1e-5
 TURNS = 40
 # Fraction of the step's tolerance, relative to all amounts so far: then the sum over all steps is within tolerance.
 SHARE = 0.03
@@ -92,7 +93,9 @@ def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
     stored : int64[q]  numbers of the states that are stored masses; ledger : sums of all amounts so far
     """
     s, count = ledger_rates.shape
-    worst, reference, covered = 0.0, LEAST, 0.0
+    worst = 0.0
+    reference = LEAST
+    covered = 0.0
     for i in stored:
         covered += abs(combined(error, k, i))
     for m in range(count):
@@ -120,8 +123,9 @@ def add(ledger, m, at, part):
     ledger : array of the sums, see the top of this file
     """
     count = ledger.size // LEDGER_ROWS
-    ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(ledger[at * count + m], part,
-                                                                  ledger[(2 + at) * count + m])  # fmt: skip
+    ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(
+        ledger[at * count + m], part, ledger[(2 + at) * count + m]
+    )
 
 
 @njit
@@ -136,8 +140,13 @@ def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
     s, count = ledger_rates.shape
     for m in range(count):
         total = combined(b, ledger_rates, m)
-        r0, r1, part, gross = ledger_rates[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
-        side, threshold, direction = 0 if total > 0.0 else 1, NOISE * gross, r0 + r1
+        r0 = ledger_rates[0, m]
+        r1 = end[m]
+        part = 0.0
+        gross = ledger[m] - ledger[count + m]
+        side = 0 if total > 0.0 else 1
+        threshold = NOISE * gross
+        direction = r0 + r1
         # Without a rate at either end, the sign of all amounts so far decides.
         if direction == 0.0:
             direction = ledger[m] + ledger[count + m]

@@ -7,7 +7,15 @@ bandwidth of U follow.
 
 import numpy as np
 
-from fvsolve.core.steppers.structure import LEAST_PIVOT, SIZE, SOLVER_DATA, STARTS, bad_row, reciprocal, size_of
+from fvsolve.core.steppers.structure import (
+    LEAST_PIVOT,
+    SIZE,
+    SOLVER_DATA,
+    STARTS,
+    bad_row,
+    reciprocal,
+    size_of,
+)
 from fvsolve.jit import njit
 
 # Data of this solver in the structure: bandwidths and row length, then the state of each reordered row, then the place
@@ -78,7 +86,10 @@ def factor(structure, jacobian, shift, factors):
     factors : receives L, U and the row exchanges
     """
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
-    below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
+    below = own[BELOW]
+    above = own[ABOVE]
+    width = own[WIDTH]
+    order = own[ORDER:]
     place, lower = order[n:], factors[n * width :]
     pivots = lower[n * below :]
     bad = bad_row(structure, jacobian)
@@ -126,7 +137,9 @@ def factor(structure, jacobian, shift, factors):
 def solve(structure, factors, x):
     """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
-    below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
+    below = own[BELOW]
+    width = own[WIDTH]
+    order = own[ORDER:]
     lower = factors[n * width :]
     pivots = lower[n * below :]
     work, reach = pivots[n:], int(pivots[2 * n].real)

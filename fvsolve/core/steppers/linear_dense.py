@@ -24,7 +24,9 @@ def factor(structure, jacobian, shift, factors):
     factors : receives L, U and the row exchanges
     """
     n = structure[SIZE]
-    starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
+    starts = structure[structure[STARTS] :]
+    rows = structure[structure[ROWS] :]
+    pivots = factors[n * n :]
     a = factors[: n * n].reshape((n, n))
     for e in range(n * n):
         factors[e] = 0.0

@@ -15,7 +15,8 @@ from fvsolve.jit import njit
 BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
 PARTS = 9
 LEAST_DETERMINANT = (
-    1e-13  # least determinant of a diagonal block, relative to the sizes of its two products, see `factor`
+    # least determinant of a diagonal block, relative to the sizes of its two products, see `factor`
+    1e-13
 )
 
 
@@ -36,7 +37,16 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     j_starts = np.concatenate(([0], np.cumsum(np.bincount(i, minlength=count))))
     # Place of an entry in the work row, which has four numbers for each block.
     j_places = (4 * j + 2 * (rows % 2) + columns % 2)[by_rows]
-    parts = (members[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, places[by_rows])
+    parts = (
+        members[order].ravel(),
+        l_starts,
+        l_columns,
+        u_starts,
+        u_columns,
+        j_starts,
+        j_places,
+        places[by_rows],
+    )
     offsets = PARTS + np.cumsum([0] + [part.size for part in parts[:-1]])
     own = np.concatenate([np.asarray(part, dtype=np.int64) for part in ([count], offsets, *parts)])
     return own, 4 * (l_columns.size + u_columns.size + 2 * count)
@@ -65,7 +75,9 @@ def pattern_of(rows, columns, count: int):
     """
     from scipy.sparse import coo_array, csc_array
 
-    pattern = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
+    pattern = csc_array(
+        coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count))
+    )
     pattern.sum_duplicates()
     return pattern
 
@@ -82,7 +94,9 @@ def minimum_degree(pattern) -> np.ndarray:
     n = pattern.shape[0]
     ones = csc_array(pattern, dtype=np.float64)
     dominant = csc_array(diags_array(np.full(n, 2.0 * ones.sum(axis=1).max() + 2.0)) - ones)
-    factors = splu(dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0)
+    factors = splu(
+        dominant, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
+    )
     return np.argsort(factors.perm_c).astype(np.int64)
 
 
@@ -96,9 +110,15 @@ def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     # The number of entries that fill in is not known before.
     while True:
         l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
-        l_columns, u_columns = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
+        l_columns = np.empty(capacity, dtype=np.int64)
+        u_columns = np.empty(capacity, dtype=np.int64)
         if eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
-            return l_starts, l_columns[: l_starts[n]].copy(), u_starts, u_columns[: u_starts[n]].copy()
+            return (
+                l_starts,
+                l_columns[: l_starts[n]].copy(),
+                u_starts,
+                u_columns[: u_starts[n]].copy(),
+            )
         capacity *= 2
 
 
@@ -117,7 +137,9 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
         for p in range(starts[i], starts[i + 1]):
             chain[last], last = columns[p], columns[p]
         chain[last] = n
-        at, end, k = l_starts[i], u_starts[i], chain[n]
+        at = l_starts[i]
+        end = u_starts[i]
+        k = chain[n]
         # Columns before the diagonal are entries of L; each brings the entries of its row of U.
         while k < i:
             if at == l_columns.size:
@@ -170,9 +192,12 @@ def factor(structure, jacobian, shift, factors):
     factors : receives L, U and the inverses of the diagonal blocks
     """
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
-    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
-    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
-    starts, places = structure[place(structure, J_STARTS) :], structure[place(structure, J_PLACES) :]
+    l_starts = structure[place(structure, L_STARTS) :]
+    l_columns = structure[place(structure, L_COLUMNS) :]
+    u_starts = structure[place(structure, U_STARTS) :]
+    u_columns = structure[place(structure, U_COLUMNS) :]
+    starts = structure[place(structure, J_STARTS) :]
+    places = structure[place(structure, J_PLACES) :]
     entries = structure[place(structure, J_ENTRIES) :]
     lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, row = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
@@ -192,7 +217,9 @@ def factor(structure, jacobian, shift, factors):
         first = size_of(own[0] * own[3]) + size_of(own[1] * own[2])
         for p in range(l_starts[i], l_starts[i + 1]):
             k = l_columns[p]
-            x, d, share = row[4 * k : 4 * k + 4], inverse[4 * k : 4 * k + 4], lower[4 * p : 4 * p + 4]
+            x = row[4 * k : 4 * k + 4]
+            d = inverse[4 * k : 4 * k + 4]
+            share = lower[4 * p : 4 * p + 4]
             l0, l1 = x[0] * d[0] + x[1] * d[2], x[0] * d[1] + x[1] * d[3]
             l2, l3 = x[2] * d[0] + x[3] * d[2], x[2] * d[1] + x[3] * d[3]
             share[0], share[1], share[2], share[3] = l0, l1, l2, l3
@@ -202,7 +229,10 @@ def factor(structure, jacobian, shift, factors):
                 y0, y1 = y[0] - (l0 * u[0] + l1 * u[2]), y[1] - (l0 * u[1] + l1 * u[3])
                 y2, y3 = y[2] - (l2 * u[0] + l3 * u[2]), y[3] - (l2 * u[1] + l3 * u[3])
                 y[0], y[1], y[2], y[3] = y0, y1, y2, y3
-        a, b, c, d = own[0], own[1], own[2], own[3]
+        a = own[0]
+        b = own[1]
+        c = own[2]
+        d = own[3]
         # The work row must be empty for the next row.
         clear(own)
         diagonal, cross = a * d, b * c
@@ -226,8 +256,10 @@ def factor(structure, jacobian, shift, factors):
 def solve(structure, factors, x):
     """Replace x with (shift I - J)^-1 x, with the factors that `factor` has computed."""
     count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
-    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
-    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
+    l_starts = structure[place(structure, L_STARTS) :]
+    l_columns = structure[place(structure, L_COLUMNS) :]
+    u_starts = structure[place(structure, U_STARTS) :]
+    u_columns = structure[place(structure, U_COLUMNS) :]
     lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
     # L has a unit diagonal: forward substitution without division.
@@ -265,7 +297,9 @@ def pairs(pattern) -> np.ndarray:
     both = csr_array(pattern + pattern.T, dtype=np.float64)
     walks = coo_array(((both @ both) @ both) * both)
     upper = walks.row < walks.col
-    i, j, weight = walks.row[upper], walks.col[upper], walks.data[upper]
+    i = walks.row[upper]
+    j = walks.col[upper]
+    weight = walks.data[upper]
     strongest = np.lexsort((j, i, -weight))
     partner = list(range(n))
     for a, b in zip(i[strongest].tolist(), j[strongest].tolist(), strict=True):

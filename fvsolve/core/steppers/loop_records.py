@@ -25,10 +25,15 @@ STATE = _record(
     "window",
 )
 COUNTS = {
-    "steps": "steps", "rejections": "rejections", "rhs": "calls", "jacobians": "jacobians",
-    "factorisations": "factorisations", "newton": "newton", "newton_failures": "newton_failures",
+    "steps": "steps",
+    "rejections": "rejections",
+    "rhs": "calls",
+    "jacobians": "jacobians",
+    "factorisations": "factorisations",
+    "newton": "newton",
+    "newton_failures": "newton_failures",
     "parted": "split_steps",
-}  # fmt: skip
+}
 # Set before each call. mode : COURANT, FIXED_STEP or TOLERANCE, with the number `size`; kind : EXPLICIT and so on
 # fsal : 1 where the last stage is the first stage of the next step; watch : 1 for the stiffness test
 # stage_slope : 1 where the slope of the last stage is used as that of the end, because a new evaluation of f
@@ -72,9 +77,19 @@ GROWTH_FOUND = -1.0  # in `budget`: a state has grown beyond its largest value, 
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of `kind`
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of `mode`
 # Reasons for which a call returns.
-DONE, BUDGET_SPENT, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK, SWITCHED, CHATTERING = (
-    range(11)
-)
+(
+    DONE,
+    BUDGET_SPENT,
+    ROWS_FULL,
+    FIELD,
+    BAD_VALUE,
+    TINY_STEP,
+    BAD_STATUS,
+    STOPPED,
+    NEWTON_STUCK,
+    SWITCHED,
+    CHATTERING,
+) = range(11)
 REPEAT = -1  # in place of a reason: compute the rates of the present state again
 FRESH, FUSED, EMIT, READY = range(4)  # values of `phase`
 
@@ -87,7 +102,8 @@ LEAST_STEP = 4e-16  # least step, relative to the time
 RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP, NEARBY = 0, 1, 2, 3, 4, 5, 7
 OUT_HEAD = 8
 NO_JUMP = -1e300  # in JUMP_TIME: no jump will arrive
-CORRECTED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
+# in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
+CORRECTED, ARRIVED = 7, 8
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[PLACE]: the record requests the end of the run
 UNKNOWN_DEFECT = 1e300  # in place of a defect: the rates on the dense output are not valid

@@ -29,7 +29,8 @@ STOP_FRACTION = 0.05  # fraction of the tolerance at which Newton stops
 STALE = 0.03  # ratio of successive increments above which the Jacobian is renewed for the next step
 CONVERGED, FAILED = 0, 1
 MOST_DAMPED, LEAST_PART = 40, 1e-4  # greatest number of damped iterations, least damping factor
-LEAST_STAGE_PART = 1 / 64  # least fraction of a step over which `solve_stage_from_start` continues a stage
+# least fraction of a step over which `solve_stage_from_start` continues a stage
+LEAST_STAGE_PART = 1 / 64
 
 
 def reset(newton: np.void) -> None:
@@ -48,12 +49,20 @@ def begin(r, now):
     A Jacobian is slow if the greatest ratio of successive Newton increments in the last step was above STALE.
     r : open handle of the run; now : row of y at the start of the step
     """
-    state, newton, control, k, scale, y = r.state[0], r.newton[0], r.control[0], r.k, r.scale, r.y[now]
+    state = r.state[0]
+    newton = r.newton[0]
+    control = r.control[0]
+    k = r.k
+    scale = r.scale
+    y = r.y[now]
     # A repeated attempt: the stages of the last step are already stored, and k holds failed ones.
     if newton["stages_step"] == state["steps"]:
         return
     tolerance = control["size"] if control["mode"] == rec.TOLERANCE else FIXED
-    weights, first, last, rates = r.weights, r.first, r.last_stages[0], k[0]
+    weights = r.weights
+    first = r.first
+    last = r.last_stages[0]
+    rates = k[0]
     for i in range(rates.size):
         weights[i] = 1.0 / (tolerance * error_scale(scale[i], y[i]))
         last[i], first[i] = first[i], rates[i]
@@ -113,7 +122,9 @@ def factor_for(r, shift):
     r.state[0]["factorisations"] += 0.0 if newton["shift"] == -shift else 1.0
     # Until the factors are complete, none are valid.
     newton["shift"] = 0.0
-    bad = run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors)
+    bad = run_handle.call_factor(
+        r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors
+    )
     if bad == 0:
         newton["shift"] = shift
     return bad
@@ -122,7 +133,11 @@ def factor_for(r, shift):
 @inline
 def spectral_radius(r):
     """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
-    v, product, scale, before, now = r.increment, r.product, r.scale, 0.0, 0.0
+    v = r.increment
+    product = r.product
+    scale = r.scale
+    before = 0.0
+    now = 0.0
     for e in range(v.size):
         # Alternating signs contain the shortest waves of a grid, which are its fastest modes.
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
@@ -203,7 +218,9 @@ def damped_limits(control):
 @inline
 def find_worst(r, d, f):
     """Store as `worst` a state whose rate f is not finite, or the state with the greatest increment d."""
-    weights, worst, at = r.weights, -1.0, r.state[0]["worst"]
+    weights = r.weights
+    worst = -1.0
+    at = r.state[0]["worst"]
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
         if e > worst:  # a rate that is not a number makes other increments NaN as well
@@ -261,7 +278,9 @@ def evaluate_stage(handle, r, t, h_gamma, ki, residual):
     t : time of the stage; h_gamma : step times the diagonal coefficient of the method; y[3] receives the state
     residual : float64[n]  receives rate - ki
     """
-    y_stage, base, f = r.y[3], r.base, r.rate
+    y_stage = r.y[3]
+    base = r.base
+    f = r.rate
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
     stage_rates(handle, r, t, y_stage, f)
@@ -276,13 +295,22 @@ def damped_increment(handle, r, t, h_gamma, i):
 
     The increment is stored in `increment`; `rate` contains the rates of the stage. -1 : the matrix is singular.
     """
-    d, f, ki, shift, newton = r.increment, r.rate, r.k[i], 1.0 / h_gamma, r.newton[0]
+    d = r.increment
+    f = r.rate
+    ki = r.k[i]
+    shift = 1.0 / h_gamma
+    newton = r.newton[0]
     status, where = r.out[rec.STATUS], r.out[rec.PLACE]
     store_ledger_rates(r, i)
     renew(handle, r, t, r.y[3], f, r.ledger_rates[i], d)
     r.out[rec.STATUS], r.out[rec.PLACE] = status, where  # the Jacobian needs rates at other states
     r.state[0]["factorisations"] += 1.0
-    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
+    if (
+        run_handle.call_factor(
+            r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors
+        )
+        != 0
+    ):
         return -1.0
     newton["shift"] = shift
     # The differences of the Jacobian have used `increment` as work space.
@@ -300,7 +328,10 @@ def damped_update(handle, r, t, h_gamma, i, size, rounded):
     Returns (part of the increment, part added so far, squared length of the next increment relative to this one); both
     parts are equal if the trial is accepted.
     """
-    d, other, ki, shift = r.increment, r.moved, r.k[i], 1.0 / h_gamma
+    d = r.increment
+    other = r.moved
+    ki = r.k[i]
+    shift = 1.0 / h_gamma
     part, tried, length = 1.0, 0.0, 0.0
     # Trials reuse the factors; only accepted iterates get a new Jacobian.
     while part != tried and part > LEAST_PART:
@@ -323,7 +354,10 @@ def damped_newton(handle, r, t, h_gamma, i):
     The iteration starts from k[i]. Returns CONVERGED or FAILED.
     t : time of the stage; h_gamma : step times the diagonal coefficient of the method
     """
-    d, ki, newton, shift = r.increment, r.k[i], r.newton[0], 1.0 / h_gamma
+    d = r.increment
+    ki = r.k[i]
+    newton = r.newton[0]
+    shift = 1.0 / h_gamma
     enough, rounded, floor = damped_limits(r.control[0])
     before = np.inf
     evaluate_stage(handle, r, t, h_gamma, ki, d)
@@ -331,11 +365,21 @@ def damped_newton(handle, r, t, h_gamma, i):
         size = damped_increment(handle, r, t, h_gamma, i)
         if size == -1.0:
             break
-        done = size <= enough or size <= rounded and size >= 0.5 * before or size <= floor and turn == MOST_DAMPED - 1
-        part, tried, length, before = 1.0, 0.0, 0.0, size
+        done = (
+            size <= enough
+            or size <= rounded
+            and size >= 0.5 * before
+            or size <= floor
+            and turn == MOST_DAMPED - 1
+        )
+        part = 1.0
+        tried = 0.0
+        length = 0.0
+        before = size
         if not done:
             part, tried, length = damped_update(handle, r, t, h_gamma, i, size, rounded)
-        if part != tried and size <= floor and length < np.inf:  # rounding, or a kink between the iterates
+        # rounding, or a kink between the iterates
+        if part != tried and size <= floor and length < np.inf:
             done = True
         if done and r.out[rec.STATUS] != 0.0:
             break
@@ -363,8 +407,15 @@ def solve_stage_from_start(handle, r, t, h_gamma, i, y):
     solution from a step of zero length. Under error control a shorter step is cheaper, so there is only one try.
     y : state at the start of the step; other arguments as for `damped_newton`
     """
-    base, reached, ki, state = r.base, r.fallback, r.k[i], r.state[0]
-    done, part, turn, worst = 0.0, 1.0, 0, state["worst"]  # `worst` keeps the result of simplified Newton
+    base = r.base
+    reached = r.fallback
+    ki = r.k[i]
+    state = r.state[0]
+    # `worst` keeps the result of simplified Newton
+    done = 0.0
+    part = 1.0
+    turn = 0
+    worst = state["worst"]
     while part >= LEAST_STAGE_PART:
         if turn == 1:
             # The state y itself: the slope that leads from the base back to the start of the step.
@@ -400,13 +451,26 @@ def smoothed_error(handle, r, t, h, now, new, error, shift):
     error, because J jumps, the unfiltered error is used. Returns NEWTON_FAILED if the matrix is singular.
     now, new : rows of y at the start and the end of the step
     """
-    k, d, f, y, y_new, scale = r.k, r.increment, r.rate, r.y[now], r.y[new], r.scale
-    size, plain, dot, smooth = r.control[0]["size"], 0.0, 0.0, 0.0
+    k = r.k
+    d = r.increment
+    f = r.rate
+    y = r.y[now]
+    y_new = r.y[new]
+    scale = r.scale
+    size = r.control[0]["size"]
+    plain = 0.0
+    dot = 0.0
+    smooth = 0.0
     # Damped Newton has replaced the Jacobian by those of its iterates.
     renew_at_start(handle, r, t, now)
     r.state[0]["factorisations"] += 1.0
     r.newton[0]["increment_ratio"] = 1.0
-    if run_handle.call_factor(r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors) != 0:
+    if (
+        run_handle.call_factor(
+            r.calls[run_handle.REAL_FACTOR], r.structure, r.jacobian, shift, r.factors
+        )
+        != 0
+    ):
         return rec.NEWTON_FAILED
     for i in range(y.size):
         f[i] = 0.0

@@ -31,27 +31,55 @@ AFTER_STEP = loop_records.DONE, loop_records.BUDGET_SPENT  # codes after a step 
 
 @overload
 def integrate(
-    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = ..., rtol: float | None = ...,
-    step: float | None = ..., atol: ArrayLike | None = ..., counts: dict[str, int] | None = ..., *,
-    max_step: float | None = ..., first_step: float | None = ..., tcrit: ArrayLike = ..., events: None = ...,
-) -> np.ndarray: ...  # fmt: skip
+    f: Callable[..., Any],
+    y0: ArrayLike,
+    t: ArrayLike,
+    method: str | Method = ...,
+    rtol: float | None = ...,
+    step: float | None = ...,
+    atol: ArrayLike | None = ...,
+    counts: dict[str, int] | None = ...,
+    *,
+    max_step: float | None = ...,
+    first_step: float | None = ...,
+    tcrit: ArrayLike = ...,
+    events: None = ...,
+) -> np.ndarray: ...
 
 
 @overload
 def integrate(
-    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = ..., rtol: float | None = ...,
-    step: float | None = ..., atol: ArrayLike | None = ..., counts: dict[str, int] | None = ..., *,
-    max_step: float | None = ..., first_step: float | None = ..., tcrit: ArrayLike = ...,
+    f: Callable[..., Any],
+    y0: ArrayLike,
+    t: ArrayLike,
+    method: str | Method = ...,
+    rtol: float | None = ...,
+    step: float | None = ...,
+    atol: ArrayLike | None = ...,
+    counts: dict[str, int] | None = ...,
+    *,
+    max_step: float | None = ...,
+    first_step: float | None = ...,
+    tcrit: ArrayLike = ...,
     events: Callable[..., Any] | Sequence[Callable[..., Any]],
-) -> EventSolution: ...  # fmt: skip
+) -> EventSolution: ...
 
 
 def integrate(
-    f: Callable[..., Any], y0: ArrayLike, t: ArrayLike, method: str | Method = "dormand-prince",
-    rtol: float | None = None, step: float | None = None, atol: ArrayLike | None = None,
-    counts: dict[str, int] | None = None, *, max_step: float | None = None, first_step: float | None = None,
-    tcrit: ArrayLike = (), events: Any = None,
-) -> np.ndarray | EventSolution:  # fmt: skip
+    f: Callable[..., Any],
+    y0: ArrayLike,
+    t: ArrayLike,
+    method: str | Method = "dormand-prince",
+    rtol: float | None = None,
+    step: float | None = None,
+    atol: ArrayLike | None = None,
+    counts: dict[str, int] | None = None,
+    *,
+    max_step: float | None = None,
+    first_step: float | None = None,
+    tcrit: ArrayLike = (),
+    events: Any = None,
+) -> np.ndarray | EventSolution:
     """Integrate y' = f(t, y), y(t[0]) = y0; returns y at the times t : float64[len(t), n].
 
     f : f(t, y) -> float64[n], or f(t, y, dydt), which fills its last argument; compiled if numba can compile it
@@ -107,7 +135,9 @@ def integrate(
     return states if events is None else search.solution(t, states)
 
 
-def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0, critical, search) -> np.ndarray:
+def _solve_steps(
+    stepper: Integrator, functions: tuple, key: int, t, y0, critical, search
+) -> np.ndarray:
     """Take all steps, and return the states at the times t : float64[len(t), n], or up to a terminal event.
 
     stepper : `Integrator` of the call; y0 : state at t[0]; functions : result of `_functions`
@@ -125,7 +155,9 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0, critica
             states[1:] = stepper.rows[: t.size - 1, 1:]
             return states
         if code != loop_records.DONE:
-            raise FvsolveError(_failure(stepper.method, code, stepper.state[0])) from _EXCEPTIONS.get(key)
+            raise FvsolveError(
+                _failure(stepper.method, code, stepper.state[0])
+            ) from _EXCEPTIONS.get(key)
         if end < t[-1]:
             # f may jump there, so that step size, errors and Jacobian of the time before are useless.
             stepper.discard_history()
@@ -139,7 +171,9 @@ def _solve_segment(stepper: Integrator, functions: tuple, key: int, search) -> i
 
     Arguments as for `_solve_steps`
     """
-    code, handle, steps = loop_records.BUDGET_SPENT, np.array([key]), stepper.state[0]["steps"]
+    code = loop_records.BUDGET_SPENT
+    handle = np.array([key])
+    steps = stepper.state[0]["steps"]
     while code == loop_records.BUDGET_SPENT:
         if automatic.is_change_due(stepper):
             automatic.change(stepper)
@@ -163,7 +197,11 @@ def _critical_times(tcrit, t) -> list[tuple[float, float]]:
     if not np.isfinite(times).all():
         raise FvsolveError(f"tcrit = {tcrit!r} is not valid; expected finite times")
     gap = 4.0 * np.finfo(float).eps * np.abs(t).max()
-    return [(time - gap, time + gap) for time in times.tolist() if t[0] + 4.0 * gap < time < t[-1] - 4.0 * gap]
+    return [
+        (time - gap, time + gap)
+        for time in times.tolist()
+        if t[0] + 4.0 * gap < time < t[-1] - 4.0 * gap
+    ]
 
 
 def _check_steps(t, step, max_step, first_step) -> None:
@@ -178,7 +216,9 @@ def _check_steps(t, step, max_step, first_step) -> None:
         if value <= LEAST_STEP * np.abs(t).max():
             raise FvsolveError(f"{name} = {value:g} is too small to change the time")
     if first_step is not None and first_step > t[-1] - t[0]:
-        raise FvsolveError(f"first_step = {first_step:g} is longer than the integration, {t[-1] - t[0]:g}")
+        raise FvsolveError(
+            f"first_step = {first_step:g} is longer than the integration, {t[-1] - t[0]:g}"
+        )
 
 
 def _prepare(f, t0, y0) -> tuple:
@@ -216,7 +256,10 @@ def frozen_values(f: Callable) -> tuple | None:
         outer = inspect.getclosurevars(f)
     except ValueError:  # a variable from outside has no value yet
         return None
-    values = [(name, frozen_value(value)) for name, value in (*outer.nonlocals.items(), *outer.globals.items())]
+    values = [
+        (name, frozen_value(value))
+        for name, value in (*outer.nonlocals.items(), *outer.globals.items())
+    ]
     values.append(("", frozen_value(f.__defaults__ or ())))
     return None if any(value is None for _, value in values) else (f.__code__, *values)
 
@@ -232,7 +275,11 @@ def frozen_value(value: Any) -> tuple | None:
         return type(value), repr(value)
     known = value is None or value is np or value is math or hasattr(value, "py_func")
     if not known and callable(value):
-        known = str(getattr(value, "__module__", "")).partition(".")[0] in ("builtins", "math", "numpy")
+        known = str(getattr(value, "__module__", "")).partition(".")[0] in (
+            "builtins",
+            "math",
+            "numpy",
+        )
     return ("object", value) if known else None
 
 
@@ -244,8 +291,14 @@ def _full(n):
 def _failure(method, code, state) -> str:
     when = f"{method.name} stopped at t = {state['t']:.6g}: "
     if code == loop_records.NEWTON_STUCK:
-        return when + f"Newton did not converge, worst in y[{int(state['worst'])}]; try another rtol, step or method"
-    return when + "the solution is not finite or the step became too small; set a smaller step, or rtol without step"
+        return (
+            when
+            + f"Newton did not converge, worst in y[{int(state['worst'])}]; try another rtol, step or method"
+        )
+    return (
+        when
+        + "the solution is not finite or the step became too small; set a smaller step, or rtol without step"
+    )
 
 
 def _numbers(name, given) -> np.ndarray:
@@ -265,8 +318,10 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
     """
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
-        raise FvsolveError(f"atol = {atol.tolist()} is not valid; expected a positive number, or a row of positive "
-                           f"numbers with the length of y0, {n}")  # fmt: skip
+        raise FvsolveError(
+            f"atol = {atol.tolist()} is not valid; expected a positive number, or a row of positive "
+            f"numbers with the length of y0, {n}"
+        )
     return np.broadcast_to(atol / rtol, n).copy()
 
 
@@ -286,8 +341,12 @@ def _check(method, t, rtol, step) -> None:
     if rtol is not None and step is not None:
         raise FvsolveError("rtol and step both set the step; give only one of them")
     if step is None and not method.adaptive:
-        adaptive = ", ".join(dict.fromkeys(other.name for other in METHODS.values() if other.adaptive))
-        raise FvsolveError(f"{method.name} has no error estimate; give step, or one of the methods {adaptive}")
+        adaptive = ", ".join(
+            dict.fromkeys(other.name for other in METHODS.values() if other.adaptive)
+        )
+        raise FvsolveError(
+            f"{method.name} has no error estimate; give step, or one of the methods {adaptive}"
+        )
     if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0):
         raise FvsolveError("t is not valid; expected at least two times in rising order")
     for name, value in (("rtol", rtol), ("step", step)):
@@ -295,14 +354,20 @@ def _check(method, t, rtol, step) -> None:
             raise FvsolveError(f"{name} = {value!r} is not a positive number")
     least = LEAST_STEP * np.abs(t).max(initial=0.0)
     if step is not None and 0 < step <= least:
-        raise FvsolveError(f"step = {step:g} is too small to change the time; expected more than {least:.2g}")
+        raise FvsolveError(
+            f"step = {step:g} is too small to change the time; expected more than {least:.2g}"
+        )
     if rtol is not None and 0 < rtol < LEAST_TOLERANCE:
-        raise FvsolveError(f"rtol = {rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more")
+        raise FvsolveError(
+            f"rtol = {rtol:g} is below rounding errors; expected {LEAST_TOLERANCE:g} or more"
+        )
 
 
-_COMPILED: dict[Any, tuple] = {}  # functions of the time loop, by compiled function or by `frozen_values`
+# functions of the time loop, by compiled function or by `frozen_values`
+_COMPILED: dict[Any, tuple] = {}
 MOST_COMPILED = 100  # number of systems whose functions are kept; then the oldest is dropped
-_KEYS = itertools.count()  # keys of the next two dicts, one for each call: threads may integrate at the same time
+# keys of the next two dicts, one for each call: threads may integrate at the same time
+_KEYS = itertools.count()
 _PYTHON: dict[int, Callable] = {}  # Python functions, by the number in their handle
 _EXCEPTIONS: dict[int, BaseException] = {}  # exceptions that they raised
 WHERE = 3  # ledger offset in `out`: no ledger follows
@@ -373,7 +438,12 @@ def _compile(function, letters: str) -> DeclaredFunction:
 @compile_once
 def observers() -> tuple:
     """(fused step, observe, record, events) for the time loop of a system without events; rows are its states."""
-    functions = (_no_fused_step, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
+    functions = (
+        (_no_fused_step, FUSED_STEP),
+        (_row, OBSERVE),
+        (_nothing, OBSERVE),
+        (_no_events, EVENTS),
+    )
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 
 

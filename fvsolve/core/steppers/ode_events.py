@@ -22,7 +22,8 @@ from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
 
 POINTS = 9  # intervals of a step in which signs are compared; no divisor of common periods
-AT_VERTEX = 0.1  # margin of an interval within which the vertex of a parabola shows an extremum, in intervals
+# margin of an interval within which the vertex of a parabola shows an extremum, in intervals
+AT_VERTEX = 0.1
 
 
 class EventSolution(NamedTuple):
@@ -54,15 +55,26 @@ class EventFunction(NamedTuple):
 def read_events(given: Any) -> list[EventFunction]:
     """Event functions with their attributes `terminal` and `direction`; raises FvsolveError for invalid ones."""
     functions = [given] if callable(given) else given
-    if not isinstance(functions, Sequence) or isinstance(functions, str) or not all(map(callable, functions)):
-        raise FvsolveError(f"events = {given!r} is not valid; expected a function g(t, y), or a list of such functions")
+    if (
+        not isinstance(functions, Sequence)
+        or isinstance(functions, str)
+        or not all(map(callable, functions))
+    ):
+        raise FvsolveError(
+            f"events = {given!r} is not valid; expected a function g(t, y), or a list of such functions"
+        )
     events = []
     for function in functions:
-        terminal, direction = getattr(function, "terminal", False), getattr(function, "direction", 0.0)
+        terminal = getattr(function, "terminal", False)
+        direction = getattr(function, "direction", 0.0)
         if not isinstance(terminal, (bool, np.bool_, Integral)) or terminal < 0:
-            raise FvsolveError(f"terminal = {terminal!r} of an event is not valid; expected True, False, or a number")
+            raise FvsolveError(
+                f"terminal = {terminal!r} of an event is not valid; expected True, False, or a number"
+            )
         if not isinstance(direction, Real) or direction != direction:
-            raise FvsolveError(f"direction = {direction!r} of an event is not valid; expected a number: 1, 0 or -1")
+            raise FvsolveError(
+                f"direction = {direction!r} of an event is not valid; expected a number: 1, 0 or -1"
+            )
         events.append(EventFunction(function, int(terminal), float(direction)))
     return events
 
@@ -71,7 +83,9 @@ def read_events(given: Any) -> list[EventFunction]:
 def state_within(handle, run, due):
     """Write the state at the time `due` within the last step to `y_out`."""
     r = open_run(run)
-    t_old, now, old = r.progress[0]["t_old"], r.progress[0]["now"], r.progress[0]["old"]
+    t_old = r.progress[0]["t_old"]
+    now = r.progress[0]["now"]
+    old = r.progress[0]["old"]
     new, separate = 3 - now - old, r.control[0]["end_at_rows"] == 1 or needs_separate_step(r)
     if needs_defect(r) and substep_row(handle, r, t_old, due, now, old):
         return
@@ -87,7 +101,9 @@ class EventSearch:
     events : results of `read_events`; stepper : `Integrator` of the call; handle : argument of its functions
     """
 
-    def __init__(self, events: list[EventFunction], stepper: Integrator, handle: np.ndarray) -> None:
+    def __init__(
+        self, events: list[EventFunction], stepper: Integrator, handle: np.ndarray
+    ) -> None:
         self.events, self.stepper, self.handle = events, stepper, handle
         self.times: list[list[float]] = [[] for _ in events]
         self.states: list[list[np.ndarray]] = [[] for _ in events]
@@ -110,7 +126,9 @@ class EventSearch:
         """Value of an event function at a time within the last step."""
         value = np.asarray(event.function(t, self.state(t)), dtype=float)
         if value.size != 1:
-            raise FvsolveError(f"an event function returns {value.size} values; expected a single number")
+            raise FvsolveError(
+                f"an event function returns {value.size} values; expected a single number"
+            )
         return float(value.reshape(()))
 
     def search_step(self) -> bool:
@@ -141,7 +159,8 @@ class EventSearch:
                 ends.insert(1, self.extremum(event, *ends))
             for (a, left), (b, right) in zip(ends, ends[1:], strict=False):
                 if left == 0.0 or left * right > 0.0 or event.direction * left > 0.0:
-                    continue  # a zero at the start of an interval counts at the end of the interval before
+                    # a zero at the start of an interval counts at the end of the interval before
+                    continue
                 result.append(b if right == 0.0 else self.zero(event, a, b))
         return result
 
@@ -149,21 +168,34 @@ class EventSearch:
         """(time, value) of the value nearest to zero, or beyond it, between two points of equal sign."""
         sign = copysign(1.0, first[1])
         least = minimize_scalar(
-            lambda t: sign * self.value(event, t), bounds=(first[0], last[0]), method="bounded",
+            lambda t: sign * self.value(event, t),
+            bounds=(first[0], last[0]),
+            method="bounded",
             options={"xatol": 1e-9 * (last[0] - first[0])},
-        )  # fmt: skip
+        )
         return float(least.x), sign * float(least.fun)
 
     def zero(self, event: EventFunction, a: float, b: float) -> float:
         """Time of the zero of an event function that has opposite signs at times a and b."""
         small = 4.0 * np.finfo(float).eps
-        return float(brentq(lambda t: self.value(event, t), a, b, xtol=small * max(abs(a), abs(b), 1e-300), rtol=small))
+        return float(
+            brentq(
+                lambda t: self.value(event, t),
+                a,
+                b,
+                xtol=small * max(abs(a), abs(b), 1e-300),
+                rtol=small,
+            )
+        )
 
     def solution(self, t: np.ndarray, states: np.ndarray) -> EventSolution:
         """Result of `integrate` from the states at all times t that the steps reached."""
         count = t.size if self.end is None else int(np.searchsorted(t, self.end, side="right"))
         n = states.shape[1]
-        events = [np.array(times) for times in self.times], [np.array(s).reshape(-1, n) for s in self.states]
+        events = (
+            [np.array(times) for times in self.times],
+            [np.array(s).reshape(-1, n) for s in self.states],
+        )
         return EventSolution(t[:count], states[:count], *events, int(self.end is not None))
 
 

@@ -32,7 +32,9 @@ def row_due(r):
 
     r : open handle of the run
     """
-    control, count, times = r.control[0], r.state[0]["next_output"], r.times
+    control = r.control[0]
+    count = r.state[0]["next_output"]
+    times = r.times
     if times.size > 0:
         return times[int(count)] if count < times.size else NEVER
     return output_due(control["start"], count, control["every"], NEVER)
@@ -42,7 +44,9 @@ def row_due(r):
 def field_due(r):
     """Time [s] of the next field frame; 1e308 after the last."""
     control = r.control[0]
-    return output_due(control["start"], r.state[0]["next_field"], control["field_every"], control["field_count"])
+    return output_due(
+        control["start"], r.state[0]["next_field"], control["field_every"], control["field_count"]
+    )
 
 
 @njit(forceinline=True)
@@ -86,7 +90,9 @@ def limit_ratio(states, row, y_old, y, out):
     if limited != found:
         # The ratio of `per_amount`, solved for the state.
         wide = max(total, row[LEAST])
-        out[states[0]] = limited * (total * total + wide * wide) / (2.0 * total) if total > 0.0 else 0.0
+        out[states[0]] = (
+            limited * (total * total + wide * wide) / (2.0 * total) if total > 0.0 else 0.0
+        )
 
 
 @njit
@@ -102,7 +108,9 @@ def limit_to_bounds(states, bounds, y_old, y, out, checked):
     checked : True if the error of the interpolation is within the tolerance of the steps: flows are not limited then
     """
     for r in range(bounds.shape[0]):
-        row_states, low, high = states[3 * r : 3 * r + 3], bounds[r, LEAST], bounds[r, MOST]
+        row_states = states[3 * r : 3 * r + 3]
+        low = bounds[r, LEAST]
+        high = bounds[r, MOST]
         if high < low:
             if not checked:
                 limit_ratio(row_states, bounds[r], y_old, y, out)
@@ -136,8 +144,11 @@ def separate_step(handle, r, t, h, old, new):
     """
     own, state = open_run(r.spare), r.state[0]
     # A row must leave no trace in what the steps report and decide.
-    worst, radius, newton = state["worst"], state["radius"], own.newton[0]
-    newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0  # no Jacobian, no earlier stages
+    worst = state["worst"]
+    radius = state["radius"]
+    newton = own.newton[0]
+    # no Jacobian, no earlier stages
+    newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0
     newton["shift"] = newton["increment_ratio"] = 0.0
     newton["stages_step"] = newton["damped_step"] = -1.0
     newton["convergence_factor"], newton["factor_size"] = 1.0, r.newton[0]["factor_size"]
@@ -154,9 +165,15 @@ def interpolate_row(r, t_old, due, separate, now, old):
 
     separate : True for a linear interpolation, where a separate step could not be solved
     """
-    y, y_new, out, h = r.y[old], r.y[now], r.y_out, r.state[0]["t"] - t_old
-    theta, row_blocks, s = (due - t_old) / h, r.row_blocks, r.k.shape[0]
-    start_slope, f = start_slope_of(r.coefficients, s), r.k[s - 1] if r.control[0]["stage_slope"] == 1 else r.k[0]
+    y = r.y[old]
+    y_new = r.y[now]
+    out = r.y_out
+    h = r.state[0]["t"] - t_old
+    theta = (due - t_old) / h
+    row_blocks = r.row_blocks
+    s = r.k.shape[0]
+    start_slope = start_slope_of(r.coefficients, s)
+    f = r.k[s - 1] if r.control[0]["stage_slope"] == 1 else r.k[0]
     for m in range(row_blocks.shape[0]):
         begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
         if separate:
@@ -173,7 +190,10 @@ def compute_row(handle, r, t_old, due, now, old):
     t_old : time of the last state; now, old : rows of y with the present and the last state
     Where a separate step cannot be solved, the row is interpolated linearly.
     """
-    t, new, y_out, row_blocks = r.state[0]["t"], 3 - now - old, r.y_out, r.row_blocks
+    t = r.state[0]["t"]
+    new = 3 - now - old
+    y_out = r.y_out
+    row_blocks = r.row_blocks
     separate = needs_separate_step(r)
     within = due < t - AT_END * (t - t_old)
     # From the most accurate source to the cheapest: substeps, a separate step, the dense output.
@@ -197,8 +217,14 @@ def emit(handle, r):
     DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
     Rows from control["stop_at"] on are not written.
     """
-    state, progress, rows, t = r.state[0], r.progress[0], r.rows, r.state[0]["t"]
-    t_old, stop_at, now, old = t - state["last"], r.control[0]["stop_at"], progress["now"], progress["old"]
+    state = r.state[0]
+    progress = r.progress[0]
+    rows = r.rows
+    t = r.state[0]["t"]
+    t_old = t - state["last"]
+    stop_at = r.control[0]["stop_at"]
+    now = progress["now"]
+    old = progress["old"]
     while True:
         row, field = row_due(r), field_due(r)
         due = min(row, field)
@@ -210,7 +236,9 @@ def emit(handle, r):
         if row <= due:
             values = rows[progress["rows"], 1:]
             rows[progress["rows"], 0] = due
-            run_handle.call_observer(r.calls[run_handle.OBSERVER], due, r.y_out, r.out_row, handle, values)
+            run_handle.call_observer(
+                r.calls[run_handle.OBSERVER], due, r.y_out, r.out_row, handle, values
+            )
             progress["rows"] += 1
             state["next_output"] += 1.0
         # After the row of the same time, because the caller writes the frame and then calls again.

@@ -8,7 +8,13 @@ and Wanner 1996, (IV.7.25)). Stages are stored as k_i = u_i / h.
 from fvsolve.core.steppers import loop_records as rec
 from fvsolve.core.steppers.coefficients import nodes_of, row_of, weights_of
 from fvsolve.core.steppers.newton import factor_for, follow_stages, renew_at_start, spectral_radius
-from fvsolve.core.steppers.run_handle import REAL_SOLVE, call_solve, note_stage, open_run, stage_rates
+from fvsolve.core.steppers.run_handle import (
+    REAL_SOLVE,
+    call_solve,
+    note_stage,
+    open_run,
+    stage_rates,
+)
 from fvsolve.core.steppers.step_operations import combine, copy, error_norm
 from fvsolve.core.steppers.structure import multiply
 from fvsolve.jit import inline, njit
@@ -22,14 +28,19 @@ def slope_in_time(handle, r, t, h, now):
 
     Arguments as for `attempt`.
     """
-    slope, first, out, ledger_slopes, offset = r.base, r.k[0], r.out, r.ledger_slopes, r.control[0]["ledger_offset"]
+    slope = r.base
+    first = r.k[0]
+    out = r.out
+    ledger_slopes = r.ledger_slopes
+    offset = r.control[0]["ledger_offset"]
     # The root balances rounding and curvature; a difference within the step meets no later kink.
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
     later = t + step
     out[rec.NEARBY] = 1.0
     stage_rates(handle, r, later, r.y[now], slope)
     out[rec.NEARBY] = 0.0
-    per = 1.0 / (later - t) if later > t else 0.0  # the time difference is lost in rounding: df/dt is negligible
+    # the time difference is lost in rounding: df/dt is negligible
+    per = 1.0 / (later - t) if later > t else 0.0
     for e in range(slope.size):
         slope[e] = (slope[e] - first[e]) * per
     for m in range(ledger_slopes.size):
@@ -43,7 +54,9 @@ def book_stage(r, i, gamma, time_weight, row, d):
     d : float64[n]  solution u_i of the stage; row : float64[s]  row C_i of the coefficients; J : Jacobian
     `out` holds the rates computed with f, `ledger_slopes` their time slopes.
     """
-    product, ledger_rates, offset = r.product, r.ledger_rates, r.control[0]["ledger_offset"]
+    product = r.product
+    ledger_rates = r.ledger_rates
+    offset = r.control[0]["ledger_offset"]
     multiply(r.structure, r.jacobian, d, product)
     for m in range(ledger_rates.shape[1]):
         total = r.out[offset + m] + product[d.size + m] + time_weight * r.ledger_slopes[m]
@@ -89,7 +102,12 @@ def attempt(handle, run, t, h, now, new):
     with the Jacobian J and the diagonal coefficient g of the method. Arguments as for `erk.attempt`.
     """
     r = open_run(run)
-    k, y, d, slope, s, n = r.k, r.y[now], r.increment, r.base, r.k.shape[0], r.scale.size
+    k = r.k
+    y = r.y[now]
+    d = r.increment
+    slope = r.base
+    s = r.k.shape[0]
+    n = r.scale.size
     extra, per = r.coefficients[s * s + 3 * s :], 1.0 / h  # C, d, g
     gamma = extra[s * s + s]
     prepare(handle, r, t, h, now)
@@ -100,7 +118,9 @@ def attempt(handle, run, t, h, now, new):
     for i in range(1, s):
         evaluate_stage(handle, r, t, h, i, now)
         f = k[0] if i == 1 else r.rate
-        time_weight, u, row = extra[s * s + i] * h, k[i], extra[i * s : (i + 1) * s]
+        time_weight = extra[s * s + i] * h
+        u = k[i]
+        row = extra[i * s : (i + 1) * s]
         # f may be k[0], which must not change, so the sum goes to work space.
         if time_weight != 0.0:
             for e in range(n):

@@ -39,9 +39,14 @@ CLOSE = 1e-9  # in steps: substeps that end closer to the end of the step end th
 @njit
 def store_start_slopes(r):
     """Store the slopes at the start of the last step, for output rows within it."""
-    control, row_blocks, k, f_old, s = r.control[0], r.row_blocks, r.k, r.f_old, r.k.shape[0]
+    control = r.control[0]
+    row_blocks = r.row_blocks
+    k = r.k
+    f_old = r.f_old
+    s = r.k.shape[0]
     known = control["kind"] == rec.NEWTON_SOLVED and r.newton[0]["known_steps"] > 0.0
-    start_slope, use_slope = start_slope_of(r.coefficients, s), control["stage_slope"] == 1 and known
+    start_slope = start_slope_of(r.coefficients, s)
+    use_slope = control["stage_slope"] == 1 and known
     # The rate f at the start would amplify the distance of y from the slow solution.
     slope = r.last_stages[s - 1] if known else k[0]
     for m in range(row_blocks.shape[0]):
@@ -61,7 +66,11 @@ def needs_defect(r):
     Stability limits explicit steps; other methods end steps at rows, see `Integrator.end_at_rows`.
     """
     control = r.control[0]
-    return control["kind"] != rec.EXPLICIT and control["mode"] == rec.TOLERANCE and control["end_at_rows"] == 0
+    return (
+        control["kind"] != rec.EXPLICIT
+        and control["mode"] == rec.TOLERANCE
+        and control["end_at_rows"] == 0
+    )
 
 
 @njit
@@ -70,8 +79,17 @@ def defect(handle, r, own, t, h, theta, now, old):
 
     t, h : start and length of the last step; own : open handle of `spare`, whose arrays are used for work
     """
-    y, y_new, stage, d, f, k, scale = r.y[old], r.y[now], own.y[3], own.increment, own.rate, r.k, r.scale
-    s, size, total, out = k.shape[0], r.control[0]["size"], 0.0, r.out_row
+    y = r.y[old]
+    y_new = r.y[now]
+    stage = own.y[3]
+    d = own.increment
+    f = own.rate
+    k = r.k
+    scale = r.scale
+    s = k.shape[0]
+    size = r.control[0]["size"]
+    total = 0.0
+    out = r.out_row
     start_slope = start_slope_of(r.coefficients, s)
     interpolate(0, y.size, theta, h, y, r.f_old, y_new, k[s - 1], k, r.dense, start_slope, stage)
     interpolate_slope(theta, h, y, r.f_old, y_new, k[s - 1], k, r.dense, start_slope, d)
@@ -86,7 +104,11 @@ def defect(handle, r, own, t, h, theta, now, old):
     for i in range(y.size):
         e = d[i] / (size * error_scale(scale[i], max(abs(y[i]), abs(y_new[i]))))
         total += e * e
-    return sqrt(total / max(y.size, 1)) if out[rec.STATUS] == 0.0 and isfinite(total) else rec.UNKNOWN_DEFECT
+    return (
+        sqrt(total / max(y.size, 1))
+        if out[rec.STATUS] == 0.0 and isfinite(total)
+        else rec.UNKNOWN_DEFECT
+    )
 
 
 @njit
@@ -110,7 +132,10 @@ def begin_substeps(handle, r, own, t, h, now, old):
 
     Arguments as for `defect`
     """
-    state, progress, newton, size = own.state[0], own.progress[0], own.newton[0], r.state[0]["t"]
+    state = own.state[0]
+    progress = own.progress[0]
+    newton = own.newton[0]
+    size = r.state[0]["t"]
     # The defect of a step is computed once for all its rows.
     if progress["t_old"] != t or progress["t_new"] != size:
         error = greatest_defect(handle, r, own, t, h, now, old)
@@ -118,7 +143,8 @@ def begin_substeps(handle, r, own, t, h, now, old):
         progress["t_old"], progress["t_new"] = t, size
     state["t"], state["last"], state["steps"] = t, 0.0, 1.0
     progress["now"], progress["old"], progress["no_sweeps"] = 0, 1, 1
-    newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0  # no Jacobian, no earlier stages
+    # no Jacobian, no earlier stages
+    newton["has_jacobian"] = newton["jacobian_step"] = newton["known_steps"] = 0.0
     newton["shift"] = newton["increment_ratio"] = 0.0
     newton["stages_step"] = newton["damped_step"] = -1.0
     newton["convergence_factor"], newton["factor_size"] = 1.0, r.newton[0]["factor_size"]
@@ -169,7 +195,9 @@ def substep_row(handle, r, t_old, due, now, old):
 
     Returns False if the dense output of the step is accurate, or if a substep could not be solved.
     """
-    own, t, h = open_run(r.spare), r.state[0]["t"], r.state[0]["t"] - t_old
+    own = open_run(r.spare)
+    t = r.state[0]["t"]
+    h = r.state[0]["t"] - t_old
     state, progress = own.state[0], own.progress[0]
     begun = progress["t_old"] == t_old and progress["t_new"] == t
     checked = due >= state["t"] or progress["changed"] == 1  # the dense output of the last substep
@@ -188,10 +216,16 @@ def substep_row(handle, r, t_old, due, now, old):
             # No further row of this step is tried by substeps.
             state["step"] = 0.0
             return False
-    y, y_new, last, k, s = own.y[progress["old"]], own.y[progress["now"]], state["last"], own.k, own.k.shape[0]
+    y = own.y[progress["old"]]
+    y_new = own.y[progress["now"]]
+    last = state["last"]
+    k = own.k
+    s = own.k.shape[0]
     if due == state["t"]:
         copy(y_new, r.y_out)
     else:
         theta, start_slope = (due - (state["t"] - last)) / last, start_slope_of(r.coefficients, s)
-        interpolate(0, y.size, theta, last, y, own.f_old, y_new, k[s - 1], k, r.dense, start_slope, r.y_out)
+        interpolate(
+            0, y.size, theta, last, y, own.f_old, y_new, k[s - 1], k, r.dense, start_slope, r.y_out
+        )
     return True

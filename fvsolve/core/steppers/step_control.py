@@ -7,22 +7,27 @@ from fvsolve.core.steppers.loop_records import LEAST_STEP
 from fvsolve.jit import njit
 
 STEPS_TO_SWITCH = (
-    15  # net count of steps in favour of the other kind of method before a switch; doubled by every switch
+    # net count of steps in favour of the other kind of method before a switch; doubled by every switch
+    15
 )
-BOUNDARY = 3.0  # h times spectral radius at the stability boundary: `dormand-prince` reaches 3.3 on the real axis
+# h times spectral radius at the stability boundary: `dormand-prince` reaches 3.3 on the real axis
+BOUNDARY = 3.0
 # h times spectral radius above which stability limits the step: then it varies from 1 to 3.5; limited by accuracy it
 # hardly varies.
 LIMITED_BY_STABILITY = 2.5
-WAVES = 1.0  # h times the greatest known rate below which only other parts, such as valves, can limit the step
+# h times the greatest known rate below which only other parts, such as valves, can limit the step
+WAVES = 1.0
 COUNT_DECREASE = 0.4  # decrease of the count by a step that stability does not limit
 # Fraction of an opening that may close in one given step; for x ~ (time left)^(1/3) this is half of the time left.
 CLOSING_FRACTION = 0.15
-DIVIDED_FRACTION = 0.5  # longest part of a divided step, as fraction of the time constant of the fastest mode
+# longest part of a divided step, as fraction of the time constant of the fastest mode
+DIVIDED_FRACTION = 0.5
 LIMITED = 0.8  # fraction of a limit of the step, so that the limit does not act at every step
 APPROACH = 0.95  # fraction of the rest of a segment that the second-last step takes
 EARLY = 1e-12  # least time relative to the end, to which the least step is relative
 NEVER = 1e308  # a time that is never reached [s]
-DEAD_BAND = 1.2  # a step solved by Newton that may grow by a smaller factor keeps its length, and so its factorisation
+# a step solved by Newton that may grow by a smaller factor keeps its length, and so its factorisation
+DEAD_BAND = 1.2
 
 
 @njit(forceinline=True)
@@ -46,13 +51,17 @@ def first_step(k, scale, control, state):
 
     control, state : records of the time loop, see `loop_records`
     """
-    total, tolerance, span = 0.0, control["size"], control["end"] - state["t"]
+    total = 0.0
+    tolerance = control["size"]
+    span = control["end"] - state["t"]
     limit = min(span, max(1e-3 * span, shortest(control, state)))
     for i in range(scale.size):
         total += (k[0, i] / scale[i]) ** 2
     d = sqrt(total / max(scale.size, 1))
     # At rates of zero nothing limits the step but the span.
-    return min(limit, 0.05 * tolerance ** (1.0 / (control["order"] + 1.0)) / d) if d > 0.0 else limit
+    return (
+        min(limit, 0.05 * tolerance ** (1.0 / (control["order"] + 1.0)) / d) if d > 0.0 else limit
+    )
 
 
 @njit(forceinline=True)
@@ -64,7 +73,8 @@ def next_step(control, state, out_rate, longest, k, scale):
     control, state : see `loop_records`; a first step, and a new given step with its start, are stored there
     """
     if control["mode"] == rec.TOLERANCE:
-        if too_short(control, state, state["step"]):  # no step is stored, or it does not change the time
+        # no step is stored, or it does not change the time
+        if too_short(control, state, state["step"]):
             state["step"] = first_step(k, scale, control, state)
         if 0.0 < longest < state["step"]:
             state["step"] = LIMITED * longest
@@ -74,7 +84,11 @@ def next_step(control, state, out_rate, longest, k, scale):
         return min(state["step"], control["step_max"], max(stable, shortest(control, state)))
     h = control["size"]
     if control["mode"] == rec.COURANT:
-        h = min(control["size"] / out_rate, control["step_max"]) if out_rate > 0.0 else control["step_max"]
+        h = (
+            min(control["size"] / out_rate, control["step_max"])
+            if out_rate > 0.0
+            else control["step_max"]
+        )
         # A rate without bound, as at a closing valve, must not stop the run.
         h = max(h, shortest(control, state))
     # Ends of given steps are multiples of the step, counted from this mark.
@@ -102,7 +116,8 @@ def row_step_end(control, state, due, h):
 
     due : time of the next row [s]; control, state : records of the time loop, see `loop_records`
     """
-    if control["end_at_rows"] == 0.0 or control["mode"] != rec.TOLERANCE:  # given steps do not depend on output rows
+    # given steps do not depend on output rows
+    if control["end_at_rows"] == 0.0 or control["mode"] != rec.TOLERANCE:
         return NEVER
     if due >= state["t"] + h * (1.0 - 1e-9) or too_short(control, state, due - state["t"]):
         return NEVER
@@ -123,7 +138,10 @@ def end_of(control, state, h, last, due):
     if h == due - state["t"]:
         return due
     if control["mode"] != rec.TOLERANCE and (h == state["step"] or h == state["split_remainder"]):
-        return state["t_mark"] + (state["n_mark"] + (0.0 if state["split_remainder"] > h else 1.0)) * state["step"]
+        return (
+            state["t_mark"]
+            + (state["n_mark"] + (0.0 if state["split_remainder"] > h else 1.0)) * state["step"]
+        )
     return state["t"] + h
 
 
@@ -137,7 +155,8 @@ def closing_step(state, closing, h, least):
     # A step of twice the least length cannot be divided.
     if h * closing <= CLOSING_FRACTION or h <= 2.0 * least:
         return h
-    if state["split_remainder"] == 0.0:  # the parts end together where the given step would have ended
+    # the parts end together where the given step would have ended
+    if state["split_remainder"] == 0.0:
         state["split_remainder"] = h
         state["split_steps"] += 1.0
     return max(least, min(0.5 * h, CLOSING_FRACTION / closing))
@@ -190,7 +209,9 @@ def grown(control, state, h, e, shortened):
     control, state : records of the time loop, see `loop_records`
     """
     # Errors of zero would give infinite factors.
-    e, old, order = max(e, 1e-10), max(state["error_old"], 1e-4), control["order"]
+    e = max(e, 1e-10)
+    old = max(state["error_old"], 1e-4)
+    order = control["order"]
     if control["kind"] == rec.EXPLICIT:
         return min(5.0, max(0.2, 0.9 * e ** (-0.7 / order) * old ** (0.4 / order)))
     grow = 0.9 * e ** (-1.0 / order)
@@ -247,12 +268,15 @@ def watch(control, state, h, e, out_rate):
     if control["kind"] == rec.EXPLICIT:
         growth = 0.9 * max(e, 1e-30) ** (-1.0 / control["order"])
         cheaper = h * state["radius"] > LIMITED_BY_STABILITY
-        if h * out_rate > WAVES:  # `next_step` keeps h within stability; the error gives the possible increase
+        # `next_step` keeps h within stability; the error gives the possible increase
+        if h * out_rate > WAVES:
             cheaper = h * out_rate > 1.98 and growth > control["price"]
         state["radius"] = max(state["radius"], out_rate)
     else:
         cheaper = 2.0 * max(1.0, h * state["radius"] / BOUNDARY) < control["price"]
-    state["switch_count"] = state["switch_count"] + 1.0 if cheaper else max(0.0, state["switch_count"] - COUNT_DECREASE)
+    state["switch_count"] = (
+        state["switch_count"] + 1.0 if cheaper else max(0.0, state["switch_count"] - COUNT_DECREASE)
+    )
     return state["switch_count"] >= STEPS_TO_SWITCH * 2.0 ** min(state["switches"], 6.0)
 
 

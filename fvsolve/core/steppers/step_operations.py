@@ -2,7 +2,15 @@
 
 from math import sqrt
 
-from fvsolve.core.kernels.stage_sums import BAD, BASINS, HEAD, OTHERS, combine, copy, count_not_finite
+from fvsolve.core.kernels.stage_sums import (
+    BAD,
+    BASINS,
+    HEAD,
+    OTHERS,
+    combine,
+    copy,
+    count_not_finite,
+)
 from fvsolve.core.steppers.coefficients import error_of, weights_of
 from fvsolve.core.steppers.run_handle import BANDS, call_join
 from fvsolve.jit import njit
@@ -52,7 +60,10 @@ def error_norm(r, h, now, new):
     r : open handle of the run; now, new : rows of y at the start and the end of the step
     """
     y, error = r.y[now], error_of(r.coefficients, r.k.shape[0])
-    return sqrt(squares(0, y.size, h, error, r.k, y, r.y[new], r.scale, r.control[0]["size"]) / max(y.size, 1))
+    return sqrt(
+        squares(0, y.size, h, error, r.k, y, r.y[new], r.scale, r.control[0]["size"])
+        / max(y.size, 1)
+    )
 
 
 @njit
@@ -62,13 +73,23 @@ def error_of_bands(handle, r, h, now, new):
     A band is a part of the states, which one thread or process steps.
     handle : handle of the model; other arguments as for `error_norm`
     """
-    error, k, y, y_new, scale = error_of(r.coefficients, r.k.shape[0]), r.k, r.y[now], r.y[new], r.scale
-    row_blocks, sums, tolerance = r.row_blocks, r.sums, r.control[0]["size"]
+    error = error_of(r.coefficients, r.k.shape[0])
+    k = r.k
+    y = r.y[now]
+    y_new = r.y[new]
+    scale = r.scale
+    row_blocks = r.row_blocks
+    sums = r.sums
+    tolerance = r.control[0]["size"]
     for m in range(row_blocks.shape[0]):
-        begin, stop, length = row_blocks[m, BEGIN], row_blocks[m, STOP], row_blocks[m, LENGTH]
+        begin = row_blocks[m, BEGIN]
+        stop = row_blocks[m, STOP]
+        length = row_blocks[m, LENGTH]
         for row in range(row_blocks[m, SUMS]):
             at, end = begin + row * length, min(begin + (row + 1) * length, stop)
-            sums[row_blocks[m, FIRST] + row] = squares(at, end, h, error, k, y, y_new, scale, tolerance)
+            sums[row_blocks[m, FIRST] + row] = squares(
+                at, end, h, error, k, y, y_new, scale, tolerance
+            )
     call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
     for row in range(sums.size):
@@ -118,7 +139,10 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
         # Two stages in each pass over memory.
         while j < dense.shape[0]:
             if j + 1 < dense.shape[0]:
-                a, b, ka, kb = h * weight(theta, dense, j), h * weight(theta, dense, j + 1), k[j], k[j + 1]
+                a = h * weight(theta, dense, j)
+                b = h * weight(theta, dense, j + 1)
+                ka = k[j]
+                kb = k[j + 1]
                 for i in range(begin, end):
                     out[i] += a * ka[i] + b * kb[i]
             else:
@@ -136,8 +160,11 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, start_slope,
         return
     s, r = theta, 1.0 - theta
     # Hermite cubic: weights of y_new - y, of f and of f_new.
-    h01, h10, h11 = s * s * (1.0 + 2.0 * r), h * s * r * r, -h * s * s * r
-    for i in range(begin, end):  # in differences, so that a constant state stays constant to the bit
+    h01 = s * s * (1.0 + 2.0 * r)
+    h10 = h * s * r * r
+    h11 = -h * s * s * r
+    # in differences, so that a constant state stays constant to the bit
+    for i in range(begin, end):
         out[i] = y[i] + (h01 * (y_new[i] - y[i]) + (h10 * f[i] + h11 * f_new[i]))
 
 
@@ -146,7 +173,9 @@ def interpolate_slope(theta, h, y, f, y_new, f_new, k, dense, start_slope, out):
     """Write the derivative of the dense output at t + theta h to `out` : float64[n]; arguments as for `interpolate`."""
     if dense.shape[0] == 0:
         r = 1.0 - theta
-        per, h10, h11 = 6.0 * theta * r / h, r * (1.0 - 3.0 * theta), theta * (3.0 * theta - 2.0)
+        per = 6.0 * theta * r / h
+        h10 = r * (1.0 - 3.0 * theta)
+        h11 = theta * (3.0 * theta - 2.0)
         for i in range(out.size):
             out[i] = per * (y_new[i] - y[i]) + h10 * f[i] + h11 * f_new[i]
         return
@@ -199,7 +228,8 @@ def sum_of_bands(own, handle, r):
     for m in range(row_blocks.shape[0]):
         for row in range(row_blocks[m, FIRST], row_blocks[m, FIRST] + row_blocks[m, SUMS]):
             sums[row] = 0.0
-    sums[row_blocks[row_blocks.shape[0] - 1, FIRST]] = own  # of rows of this band, or of states common to all bands
+    # of rows of this band, or of states common to all bands
+    sums[row_blocks[row_blocks.shape[0] - 1, FIRST]] = own
     call_join(r.calls[BANDS], sums, row_blocks, handle)
     total = 0.0
     for row in range(sums.size):
@@ -215,7 +245,8 @@ def exceeded(handle, r, y):
     """
     beyond, row_blocks = 0, r.row_blocks
     for m in range(row_blocks.shape[0]):
-        own, largest = y[row_blocks[m, BEGIN] : row_blocks[m, STOP]], r.largest[row_blocks[m, BEGIN] :]
+        own = y[row_blocks[m, BEGIN] : row_blocks[m, STOP]]
+        largest = r.largest[row_blocks[m, BEGIN] :]
         for i in range(own.size):
             beyond += not abs(own[i]) <= largest[i]
     return sum_of_bands(beyond, handle, r) > 0.0
@@ -235,7 +266,9 @@ def stored_sum(r, h, b, y, q):
 
     h : step; b : weights of the stages; y : state at the start of the step
     """
-    i, k, total = r.stored[q], r.k, 0.0
+    i = r.stored[q]
+    k = r.k
+    total = 0.0
     for j in range(b.size):
         total += b[j] * k[j, i]
     # The change is summed before it is added: it is small against the mass.
@@ -248,7 +281,10 @@ def add_stored(r, h, now, new):
 
     h : step; now, new : rows of y at its start and its end. Returns True if this changed a bit of the new state.
     """
-    changed, b, y_new, stored = False, weights_of(r.coefficients, r.k.shape[0]), r.y[new], r.stored
+    changed = False
+    b = weights_of(r.coefficients, r.k.shape[0])
+    y_new = r.y[new]
+    stored = r.stored
     for q in range(stored.size):
         total = stored_sum(r, h, b, r.y[now], q)[0]
         changed = changed or total != y_new[stored[q]]

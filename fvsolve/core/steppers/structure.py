@@ -26,8 +26,10 @@ FINE, SOLVER_DATA = 7, 8  # 1 for columns with a fine increment; data of the kin
 HEADER = 9
 
 KINDS = ("dense", "banded", "sparse")
-SMALL = 16  # number of states up to which dense factors are as quick as others (0.2 to 0.6 us), without setup
-DENSE_SHARE = 0.2  # fraction of non-zero entries from which factors fill up, so that dense factors are quicker
+# number of states up to which dense factors are as quick as others (0.2 to 0.6 us), without setup
+SMALL = 16
+# fraction of non-zero entries from which factors fill up, so that dense factors are quicker
+DENSE_SHARE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +54,10 @@ class Structure:
         pattern.eliminate_zeros()
         pattern.sort_indices()
         if pattern.shape[0] < pattern.shape[1]:
-            raise FvsolveError(f"a Jacobian pattern of shape {pattern.shape} has fewer rows than states; expected a "
-                               "column for each state, and at least as many rows as columns")  # fmt: skip
+            raise FvsolveError(
+                f"a Jacobian pattern of shape {pattern.shape} has fewer rows than states; expected a "
+                "column for each state, and at least as many rows as columns"
+            )
         if self.kind is not None and self.kind not in KINDS:
             near = nearest(str(self.kind), KINDS)
             hint = f'did you mean "{near}"?' if near else f"expected one of {', '.join(KINDS)}"
@@ -102,7 +106,12 @@ class Structure:
         """Structure as one flat array for compiled functions : int64[:], laid out as at the top of this file."""
         counts = np.bincount(self.colors, minlength=self.color_count)
         color_starts = np.concatenate(([0], np.cumsum(counts)))
-        parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
+        parts = [
+            self.pattern.indptr,
+            self.pattern.indices,
+            color_starts,
+            np.argsort(self.colors, kind="stable"),
+        ]
         parts += [np.isin(np.arange(self.n), self.fine), self._own[0]]
         offsets = HEADER + np.cumsum([0] + [part.size for part in parts[:-1]])
         header = [self.n, self.m, self.color_count, *offsets]
@@ -143,10 +152,14 @@ def functions(kind: str, complex: bool) -> tuple:
     """Functions `factor` and `solve` of a kind of structure, compiled for real or complex shifts."""
     module = kind_module(kind)
     letters = (FACTOR_COMPLEX, SOLVE_COMPLEX) if complex else (FACTOR, SOLVE)
-    return tuple(compile_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))
+    return tuple(
+        compile_as(njit(f), kinds)
+        for f, kinds in zip((module.factor, module.solve), letters, strict=True)
+    )
 
 
-PYTHON_ENTRIES = 200  # number of entries below which plain Python is quicker than loading compiled code
+# number of entries below which plain Python is quicker than loading compiled code
+PYTHON_ENTRIES = 200
 
 
 def column_colors(pattern) -> np.ndarray:
@@ -167,8 +180,14 @@ def column_colors(pattern) -> np.ndarray:
     degree[np.diff(pattern.indptr) == 0] = 0
     order = np.argsort(-degree, kind="stable")
     tables = (pattern.indptr, pattern.indices, by_rows.indptr, by_rows.indices, order)
-    function = greedy.py_func if pattern.nnz < PYTHON_ENTRIES and hasattr(greedy, "py_func") else greedy
-    function(*(np.asarray(table, dtype=np.int64) for table in tables), np.full(n + 1, -1, dtype=np.int64), result)
+    function = (
+        greedy.py_func if pattern.nnz < PYTHON_ENTRIES and hasattr(greedy, "py_func") else greedy
+    )
+    function(
+        *(np.asarray(table, dtype=np.int64) for table in tables),
+        np.full(n + 1, -1, dtype=np.int64),
+        result,
+    )
     return result
 
 
@@ -208,10 +227,15 @@ def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
     The increment of a state is 2^-26 max(|y|, scale), with 2^-34 |y| in place of 2^-26 |y| for states marked fine in
     the structure, and 2^-26 |scale| for a negative scale.
     """
-    structure, scale, y_work, out, jacobian = r.structure, r.scale, r.moved, r.out, r.jacobian
+    structure = r.structure
+    scale = r.scale
+    y_work = r.moved
+    out = r.out
+    jacobian = r.jacobian
     n, offset = structure[SIZE], r.control[0]["ledger_offset"]
     starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
-    color_starts, columns = structure[structure[COLOR_STARTS] :], structure[structure[COLOR_COLUMNS] :]
+    color_starts = structure[structure[COLOR_STARTS] :]
+    columns = structure[structure[COLOR_COLUMNS] :]
     fine = structure[structure[FINE] :]
     for j in range(n):
         y_work[j] = y[j]
@@ -221,7 +245,9 @@ def differences(evaluate, handle, r, t, y, f, ledger_rates, f_work):
             if scale[j] < 0.0:
                 y_work[j] = y[j] - ROOT * scale[j]
             else:
-                y_work[j] = y[j] + max((LEAST_ROOT if fine[j] == 1 else ROOT) * abs(y[j]), ROOT * scale[j])
+                y_work[j] = y[j] + max(
+                    (LEAST_ROOT if fine[j] == 1 else ROOT) * abs(y[j]), ROOT * scale[j]
+                )
         # Columns of a colour share no row, so that one call gives the differences of all of them.
         evaluate(handle, r, t, y_work, f_work)
         for e in range(color_starts[color], color_starts[color + 1]):
@@ -251,7 +277,8 @@ def multiply(structure, jacobian, x, product):
             product[rows[p]] += jacobian[p] * x[j]
 
 
-LEAST_PIVOT = 1e-150  # least size of a pivot: its square and the square of its reciprocal are still in range
+# least size of a pivot: its square and the square of its reciprocal are still in range
+LEAST_PIVOT = 1e-150
 
 
 @njit(forceinline=True)
@@ -273,7 +300,9 @@ def bad_row(structure, jacobian):
     An entry is invalid if it is not finite or its size is 1e150 or more. Ledger rows are not tested.
     """
     n = structure[SIZE]
-    last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
+    last = structure[structure[STARTS] + n]
+    rows = structure[structure[ROWS] :]
+    good = True
     # Without a branch this loop is vectorised; the row is sought only if an entry is bad.
     for p in range(last):
         good &= abs(jacobian[p]) < 1.0 / LEAST_PIVOT

@@ -28,9 +28,12 @@ BUILT_IN: set[str] = set()  # names of built-in methods, not available for user 
 EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 FEW_DECIMALS = 3  # decimals with fewer digits, such as 0.25, are not taken for rounded numbers
 DENSE_ERROR = 1e-12  # relative difference of the new state from the dense output at its end
-DIGITS_MOST = 75  # greatest number of digits that count, below the precision of intermediate results
-STAGES_MOST, LETTERS_MOST = 100, 10**6  # greatest number of stages, and of characters in the text of a tableau
-FAULTS_SHOWN, LINE_SHOWN = 20, 120  # greatest number of faults in a message, and length of a line of the text in it
+# greatest number of digits that count, below the precision of intermediate results
+DIGITS_MOST = 75
+# greatest number of stages, and of characters in the text of a tableau
+STAGES_MOST, LETTERS_MOST = 100, 10**6
+# greatest number of faults in a message, and length of a line of the text in it
+FAULTS_SHOWN, LINE_SHOWN = 20, 120
 
 
 class Methods(UserDict):
@@ -45,7 +48,8 @@ class Methods(UserDict):
     def complete(self) -> None:
         """Declare all built-in methods."""
         if self.further:
-            importlib.import_module(self.further)  # another thread waits here until all are declared
+            # another thread waits here until all are declared
+            importlib.import_module(self.further)
             self.further = ""
 
     def __contains__(self, name: object) -> bool:
@@ -225,15 +229,27 @@ class Method:
         if self.exact.start == 0:
             return self._conditions, self.exact.b, self.exact.embedded
         a = [[Fraction(0)] * (self.stages + 1), *([Fraction(0), *row] for row in self.exact.a)]
-        return Conditions(a, self.rounding), [Fraction(0), *self.exact.b], [self.exact.start, *self.exact.embedded]
+        return (
+            Conditions(a, self.rounding),
+            [Fraction(0), *self.exact.b],
+            [self.exact.start, *self.exact.embedded],
+        )
 
 
 @validated(name=TEXT, dense=ROW, start_weight=TEXT, numbers=TABLE, digits=COUNT, source=TEXT)
 def tableau(
-    name: str, text: str | Sequence | None = None, b: Sequence | None = None, c: Sequence | None = None, *,
-    A: Sequence | None = None, source: str = "user", dense: Sequence = (), start_weight: str | None = None,
-    numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None,
-) -> Method:  # fmt: skip
+    name: str,
+    text: str | Sequence | None = None,
+    b: Sequence | None = None,
+    c: Sequence | None = None,
+    *,
+    A: Sequence | None = None,
+    source: str = "user",
+    dense: Sequence = (),
+    start_weight: str | None = None,
+    numbers: Mapping[str, tuple[str, float]] | None = None,
+    digits: int | None = None,
+) -> Method:
     """Define a method by its Butcher array, as text or as A, b, c; afterwards it can be used by its name.
 
     text : rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, for an embedded solution, a second row of weights.
@@ -254,26 +270,36 @@ def tableau(
     """
     METHODS.complete()  # their names are not free
     if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
-        raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
-                           "method; choose another name")  # fmt: skip
+        raise FvsolveError(
+            f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
+            "method; choose another name"
+        )
     if (text is None) == (A is None):
-        raise FvsolveError(f'method "{name}": expected either text or A, as in tableau(name, A=A, b=b)')
+        raise FvsolveError(
+            f'method "{name}": expected either text or A, as in tableau(name, A=A, b=b)'
+        )
     text = A if text is None else text
     if digits is not None and not 1 <= digits <= DIGITS_MOST:
         raise FvsolveError(f"digits = {digits} is out of range; expected 1 to {DIGITS_MOST}")
     if b is not None:
         if isinstance(text, str):
-            raise FvsolveError("b is given twice: as an argument and in the text; expected A, b, c in numbers, or only "
-                               "the text")  # fmt: skip
+            raise FvsolveError(
+                "b is given twice: as an argument and in the text; expected A, b, c in numbers, or only "
+                "the text"
+            )
         text = printed(text, b, c)
     elif not isinstance(text, str):
-        raise FvsolveError(f'method "{name}": b is missing; expected tableau(name, A, b) or tableau(name, A, b, c)')
+        raise FvsolveError(
+            f'method "{name}": b is missing; expected tableau(name, A, b) or tableau(name, A, b, c)'
+        )
     method = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     if method.exact and (faults := estimate_faults(method)):
         raise FvsolveError(_message(name, faults))
     if method.rounded_order is not None:
         warnings.warn(
-            f"{name}: order {method.order}; {rounding_text(text, method.rounded_order)}", RuntimeWarning, stacklevel=3
+            f"{name}: order {method.order}; {rounding_text(text, method.rounded_order)}",
+            RuntimeWarning,
+            stacklevel=3,
         )
     METHODS[name] = method
     return method
@@ -285,7 +311,9 @@ def estimate_faults(method: Method) -> list[str]:
         return []
     (conditions, b, embedded), p = method._pair, method.order
     zero = None
-    if method.error_order == p < ORDER_MOST and not conditions.differ(b, embedded, p + 1, conditions.all_trees(p + 1)):
+    if method.error_order == p < ORDER_MOST and not conditions.differ(
+        b, embedded, p + 1, conditions.all_trees(p + 1)
+    ):
         zero = f"has the error of order h^{p + 1} of the new state, so the error estimate is zero or too small"
     elif not conditions.differ(b, embedded, len(b), conditions.tall_trees()):
         zero = "equals the new state for y' = lambda y, so the error estimate is zero there"
@@ -306,7 +334,8 @@ def _rounded_order(text: str, a: Sequence, b: Sequence, given_digits: int | None
 def rounding_text(text: str, order: int) -> str:
     """Text on the order with exact numbers of a tableau whose text has decimals of few digits."""
     expected = (
-        f"expected fractions, or decimals of {EXACT_DECIMALS + 1} digits or more: shorter decimals count as exact"
+        f"expected fractions, or decimals of {EXACT_DECIMALS + 1} digits or "
+        "more: shorter decimals count as exact"
     )
     return f"with exact numbers in place of decimals of {digits(text)} digits it has order {order}; {expected}"
 
@@ -323,8 +352,15 @@ def method_of_file(path: Path) -> Method:
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
     source, existing = str(path.resolve()), METHODS.get(path.stem)
-    if existing is not None and path.stem not in BUILT_IN and existing.source != source and existing.text != text:
-        raise FvsolveError(f'{path}: "{path.stem}" is another method already, from {existing.source}; rename the file')
+    if (
+        existing is not None
+        and path.stem not in BUILT_IN
+        and existing.source != source
+        and existing.text != text
+    ):
+        raise FvsolveError(
+            f'{path}: "{path.stem}" is another method already, from {existing.source}; rename the file'
+        )
     try:
         return tableau(path.stem, text, source=source)
     except FvsolveError as error:
@@ -336,26 +372,38 @@ def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
     a, b = _numbers("A", a, 2), _numbers("b", b, 2)
     s = a.shape[0]
     if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
-        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}; expected s x s numbers in A and s in b, or two rows "
-                           "of s in b for an embedded solution (s: number of stages)")  # fmt: skip
+        raise FvsolveError(
+            f"A has shape {a.shape}, b {b.shape}; expected s x s numbers in A and s in b, or two rows "
+            "of s in b for an embedded solution (s: number of stages)"
+        )
     if c is None:
         c = [sum(map(_number, row), Fraction(0)) for row in a]
     c = _numbers("c", c, 1)
     if c.shape != (s,):
         raise FvsolveError(f"c has shape {c.shape}; expected {s} numbers")
-    rows = [f"{_entry(left)} | {' '.join(map(_entry, row))}" for left, row in zip(c, a, strict=True)]
+    rows = [
+        f"{_entry(left)} | {' '.join(map(_entry, row))}" for left, row in zip(c, a, strict=True)
+    ]
     return "\n".join([*rows, "---", *(f"| {' '.join(map(_entry, row))}" for row in b)])
 
 
 def _numbers(name: str, value: Sequence, axes: int) -> np.ndarray:
     """Array of the numbers in nested lists, with at least `axes` axes. Raises FvsolveError for other content."""
     if isinstance(value, np.ndarray):
-        value = np.fromiter(value.flat, dtype=object).reshape(value.shape)  # keeps the precision of float32
+        # keeps the precision of float32
+        value = np.fromiter(value.flat, dtype=object).reshape(value.shape)
     array = np.array(value, dtype=object, ndmin=axes) if not _is_ragged(value) else None
-    if array is None or any(isinstance(x, (Sequence, np.ndarray)) and not isinstance(x, str) for x in array.flat):
-        raise FvsolveError(f"{name} has rows of different lengths; expected the same number of entries in all rows")
+    if array is None or any(
+        isinstance(x, (Sequence, np.ndarray)) and not isinstance(x, str) for x in array.flat
+    ):
+        raise FvsolveError(
+            f"{name} has rows of different lengths; expected the same number of entries in all rows"
+        )
     wrong = {place: x for place, x in np.ndenumerate(array) if not is_number(x)}
-    faults = [f"{name}{[*at]} = {show(x.item() if isinstance(x, np.generic) else x)}" for at, x in wrong.items()]
+    faults = [
+        f"{name}{[*at]} = {show(x.item() if isinstance(x, np.generic) else x)}"
+        for at, x in wrong.items()
+    ]
     if faults:
         more = f" and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
         verb = "is not a finite number" if len(faults) == 1 else "are not finite numbers"
@@ -383,9 +431,15 @@ def _entry(x) -> str:
 
 
 def declare(
-    name: str, text: str, source: str, dense: Sequence = (), start_weight: str | None = None,
-    numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None, also: str | None = None,
-) -> Method:  # fmt: skip
+    name: str,
+    text: str,
+    source: str,
+    dense: Sequence = (),
+    start_weight: str | None = None,
+    numbers: Mapping[str, tuple[str, float]] | None = None,
+    digits: int | None = None,
+    also: str | None = None,
+) -> Method:
     """Declare a built-in method, with arguments as for `tableau`; its text is read on first use.
 
     also : second name of the method, within a family of methods
@@ -418,7 +472,9 @@ def method_named(name: str | Method) -> Method:
         return METHODS[name]
     near = nearest(name, METHODS)
     if Path(name).suffix:
-        raise FvsolveError(f'no method named "{name}". For a file: fvsolve.tableau(NAME, Path("{name}").read_text())')
+        raise FvsolveError(
+            f'no method named "{name}". For a file: fvsolve.tableau(NAME, Path("{name}").read_text())'
+        )
     hint = f'; did you mean "{near}"?' if near else f"; methods are {', '.join(METHODS)}"
     raise FvsolveError(f'no method named "{name}"{hint}')
 
@@ -437,7 +493,9 @@ def _exact(method: Method) -> Array:
     if not faults:
         faults += _mixed_roots([*head, *weights]) or _faults(head, weights, method)
     if not faults and method.start_weight is not None and len(weights) == 2:
-        faults.append("a second row of weights and start_weight both define the embedded solution; keep one of them")
+        faults.append(
+            "a second row of weights and start_weight both define the embedded solution; keep one of them"
+        )
     if faults:
         raise FvsolveError(_message(method.name, faults))
     s = len(head)
@@ -464,9 +522,16 @@ def _named_numbers(given: Mapping, faults: list[str]) -> dict:
     """Exact values of the argument `numbers` of `tableau`, by name; faults are added to the list `faults`."""
     numbers = {}
     for name, pair in given.items():
-        valid = isinstance(name, str) and name.isidentifier() and isinstance(pair, Sequence) and len(pair) == 2
+        valid = (
+            isinstance(name, str)
+            and name.isidentifier()
+            and isinstance(pair, Sequence)
+            and len(pair) == 2
+        )
         if not valid or not isinstance(pair[0], str) or not is_number(pair[1]):
-            expected = 'a name, with a polynomial and the value near its root: {"g": ("x^2-2x+1/2", 0.29)}'
+            expected = (
+                'a name, with a polynomial and the value near its root: {"g": ("x^2-2x+1/2", 0.29)}'
+            )
             faults.append(f"numbers: {show(name)} = {show(pair)}; expected {expected}")
             continue
         try:
@@ -481,9 +546,14 @@ def _dense(given: Sequence, b: tuple, numbers: Mapping, faults: list[str]) -> tu
 
     given : argument `dense` of `tableau`; b : weights; numbers : see `_rows`
     """
-    lengths = {len(row) if isinstance(row, (Sequence, np.ndarray)) and not isinstance(row, str) else 0 for row in given}
+    lengths = {
+        len(row) if isinstance(row, (Sequence, np.ndarray)) and not isinstance(row, str) else 0
+        for row in given
+    }
     if len(given) and (len(given) != len(b) or len(lengths) != 1 or lengths == {0}):
-        faults.append(f"dense: expected {len(b)} rows, one for each stage, with equal numbers of coefficients")
+        faults.append(
+            f"dense: expected {len(b)} rows, one for each stage, with equal numbers of coefficients"
+        )
         return ()
     rows = []
     for i, (row, weight) in enumerate(zip(given, b, strict=False), start=1):
@@ -518,7 +588,9 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
 
     numbers : names of irrational numbers and their values; faults are added to the list `faults`
     """
-    head, weights, below = [], [], False
+    head = []
+    weights = []
+    below = False
     for line in text.strip().splitlines():
         line = line.strip()
         shown = line if len(line) <= LINE_SHOWN else f"{line[:LINE_SHOWN]}..."
@@ -553,7 +625,10 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
 
     head, weights : results of `_rows`
     """
-    s, rounding, faults, wrong_sums = len(head), method.rounding, [], []
+    s = len(head)
+    rounding = method.rounding
+    faults = []
+    wrong_sums = []
 
     def differs(row, expected) -> bool:
         total = sum(row, Fraction(0))
@@ -567,7 +642,9 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
         if len(row) > s:
             faults.append(f"row {i} has {len(row)} entries; expected at most {s}")
         elif differs(row, c):
-            wrong_sums.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}")
+            wrong_sums.append(
+                f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}"
+            )
     if not 1 <= len(weights) <= 2 or any(len(row) != s for row in weights):
         text = f"wrong rows of weights below the line; expected one or two rows of {s} numbers"
         longer = [len(row) for row in weights] == [s + 1]
@@ -582,8 +659,10 @@ def _faults(head: list, weights: list, method: Method) -> list[str]:
             wrong_sums[-1] += f"; {rounding_text(method.text, order)}" if order else ""
         faults += wrong_sums
         if len(weights) == 2 and not faults and not _estimates(head, weights, rounding):
-            faults.append("both rows of weights give the same solution, so the error estimate is zero; expected an "
-                          "embedded solution of another order, or a single row of weights")  # fmt: skip
+            faults.append(
+                "both rows of weights give the same solution, so the error estimate is zero; expected an "
+                "embedded solution of another order, or a single row of weights"
+            )
     return faults or wrong_sums
 
 
@@ -609,5 +688,6 @@ def _message(name: str, faults: list[str]) -> str:
 
 def _floats(rows) -> np.ndarray:
     return np.array(
-        [[float(x) for x in row] if isinstance(row, tuple) else float(row) for row in rows], dtype=np.float64
+        [[float(x) for x in row] if isinstance(row, tuple) else float(row) for row in rows],
+        dtype=np.float64,
     )

@@ -15,7 +15,13 @@ from fvsolve.core.kernels.stage_sums import BAD, CHECK, MODE, OFF
 from fvsolve.core.steppers import loop_records as rec
 from fvsolve.core.steppers import run_handle, step_control
 from fvsolve.core.steppers.coefficients import error_of, weights_of
-from fvsolve.core.steppers.event_search import NOWHERE, forget_pace, is_near, update_pace, zero_within
+from fvsolve.core.steppers.event_search import (
+    NOWHERE,
+    forget_pace,
+    is_near,
+    update_pace,
+    zero_within,
+)
 from fvsolve.core.steppers.hidden_stiffness import WINDOW, has_returned
 from fvsolve.core.steppers.ledger import book, book_error
 from fvsolve.core.steppers.output_rows import emit, next_due, row_due
@@ -44,14 +50,17 @@ from fvsolve.jit import inline, njit
 EVENT_TOLERANCE = 1e-13
 # Of long steps: event functions have the rounding of large networks and of Newton, which hides a nearer event.
 SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME = 1e-9, 1e-11
-MOST_SECANTS = 3  # attempts by a line through two values beyond the event; an event function that jumps needs others
-LANDING = 0.25  # value beyond the event at which such a line aims, in tolerances: an event acts from zero on
+# attempts by a line through two values beyond the event; an event function that jumps needs others
+MOST_SECANTS = 3
+# value beyond the event at which such a line aims, in tolerances: an event acts from zero on
+LANDING = 0.25
 MOST_SEARCHES = 8  # for events before an event within the same step
 # attempts of an implicit step by Newton alone at tolerances above LOOSE: shorter steps cost less than sweeps
 UNSWEPT, LOOSE = 5, 3e-6
 # time for which a step goes on after an event function has jumped, as fraction of the step and of the time
 SAME_TIMES, SAME_ROUNDING = 1e-8, 1e-14
-JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
+# fraction of an event function, and of a given step; smaller changes do not count as a jump
+JUMP = 1e-6
 
 
 @njit(forceinline=True)
@@ -122,30 +131,51 @@ def locate(handle, run, r, h, now, new, e):
     step (Newton) of given length: then the stages of the step have several solutions, those of a shorter step only one.
     """
     g, g_new = r.g, r.g_new
-    t, low, high, at_low, past = r.state[0]["t"], 0.0, h, 1.0, event_ratio(g, g_new)
-    guess, at_high, side = h, past, 0
+    t = r.state[0]["t"]
+    low = 0.0
+    high = h
+    at_low = 1.0
+    past = event_ratio(g, g_new)
+    guess = h
+    at_high = past
+    side = 0
     earlier, at_earlier, at_last = 0.0, 1.0, 1.0  # length before `low`; ratios there and at `low`
     width, wider = inf, inf  # of the bracket in the last turn, and in the one before
-    is_slow, extrapolations, farther, at_farther = False, 0, inf, past
+    is_slow = False
+    extrapolations = 0
+    farther = inf
+    at_farther = past
     r.progress[0]["no_sweeps"] = 0
     is_long = r.control[0]["keeps_step"] == 1
-    tolerance, narrow = (SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME * h) if is_long else (EVENT_TOLERANCE, 0.0)
+    tolerance, narrow = (
+        (SLOW_EVENT_TOLERANCE, SLOW_EVENT_TIME * h) if is_long else (EVENT_TOLERANCE, 0.0)
+    )
     beyond = 1e-3 * tolerance * h
     for turn in range(101):
-        done = turn == 100 or past >= -tolerance or high - low <= max(narrow, 4e-16 * max(abs(t), high))
+        done = (
+            turn == 100
+            or past >= -tolerance
+            or high - low <= max(narrow, 4e-16 * max(abs(t), high))
+        )
         if done and guess == high:
             break
         is_slow = is_slow or high - low > 0.5 * wider
-        guess, fall = -inf, (at_earlier - at_last) / (low - earlier) if low > earlier else 0.0
+        guess = -inf
+        fall = (at_earlier - at_last) / (low - earlier) if low > earlier else 0.0
         if not is_slow or is_on_line(past, at_last - fall * (high - low)):
-            guess, extrapolations = high - at_high * (high - low) / (at_high - at_low), 0
+            guess = high - at_high * (high - low) / (at_high - at_low)
+            extrapolations = 0
         elif fall > 0.0 and (extrapolations < 2 or high - low <= 0.5 * width):
             farther = 2.0 if extrapolations == 1 and side < 0 else 1.0
             guess, extrapolations = low + farther * at_last / fall, extrapolations % 2 + 1
         guess += -beyond if side > 0 else beyond  # to the other side of the event
         if not low < guess < high:
             guess, extrapolations = 0.5 * (low + high), 0
-        line = secant(high, past, farther, at_farther, tolerance) if is_long and turn <= MOST_SECANTS else -inf
+        line = (
+            secant(high, past, farther, at_farther, tolerance)
+            if is_long and turn <= MOST_SECANTS
+            else -inf
+        )
         if side > 0 and low < line < high:
             guess = line
         wider, width = width, high - low
@@ -155,17 +185,22 @@ def locate(handle, run, r, h, now, new, e):
         e = call_attempt(r.calls[STEP], handle, run, t, guess, now, new)
         if e == rec.NEWTON_FAILED:
             break
-        add_stored(r, guess, now, new)  # `accept` does it too: rounding must not move the state back before the event
+        # `accept` does it too: rounding must not move the state back before the event
+        add_stored(r, guess, now, new)
         call_events(r.calls[EVENT_FUNCTIONS], t + guess, r.y[new], handle, g_new)
         if done:
             break
         here = event_ratio(g, g_new)
         if here <= 0.0:
             farther, at_farther = high, past
-            high, at_high, past = guess, here, here
+            high = guess
+            at_high = here
+            past = here
             at_low, side = 0.5 * at_low if side > 0 else at_last, 1
         else:
-            earlier, at_earlier, at_last = low, at_last, here
+            earlier = low
+            at_earlier = at_last
+            at_last = here
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else past, -1
     if past < -JUMP and e != rec.NEWTON_FAILED:
@@ -247,7 +282,9 @@ def switches_at_start(handle, r):
         update_pace(r)
         copy(r.g_new, g)
     elif g.size > 0:
-        run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"], r.y[progress["now"]], handle, g)
+        run_handle.call_events(
+            r.calls[run_handle.EVENT_FUNCTIONS], r.state[0]["t"], r.y[progress["now"]], handle, g
+        )
     progress["event_known"] = 0
     if not has_switched(g, r.armed):
         return False
@@ -265,8 +302,14 @@ def evaluate_state(handle, r):
 
     Returns False if the last step is rejected because of these rates, see `reject_end`.
     """
-    progress, t, k, out, structure = r.progress[0], r.state[0]["t"], r.k, r.out, r.structure
-    y, row_blocks, last_stage = r.y[progress["now"]], r.row_blocks, k[k.shape[0] - 1]
+    progress = r.progress[0]
+    t = r.state[0]["t"]
+    k = r.k
+    out = r.out
+    structure = r.structure
+    y = r.y[progress["now"]]
+    row_blocks = r.row_blocks
+    last_stage = k[k.shape[0] - 1]
     # Where the rhs forms the stages, it also searches for NaN: a further pass over memory is saved.
     checked = r.control[0]["kind"] == rec.EXPLICIT and structure.size > 0 and progress["reuse"] == 0
     if progress["reuse"] == 1:
@@ -299,8 +342,15 @@ def reject_end(handle, r):
 
     Returns True if the state at the start of that step is the present state again. The rates are not recorded.
     """
-    state, progress, control, out = r.state[0], r.progress[0], r.control[0], r.out
-    if control["mode"] != rec.TOLERANCE or progress["has_last_step"] == 0 or not state["unbooked"] > 0.0:
+    state = r.state[0]
+    progress = r.progress[0]
+    control = r.control[0]
+    out = r.out
+    if (
+        control["mode"] != rec.TOLERANCE
+        or progress["has_last_step"] == 0
+        or not state["unbooked"] > 0.0
+    ):
         return False
     # NaN in place of an error gives the greatest reduction.
     h = state["last"] * step_control.reduced(control, nan)
@@ -320,7 +370,9 @@ def reject_end(handle, r):
 @inline
 def check_state(r):
     """Book the last step in the ledger if its stages and its end are valid; returns DONE, BAD_VALUE or BAD_STATUS."""
-    out, state, control = r.out, r.state[0], r.control[0]
+    out = r.out
+    state = r.state[0]
+    control = r.control[0]
     if out[rec.STATUS] == rec.NOT_FINITE or not isfinite(out[rec.RATE]):
         return rec.BAD_VALUE
     if r.progress[0]["stage_status"] != 0:
@@ -330,7 +382,16 @@ def check_state(r):
     if state["unbooked"] > 0.0:
         use_slope, b = control["stage_slope"] == 1, weights_of(r.coefficients, r.k.shape[0])
         known = use_slope and r.newton[0]["known_steps"] > 0.0
-        book(state["unbooked"], b, r.ledger_rates, r.dense, use_slope, known, out[control["ledger_offset"] :], r.ledger)
+        book(
+            state["unbooked"],
+            b,
+            r.ledger_rates,
+            r.dense,
+            use_slope,
+            known,
+            out[control["ledger_offset"] :],
+            r.ledger,
+        )
         state["unbooked"] = 0.0
     return rec.DONE
 
@@ -338,7 +399,10 @@ def check_state(r):
 @inline
 def report_stage(r):
     """Write the status of the faulty stage of the last step, and its place, to `out`."""
-    r.out[rec.STATUS], r.out[rec.PLACE] = float(r.progress[0]["stage_status"]), float(r.progress[0]["stage_where"])
+    r.out[rec.STATUS], r.out[rec.PLACE] = (
+        float(r.progress[0]["stage_status"]),
+        float(r.progress[0]["stage_where"]),
+    )
 
 
 @inline
@@ -347,13 +411,17 @@ def finish_last_step(handle, r):
 
     Returns DONE to take the next step, REPEAT where the state has changed, or a reason to return.
     """
-    state, progress, control, out = r.state[0], r.progress[0], r.control[0], r.out
+    state = r.state[0]
+    progress = r.progress[0]
+    control = r.control[0]
+    out = r.out
     # Rows within the step belong to the equations before the switch.
     if progress["has_last_step"] == 1 and next_due(r) <= state["t"]:
         status = emit(handle, r)
         if status != rec.DONE:
             return status
-    if progress["switch_pending"] == 1:  # the rhs has switched: discard the step size and the Jacobian
+    # the rhs has switched: discard the step size and the Jacobian
+    if progress["switch_pending"] == 1:
         set_flags(r.g, r.armed)
         forget_pace(r)
         progress["switch_pending"], progress["phase"] = 0, rec.FRESH
@@ -364,7 +432,9 @@ def finish_last_step(handle, r):
     # a jump arrives now, after events have acted: the next record is of the state after it
     if out[rec.JUMP_TIME] == state["t"]:
         out[rec.STATUS] = rec.ARRIVED
-        run_handle.call_observer(r.calls[run_handle.RECORDER], state["t"], r.y[progress["now"]], out, handle, r.values)
+        run_handle.call_observer(
+            r.calls[run_handle.RECORDER], state["t"], r.y[progress["now"]], out, handle, r.values
+        )
         progress["has_last_step"], progress["phase"] = 0, rec.FRESH
         discard_stages(r)
         return rec.REPEAT
@@ -410,12 +480,16 @@ def reason_to_stop(r):
 @inline
 def take_step(handle, run, r):
     """Take the next step; returns DONE, REPEAT if the rates at its start are missing, or a reason to return."""
-    state, control, progress = r.state[0], r.control[0], r.progress[0]
+    state = r.state[0]
+    control = r.control[0]
+    progress = r.progress[0]
     # Rows 0, 1 and 2 of y hold the present, the last and the new state in turn; row 3 is a stage.
     new, full = 3 - progress["now"] - progress["old"], state["split_remainder"]
     if not full > 0.0:
         # No rest of a divided step is left.
-        full = step_control.next_step(control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale)
+        full = step_control.next_step(
+            control, state, r.out[rec.RATE], r.out[rec.LONGEST_STEP], r.k, r.scale
+        )
     if control["mode"] != rec.TOLERANCE:
         # Error control shortens steps by itself; given steps have to be divided.
         least = step_control.shortest(control, state)
@@ -440,9 +514,16 @@ def take_step(handle, run, r):
 @inline
 def take_fused_steps(handle, r, h):
     """Take fused steps of length h until something is due, or the length of the next step may change."""
-    state, control, progress, out = r.state[0], r.control[0], r.progress[0], r.out
-    address, due, full = r.calls[run_handle.FUSED_CALL], next_due(r), 1.0 - 1e-9
-    rate, closing, jump = out[rec.RATE], out[rec.CLOSING_RATE], out[rec.JUMP_TIME]
+    state = r.state[0]
+    control = r.control[0]
+    progress = r.progress[0]
+    out = r.out
+    address = r.calls[run_handle.FUSED_CALL]
+    due = next_due(r)
+    full = 1.0 - 1e-9
+    rate = out[rec.RATE]
+    closing = out[rec.CLOSING_RATE]
+    jump = out[rec.JUMP_TIME]
     progress["phase"] = rec.FUSED
     while True:
         now, new = progress["now"], 3 - progress["now"] - progress["old"]
@@ -452,9 +533,18 @@ def take_fused_steps(handle, r, h):
         run_handle.call_fused_step(address, t_new, h, r.y[now], r.y[new], out, handle, r.values)
         accept(handle, r, h, False, NEVER)
         # Only these values change the length of the next step.
-        same = out[rec.RATE] == rate and out[rec.CLOSING_RATE] == closing and out[rec.JUMP_TIME] == jump
+        same = (
+            out[rec.RATE] == rate
+            and out[rec.CLOSING_RATE] == closing
+            and out[rec.JUMP_TIME] == jump
+        )
         due_soon = due <= state["t_mark"] + (state["n_mark"] + 1.0) * h
-        if not same or due_soon or h >= (control["end"] - t_new) * full or check_state(r) != rec.DONE:
+        if (
+            not same
+            or due_soon
+            or h >= (control["end"] - t_new) * full
+            or check_state(r) != rec.DONE
+        ):
             return
         store_ledger_rates(r, 0)
         if reason_to_stop(r) != rec.DONE or 0.0 < control["watch_at"] <= state["steps"]:
@@ -465,7 +555,11 @@ def take_fused_steps(handle, r, h):
 def can_use_fused_step(r, h):
     """True if fused steps are allowed, and a step of length h ends before the next row, field or end of the segment."""
     control, state = r.control[0], r.state[0]
-    if control["allow_fused"] == 0 or too_short(control, state, h) or h >= (control["end"] - state["t"]) * (1.0 - 1e-9):
+    if (
+        control["allow_fused"] == 0
+        or too_short(control, state, h)
+        or h >= (control["end"] - state["t"]) * (1.0 - 1e-9)
+    ):
         return False
     return next_due(r) > state["t_mark"] + (state["n_mark"] + 1.0) * h
 
@@ -476,8 +570,13 @@ def find_step(handle, run, r, h, full, due, new):
 
     full : length of the step without regard to due times and jumps [s]
     """
-    state, control, now = r.state[0], r.control[0], r.progress[0]["now"]
-    failure, rate, last, failures = rec.TINY_STEP, r.out[rec.RATE], False, 0
+    state = r.state[0]
+    control = r.control[0]
+    now = r.progress[0]["now"]
+    failure = rec.TINY_STEP
+    rate = r.out[rec.RATE]
+    last = False
+    failures = 0
     unswept = UNSWEPT if control["mode"] == rec.TOLERANCE and control["size"] > LOOSE else 0
     for _ in range(1 << 62):
         rest = control["end"] - state["t"]
@@ -491,7 +590,9 @@ def find_step(handle, run, r, h, full, due, new):
         if too_short(control, state, h) and (not last or failure != rec.TINY_STEP):
             return failure, h, last
         near_kink = rest <= 1e3 * step_control.shortest(control, state)
-        r.progress[0]["no_sweeps"] = 1 if state["last"] > 0.0 and failures < unswept and not near_kink else 0
+        r.progress[0]["no_sweeps"] = (
+            1 if state["last"] > 0.0 and failures < unswept and not near_kink else 0
+        )
         e, length, last = try_step(handle, run, r, h, last, due, now, new, near_kink)
         if e == rec.NEWTON_FAILED:
             # If shorter steps fail too, the last reason is the one to report.
@@ -501,7 +602,11 @@ def find_step(handle, run, r, h, full, due, new):
         elif acceptable(e, near_kink):
             if control["mode"] == rec.TOLERANCE:
                 shortened = last or length == due - state["t"] or length < full
-                is_tested = control["watch"] != 0 and control["keeps_step"] == 1 and control["kind"] == rec.EXPLICIT
+                is_tested = (
+                    control["watch"] != 0
+                    and control["keeps_step"] == 1
+                    and control["kind"] == rec.EXPLICIT
+                )
                 if is_tested and has_returned(r, length, now, new):
                     state["switch_count"] += WINDOW
                 step_control.store_next(control, state, length, e, shortened, failures > 0, rate)
@@ -523,16 +628,24 @@ def try_step(handle, run, r, h, last, due, now, new, near_kink):
     The error is NaN under error control if the rates of a stage are not valid.
     near_kink : True if the segment ends so soon that rounding dominates
     """
-    state, progress, g = r.state[0], r.progress[0], r.g
+    state = r.state[0]
+    progress = r.progress[0]
+    g = r.g
     progress["stage_status"] = 0
-    e = error_with_ledger(r, h, run_handle.call_attempt(r.calls[run_handle.STEP], handle, run, state["t"], h, now, new))
+    e = error_with_ledger(
+        r,
+        h,
+        run_handle.call_attempt(r.calls[run_handle.STEP], handle, run, state["t"], h, now, new),
+    )
     if e == rec.NEWTON_FAILED or not acceptable(e, near_kink):
         return e, h, last
     progress["event_known"] = 1
     # Event functions must see the states with compensated sums, as the next step does.
     end_step(r, h, last, due, now, new)
     if g.size > 0:
-        run_handle.call_events(r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new)
+        run_handle.call_events(
+            r.calls[run_handle.EVENT_FUNCTIONS], progress["t_new"], r.y[new], handle, r.g_new
+        )
     found, length = crossed(g, r.g_new), h
     if found:
         length, e = locate(handle, run, r, h, now, new, e)
@@ -573,7 +686,8 @@ def shorten_to_first(handle, run, r, h, e, found, now, new):
                 if e == rec.NEWTON_FAILED:
                     return h, e, found
                 continue
-        if theta < NOWHERE or stepped:  # no event, or only in the dense output: repeat the step as it was
+        # no event, or only in the dense output: repeat the step as it was
+        if theta < NOWHERE or stepped:
             progress["no_sweeps"], progress["stage_status"] = no_sweeps, 0
             if call_attempt(r.calls[STEP], handle, run, t, h, now, new) == rec.NEWTON_FAILED:
                 return h, rec.NEWTON_FAILED, found
@@ -621,7 +735,9 @@ def end_step(r, h, last, due, now, new):
 @inline
 def accept(handle, r, h, last, due):
     """Make the end of an accepted step the present state."""
-    state, progress, control = r.state[0], r.progress[0], r.control[0]
+    state = r.state[0]
+    progress = r.progress[0]
+    control = r.control[0]
     now, new = progress["now"], 3 - progress["now"] - progress["old"]
     if progress["event_known"] == 0:
         end_step(r, h, last, due, now, new)
@@ -635,13 +751,22 @@ def accept(handle, r, h, last, due):
     state["t"] = progress["t_new"]
     state["steps"] += 1.0
     control["budget"] -= 1.0
-    if r.largest.size > 0 and state["steps"] % rec.GROWTH_CHECK_STEPS == 0.0 and exceeded(handle, r, r.y[new]):
+    if (
+        r.largest.size > 0
+        and state["steps"] % rec.GROWTH_CHECK_STEPS == 0.0
+        and exceeded(handle, r, r.y[new])
+    ):
         control["budget"] = rec.GROWTH_FOUND
     # The next evaluation overwrites the slopes at the start of the step, which rows within it need.
     if next_due(r) <= state["t"] or control["dense_steps"] == 1:
         store_start_slopes(r)
     # At the end of a segment schedules pass to their right limits, so the last stage is no longer valid.
-    reuses = control["fsal"] == 1 and control["mode"] == rec.TOLERANCE and not last and progress["changed"] == 0
+    reuses = (
+        control["fsal"] == 1
+        and control["mode"] == rec.TOLERANCE
+        and not last
+        and progress["changed"] == 0
+    )
     progress["reuse"] = 1 if reuses else 0
     progress["old"], progress["now"], progress["has_last_step"] = now, new, 1
 

@@ -8,7 +8,13 @@ import numpy as np
 
 from fvsolve.case import Case
 from fvsolve.errors import FvsolveError
-from fvsolve.exchange.epanet.part_tables import GRAVITY, WATER_VISCOSITY, WEIGHT, manning_share, rounded_number
+from fvsolve.exchange.epanet.part_tables import (
+    GRAVITY,
+    WATER_VISCOSITY,
+    WEIGHT,
+    manning_share,
+    rounded_number,
+)
 from fvsolve.parts.pipe.part import Pipe
 
 LONGEST_NAME = 31  # of EPANET, in characters
@@ -22,7 +28,8 @@ FORMULAS = {
     "swamee-jain": "D-W",
 }
 REGULATING = {"pressure-reducing": "PRV", "pressure-sustaining": "PSV", "flow-control": "FCV"}
-NEGATION = "1 - other"  # formula of a block that does the opposite of a relay, as the import writes it
+# formula of a block that does the opposite of a relay, as the import writes it
+NEGATION = "1 - other"
 GENERAL_DIAMETER = 100.0  # of a valve whose loss follows a curve [mm]
 HIGH_LEVEL = 1000.0  # greatest level of a tank that has none [m]
 
@@ -59,11 +66,21 @@ class _Export:
         self.minor = GRAVITY / case.gravity  # EPANET divides minor losses by its own gravity
         self.exponents: set[float] = set()
         self.pressures: set[tuple[float, float, float]] = set()
-        writers = {"junction": self.junction, "reservoir": self.reservoir, "tank": self.tank, "inflow": self.inflow}
+        writers = {
+            "junction": self.junction,
+            "reservoir": self.reservoir,
+            "tank": self.tank,
+            "inflow": self.inflow,
+        }
         for name, node in case.nodes.items():
             self.check_name(name, "nodes")
             self.part(name, "nodes", node, writers)
-        writers = {"pipe": self.pipe, "valve": self.valve, "orifice": self.valve, "altitude-valve": self.altitude_valve}
+        writers = {
+            "pipe": self.pipe,
+            "valve": self.valve,
+            "orifice": self.valve,
+            "altitude-valve": self.altitude_valve,
+        }
         writers |= {"check-valve": self.check_valve, "loss-curve": self.loss_curve}
         writers |= dict.fromkeys(REGULATING, self.regulating)
         writers |= {"pump": self.pump, "leak": self.leak}
@@ -86,7 +103,9 @@ class _Export:
         kind = "pipe" if isinstance(part, Pipe) else part.kind  # of any pipe model
         if kind not in writers:
             kinds = ", ".join(writers)
-            self.faults.append(f"{group}.{name}: EPANET has no {kind}; expected {kinds}; leave it out of the case")
+            self.faults.append(
+                f"{group}.{name}: EPANET has no {kind}; expected {kinds}; leave it out of the case"
+            )
             return
         writers[kind](name, part)
 
@@ -97,7 +116,9 @@ class _Export:
 
     def add(self, section: str, *words: Any) -> None:
         """Add a line to a section; numbers with ten digits."""
-        texts = [word if isinstance(word, str) else str(rounded_number(float(word))) for word in words]
+        texts = [
+            word if isinstance(word, str) else str(rounded_number(float(word))) for word in words
+        ]
         self.sections.setdefault(section, []).append(" ".join(texts))
 
     # schedules ------------------------------------------------------------------------------------------------
@@ -120,7 +141,9 @@ class _Export:
         if schedule.kind == "constant":
             return schedule.first * factor, ""
         if schedule.kind != "step":
-            text = f"a schedule of kind {schedule.kind} has no pattern; expected steps, or a constant"
+            text = (
+                f"a schedule of kind {schedule.kind} has no pattern; expected steps, or a constant"
+            )
             self.notes.append(f"{where}: {text}: its first value is written")
             return schedule.first * factor, ""
         count = max(1, math.ceil(self.case.numerics.end / self.step))
@@ -146,8 +169,12 @@ class _Export:
         self.position(name, node)
         if node.required_pressure is not None:
             weight, ambient = WEIGHT, self.case.ambient_pressure
-            least = 0.0 if node.minimum_pressure is None else (node.minimum_pressure - ambient) / weight
-            self.pressures.add((least, (node.required_pressure - ambient) / weight, node.demand_exponent))
+            least = (
+                0.0 if node.minimum_pressure is None else (node.minimum_pressure - ambient) / weight
+            )
+            self.pressures.add(
+                (least, (node.required_pressure - ambient) / weight, node.demand_exponent)
+            )
 
     def inflow(self, name: str, node: Any) -> None:
         base, pattern = self.scheduled(f"nodes.{name}.flow", node.flow, -1e3)
@@ -157,7 +184,9 @@ class _Export:
     def reservoir(self, name: str, node: Any) -> None:
         if node.head is None:
             weight = self.case.properties.density * self.case.gravity
-            first = (node.pressure.first - self.case.ambient_pressure) / weight + self.elevation(name)
+            first = (node.pressure.first - self.case.ambient_pressure) / weight + self.elevation(
+                name
+            )
             self.add("RESERVOIRS", name, first)
         else:
             base, pattern = self.scheduled(f"nodes.{name}.head", node.head, 1.0)
@@ -165,9 +194,18 @@ class _Export:
         self.position(name, node)
 
     def tank(self, name: str, node: Any) -> None:
-        valves = [link for link in self.case.links.values() if link.kind == "altitude-valve" and link.to == name]
-        full = min((valve.full_level for valve in valves if valve.full_level is not None), default=node.height)
-        least = max((valve.empty_level for valve in valves if valve.empty_level is not None), default=0.0)
+        valves = [
+            link
+            for link in self.case.links.values()
+            if link.kind == "altitude-valve" and link.to == name
+        ]
+        full = min(
+            (valve.full_level for valve in valves if valve.full_level is not None),
+            default=node.height,
+        )
+        least = max(
+            (valve.empty_level for valve in valves if valve.empty_level is not None), default=0.0
+        )
         full, curve = full or HIGH_LEVEL, ""
         if hasattr(node.area, "area"):
             curve = self.volume_curve(node.area, full)
@@ -194,7 +232,11 @@ class _Export:
     def loss_formula(self) -> str:
         """Formula of the head loss of all pipes."""
         models = [link.friction for link in self.pipes() if link.friction is not None]
-        found = {FORMULAS[item.model] for item in models if item.model in FORMULAS and item.factor is None}
+        found = {
+            FORMULAS[item.model]
+            for item in models
+            if item.model in FORMULAS and item.factor is None
+        }
         if len(found) > 1:
             text = f"pipes have the formulas {', '.join(sorted(found))}; EPANET has one formula for all pipes"
             self.faults.append(f"links: {text}")
@@ -208,7 +250,9 @@ class _Export:
 
     def pipe(self, name: str, link: Any) -> None:
         friction = link.friction
-        stated = friction is not None and (friction.roughness is not None or friction.coefficient is not None)
+        stated = friction is not None and (
+            friction.roughness is not None or friction.coefficient is not None
+        )
         if not stated or FORMULAS.get(friction.model) != self.formula:
             text = "EPANET needs hazen-williams, chezy-manning, or a roughness"
             self.faults.append(f"links.{name}.friction: {text}; expected one of these models")
@@ -243,7 +287,16 @@ class _Export:
             self.notes.append(
                 f"links.{name}.characteristic: EPANET has none; the loss is that of a linear characteristic"
             )
-        self.add("VALVES", name, link.from_, link.to, diameter, "TCV", self.throttled(loss, first or 1.0), 0.0)
+        self.add(
+            "VALVES",
+            name,
+            link.from_,
+            link.to,
+            diameter,
+            "TCV",
+            self.throttled(loss, first or 1.0),
+            0.0,
+        )
         if first == 0.0:
             self.add("STATUS", name, "CLOSED")
         if opening.kind == "step":
@@ -267,9 +320,14 @@ class _Export:
         """Write a general purpose valve by its curve; its diameter has no effect."""
         weight = self.case.properties.density * self.case.gravity
         per_metre = 1.0 if link.loss.quantity == "head" else weight
-        points = [(1e3 * q, loss / per_metre) for q, loss in zip(link.loss.flow, link.loss.value, strict=True)]
+        points = [
+            (1e3 * q, loss / per_metre)
+            for q, loss in zip(link.loss.flow, link.loss.value, strict=True)
+        ]
         points = [(0.0, 0.0), *points] if points[0][0] > 0.0 else points
-        self.add("VALVES", name, link.from_, link.to, GENERAL_DIAMETER, "GPV", self.curve(points), 0.0)
+        self.add(
+            "VALVES", name, link.from_, link.to, GENERAL_DIAMETER, "GPV", self.curve(points), 0.0
+        )
 
     def regulating(self, name: str, link: Any) -> None:
         kind = REGULATING[link.kind]
@@ -279,7 +337,11 @@ class _Export:
         if schedule.kind != "constant":
             self.notes.append(f"links.{name}.{key}: a schedule is left out: its first value counts")
         weight = WEIGHT
-        setting = 1e3 * schedule.first if kind == "FCV" else (schedule.first - self.case.ambient_pressure) / weight
+        setting = (
+            1e3 * schedule.first
+            if kind == "FCV"
+            else (schedule.first - self.case.ambient_pressure) / weight
+        )
         self.add("VALVES", name, link.from_, link.to, diameter, kind, setting, loss)
 
     def pump(self, name: str, link: Any) -> None:
@@ -304,7 +366,9 @@ class _Export:
             tail = ["PATTERN", self.patterns.setdefault(scaled, f"pattern{len(self.patterns) + 1}")]
         self.add("PUMPS", name, link.from_, link.to, *law, *tail)
         if not link.check_valve:
-            self.notes.append(f"links.{name}: EPANET's pumps have a check valve, this pump has none")
+            self.notes.append(
+                f"links.{name}: EPANET's pumps have a check valve, this pump has none"
+            )
 
     def shape(self, pattern: str) -> tuple[float, ...]:
         return next(shape for shape, name in self.patterns.items() if name == pattern)
@@ -319,21 +383,42 @@ class _Export:
     def control(self, name: str, block: Any) -> None:
         """Write a relay on the level of a tank as two controls; note other blocks that drive a valve or pump."""
         driven = self.driven_by(name)
-        negated = block.control.kind == "function" and block.control.formula == NEGATION and len(block.blocks_read) == 1
+        negated = (
+            block.control.kind == "function"
+            and block.control.formula == NEGATION
+            and len(block.blocks_read) == 1
+        )
         relay = self.case.controls[block.blocks_read[0]] if negated else block
         probe = relay.inputs[0] if relay.inputs else None
-        of_tank = getattr(probe, "quantity", "") == "level" and self.case.nodes[probe.name].kind == "tank"
+        of_tank = (
+            getattr(probe, "quantity", "") == "level" and self.case.nodes[probe.name].kind == "tank"
+        )
         if relay.control.kind != "relay" or not of_tank:
             if driven:
-                self.notes.append(f"controls.{name}: a block of type {block.control.kind} is left out")
+                self.notes.append(
+                    f"controls.{name}: a block of type {block.control.kind} is left out"
+                )
             return
         off, on = relay.control.output
         if negated:
             off, on = 1.0 - off, 1.0 - on
         for link in driven:
             for value, level in ((on, relay.control.on), (off, relay.control.off)):
-                side = "BELOW" if (level == relay.control.on) == (relay.control.on < relay.control.off) else "ABOVE"
-                self.add("CONTROLS", "LINK", link, self.action(link, value), "IF NODE", probe.name, side, level)
+                side = (
+                    "BELOW"
+                    if (level == relay.control.on) == (relay.control.on < relay.control.off)
+                    else "ABOVE"
+                )
+                self.add(
+                    "CONTROLS",
+                    "LINK",
+                    link,
+                    self.action(link, value),
+                    "IF NODE",
+                    probe.name,
+                    side,
+                    level,
+                )
             if (on if relay.control.initial else off) == 0.0:
                 self.add("STATUS", link, "CLOSED")
 
@@ -348,9 +433,13 @@ class _Export:
         """Names of valves and pumps whose opening or speed follows a block."""
         links = self.case.links.items()
         keys = {"valve": "opening", "pump": "speed"}
-        schedules = [(own, getattr(link, keys[link.kind])) for own, link in links if link.kind in keys]
+        schedules = [
+            (own, getattr(link, keys[link.kind])) for own, link in links if link.kind in keys
+        ]
         return [
-            own for own, schedule in schedules if schedule.kind == "control" and schedule.origin == {"control": name}
+            own
+            for own, schedule in schedules
+            if schedule.kind == "control" and schedule.origin == {"control": name}
         ]
 
     # text -----------------------------------------------------------------------------------------------------
@@ -380,17 +469,37 @@ class _Export:
         if abs(self.gravity - 1.0) > 1e-6:
             options.append(("SPECIFIC GRAVITY", self.gravity))
         if self.formula == "D-W":
-            options.append(("VISCOSITY", case.properties.viscosity / case.properties.density / WATER_VISCOSITY))
+            options.append(
+                ("VISCOSITY", case.properties.viscosity / case.properties.density / WATER_VISCOSITY)
+            )
         if self.exponents:
             options.append(("EMITTER EXPONENT", *self.exponents))
         for least, required, exponent in self.pressures:
-            options += [("DEMAND MODEL", "PDA"), ("MINIMUM PRESSURE", least), ("REQUIRED PRESSURE", required),
-                        ("PRESSURE EXPONENT", exponent)]  # fmt: skip
+            options += [
+                ("DEMAND MODEL", "PDA"),
+                ("MINIMUM PRESSURE", least),
+                ("REQUIRED PRESSURE", required),
+                ("PRESSURE EXPONENT", exponent),
+            ]
         for words in options:
             self.add("OPTIONS", *words)
         title = case.title or "fvsolve"
-        order = ("JUNCTIONS", "RESERVOIRS", "TANKS", "PIPES", "PUMPS", "VALVES", "EMITTERS", "PATTERNS", "CURVES",
-                 "STATUS", "CONTROLS", "TIMES", "OPTIONS", "COORDINATES")  # fmt: skip
+        order = (
+            "JUNCTIONS",
+            "RESERVOIRS",
+            "TANKS",
+            "PIPES",
+            "PUMPS",
+            "VALVES",
+            "EMITTERS",
+            "PATTERNS",
+            "CURVES",
+            "STATUS",
+            "CONTROLS",
+            "TIMES",
+            "OPTIONS",
+            "COORDINATES",
+        )
         lines = ["[TITLE]", title, "by fvsolve export"]
         for section in order:
             if section in self.sections:

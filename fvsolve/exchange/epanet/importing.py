@@ -7,7 +7,12 @@ from pathlib import Path
 from fvsolve.case import text
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.exchange.epanet.day import DayTranslation
-from fvsolve.exchange.epanet.network_file import EpanetNetwork, EpanetSolution, read_network, solution_at
+from fvsolve.exchange.epanet.network_file import (
+    EpanetNetwork,
+    EpanetSolution,
+    read_network,
+    solution_at,
+)
 from fvsolve.exchange.epanet.part_tables import DENSITY, GRAVITY, WATER_VISCOSITY
 from fvsolve.exchange.epanet.switching import DAY
 from fvsolve.exchange.epanet.translating import Translation
@@ -63,7 +68,9 @@ def import_network(
     Raises FvsolveError for an invalid hour, if file or toolkit are missing, or if EPANET finds faults in the file.
     """
     if not (math.isfinite(hour) and hour >= 0.0):
-        raise FvsolveError(f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more")
+        raise FvsolveError(
+            f"hour {hour:g} is not valid; expected hours from the start of EPANET's run, 0 or more"
+        )
     network = read_network(Path(path), required_pressure)
     solution = solution_at(network, 0.0 if day else hour).solutions[0]
     if day:
@@ -71,16 +78,28 @@ def import_network(
         title = f"{Path(path).stem} over {'a day' if duration == DAY else f'{duration / 3600.0:g} h'}, from EPANET"
         lines, short = _day_lines(translation), []
     else:
-        time = cell_time([link.length for link in network.links.values() if link.kind == "pipe"], wave_speed)
+        time = cell_time(
+            [link.length for link in network.links.values() if link.kind == "pipe"], wave_speed
+        )
         translation = Translation(network, solution, wave_speed, shortest)
         lengths = translation.lengths
-        short = sorted((name for name, length in lengths.items() if length < wave_speed * time), key=lengths.get)
+        short = sorted(
+            (name for name, length in lengths.items() if length < wave_speed * time),
+            key=lengths.get,
+        )
         title = f"{Path(path).stem} at hour {hour:g}, from EPANET"
         lines = _hour_lines(translation, time, short)
     case_text = _text(Path(path), network, translation, title, lines)
     names = translation.node_names.given, translation.link_names.given
     return Imported(
-        case_text, *names, translation.notes, short, network, solution, translation.causes, translation.start_causes
+        case_text,
+        *names,
+        translation.notes,
+        short,
+        network,
+        solution,
+        translation.causes,
+        translation.start_causes,
     )
 
 
@@ -92,7 +111,9 @@ def cell_time(lengths: list[float], wave_speed: float) -> float:
     return float(f"{max(CELL_TIME, sum(lengths) / wave_speed / MOST_CELLS):.2g}")
 
 
-def _text(path: Path, network: EpanetNetwork, translation: Translation, title: str, closing: list[str]) -> str:
+def _text(
+    path: Path, network: EpanetNetwork, translation: Translation, title: str, closing: list[str]
+) -> str:
     """Text of the case file; closing : its lines after nodes and links"""
     lines = ["#:schema schema.json", "schema = 1", f"title = {text.inline(title)}"]
     description = " ".join(line.strip() for line in network.title)
@@ -106,10 +127,14 @@ def _text(path: Path, network: EpanetNetwork, translation: Translation, title: s
     lines += ["", "[fluid]", 'name = "Water"', 'temperature = "20 degC"', 'law = "linear"']
     lines.append(f'density = "{density:.10g} kg/m3"  # EPANET\'s weight of water')
     if translation.formula == "D-W":
-        lines.append(f'viscosity = "{1e6 * WATER_VISCOSITY * network.options["viscosity"]:.7g} cSt"')
+        lines.append(
+            f'viscosity = "{1e6 * WATER_VISCOSITY * network.options["viscosity"]:.7g} cSt"'
+        )
     for group in ("nodes", "links"):
         lines += ["", f"[{group}]"]
-        lines += [f"{name} = {text.inline(part)}" for name, part in getattr(translation, group).items()]
+        lines += [
+            f"{name} = {text.inline(part)}" for name, part in getattr(translation, group).items()
+        ]
     return "\n".join(lines + closing) + "\n"
 
 
@@ -120,22 +145,42 @@ def _hour_lines(translation: Translation, time: float, short: list[str]) -> list
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes with a shorter travel time get one cell',
-        'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
-        "", "[output]", f"probes = {text.inline(_probes(translation))}", 'units = { flow = "l/s", pressure = "barg" }',
-    ]  # fmt: skip
+        'pipe_model = "auto"'
+        + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
+        "",
+        "[output]",
+        f"probes = {text.inline(_probes(translation))}",
+        'units = { flow = "l/s", pressure = "barg" }',
+    ]
 
 
 def _day_lines(translation: DayTranslation) -> list[str]:
     """Lines of signals, controls, numerics and output for a run over a day."""
     lines = []
     if translation.energy:
-        lines += ["", "[energy]", *(f"{key} = {text.inline(value)}" for key, value in translation.energy.items())]
+        lines += [
+            "",
+            "[energy]",
+            *(f"{key} = {text.inline(value)}" for key, value in translation.energy.items()),
+        ]
     for group in ("signals", "controls"):
         if table := getattr(translation, group):
-            lines += ["", f"[{group}]", *(f"{name} = {text.inline(part)}" for name, part in table.items())]
-    numerics = [f'end = "{translation.end / 3600.0:g} h"', f'pipe_model = "{QUASI_STEADY}"', f"rtol = {DAY_RTOL:g}"]
+            lines += [
+                "",
+                f"[{group}]",
+                *(f"{name} = {text.inline(part)}" for name, part in table.items()),
+            ]
+    numerics = [
+        f'end = "{translation.end / 3600.0:g} h"',
+        f'pipe_model = "{QUASI_STEADY}"',
+        f"rtol = {DAY_RTOL:g}",
+    ]
     probes = f"probes = {text.inline(_probes(translation))}"
-    output = [f'every = "{DAY_ROWS}"', probes, 'units = { flow = "l/s", pressure = "barg", time = "h" }']
+    output = [
+        f'every = "{DAY_ROWS}"',
+        probes,
+        'units = { flow = "l/s", pressure = "barg", time = "h" }',
+    ]
     return [*lines, "", "[numerics]", *numerics, "", "[output]", *output]
 
 

@@ -173,7 +173,10 @@ class EpanetNetwork:
         if index <= 0:
             return 1.0
         values = self.patterns[index - 1][1]
-        return values[math.floor((seconds + self.times["pattern_start"]) / self.times["pattern_step"]) % len(values)]
+        return values[
+            math.floor((seconds + self.times["pattern_start"]) / self.times["pattern_step"])
+            % len(values)
+        ]
 
     def demand_pattern(self, index: int) -> int:
         """Index of the pattern of a demand: the default pattern of the file for the index 0."""
@@ -181,7 +184,10 @@ class EpanetNetwork:
 
     def demand_at(self, node: EpanetNode, seconds: float) -> float:
         """Demand of a junction at a time of the run, from its patterns [m3/s]."""
-        amounts = (base * self.pattern_at(self.demand_pattern(index), seconds) for base, index in node.demands)
+        amounts = (
+            base * self.pattern_at(self.demand_pattern(index), seconds)
+            for base, index in node.demands
+        )
         return self.options["multiplier"] * sum(amounts)
 
 
@@ -236,9 +242,11 @@ def read_network(path: Path, required_pressure: float = 0.0) -> EpanetNetwork:
     links = {entry["name"]: EpanetLink(**entry) for entry in table["links"]}
     if required_pressure:
         table["options"] |= {
-            "pressure_driven": True, "minimum_pressure": 0.0, "required_pressure": required_pressure,
+            "pressure_driven": True,
+            "minimum_pressure": 0.0,
+            "required_pressure": required_pressure,
             "pressure_exponent": 0.5,
-        }  # fmt: skip
+        }
     return EpanetNetwork(
         path,
         title=[readable(line) for line in table["title"]],
@@ -277,9 +285,11 @@ def wntr_folder() -> Path:
 
 
 LIBRARY_FOLDERS = {
-    ("linux", "x86_64"): "linux-x64", ("win32", "amd64"): "windows-x64", ("darwin", "x86_64"): "darwin-x64",
+    ("linux", "x86_64"): "linux-x64",
+    ("win32", "amd64"): "windows-x64",
+    ("darwin", "x86_64"): "darwin-x64",
     ("darwin", "arm64"): "darwin-arm",
-}  # fmt: skip
+}
 
 
 def solution_at(network: EpanetNetwork, hour: float) -> EpanetRun:
@@ -299,10 +309,14 @@ def run_epanet(network: EpanetNetwork, end: int, step: int | None, times: list[i
     """
     request = {"solutions": [{"seconds": end, "step": step, "rows": times}]}
     if network.required_pressure:
-        request |= {"required_pressure": network.required_pressure, "pressure_unit": network.options["pressure_unit"]}
+        request |= {
+            "required_pressure": network.required_pressure,
+            "pressure_unit": network.options["pressure_unit"],
+        }
     library = library_2_2()
     try:
-        reply, version = toolkit_reply(network.path, request | {"library": library}), "2.2" if library else "2.3"
+        reply = toolkit_reply(network.path, request | {"library": library})
+        version = "2.2" if library else "2.3"
     except FvsolveError:  # EPANET 2.2 refuses what is new in 2.3
         if library is None:
             raise
@@ -310,7 +324,11 @@ def run_epanet(network: EpanetNetwork, end: int, step: int | None, times: list[i
     result = reply["solutions"][0]
     if "error" in result:
         raise FvsolveError(f"{network.path.name}: EPANET stops: {result['error']}")
-    solutions = [_solution(network, at, row) for at, row in zip(times, result["rows"], strict=True) if row is not None]
+    solutions = [
+        _solution(network, at, row)
+        for at, row in zip(times, result["rows"], strict=True)
+        if row is not None
+    ]
     if len(solutions) < len(times):
         missing = next(at for at, row in zip(times, result["rows"], strict=True) if row is None)
         text = f"EPANET's run has no results at hour {missing / 3600.0:g}"
@@ -352,17 +370,26 @@ def toolkit_reply(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     if b"\0" in (head := path.read_bytes()[:4096]):
         text = "expected the text file (.inp) that EPANET writes by File > Export > Network"
         raise FvsolveError(f"{path.name} is not a text file, first bytes {head[:8]!r}; {text}")
-    command = python_command(str(Path(toolkit_process.__file__)), str(path.resolve()), json.dumps(request))
+    command = python_command(
+        str(Path(toolkit_process.__file__)), str(path.resolve()), json.dumps(request)
+    )
     try:
         done = subprocess.run(
-            command, capture_output=True, timeout=TIME_LIMIT, check=False, env=python_environment(), cwd="/"
+            command,
+            capture_output=True,
+            timeout=TIME_LIMIT,
+            check=False,
+            env=python_environment(),
+            cwd="/",
         )
     except subprocess.TimeoutExpired:
         text = f"EPANET does not end within {TIME_LIMIT:g} s; expected a network that EPANET itself can run"
         raise FvsolveError(f"{path.name}: {text}") from None
     if done.returncode != 0:
         last = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        text = f"EPANET's toolkit stopped with code {done.returncode}" + (f" ({last[-1]})" if last else "")
+        text = f"EPANET's toolkit stopped with code {done.returncode}" + (
+            f" ({last[-1]})" if last else ""
+        )
         raise FvsolveError(f"{path.name}: {text}; expected a file that EPANET can open")
     reply = json.loads(done.stdout)
     if reply["faults"]:
@@ -401,7 +428,11 @@ def _fault(path: Path, reported: str, places: dict[str, int]) -> str:
 
 def readable(text: str) -> str:
     """Text in which bytes that are not UTF-8 are read as Windows text (code page 1252)."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8") if text.isascii() else _decoded(text)
+    return (
+        text.encode("utf-8", "surrogateescape").decode("utf-8")
+        if text.isascii()
+        else _decoded(text)
+    )
 
 
 def _decoded(text: str) -> str:

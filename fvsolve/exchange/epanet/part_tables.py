@@ -5,13 +5,16 @@ from typing import Any
 
 Part = dict[str, Any]
 
-NO_LOSS = 1e-4  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
+# loss coefficient of an open valve without loss in EPANET: a case needs a positive one
+NO_LOSS = 1e-4
 OPENING = 0.3  # of a regulating valve that acts, at the start of a run with waves
-CONTROL_VALVE_LOSS = 10.0  # loss coefficient of an open control valve (globe), for valves that are shut at the start
+# loss coefficient of an open control valve (globe), for valves that are shut at the start
+CONTROL_VALVE_LOSS = 10.0
 TIME_CONSTANT = "5 s"  # of regulating valves in a run with waves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
 POUND_FORCE, FOOT = 4.4482216152605, 0.3048  # [N], [m]
-WEIGHT = 550.0 / 8.814 * POUND_FORCE / FOOT**3  # EPANET's weight of water, by its power of a pump [N/m3]
+# EPANET's weight of water, by its power of a pump [N/m3]
+WEIGHT = 550.0 / 8.814 * POUND_FORCE / FOOT**3
 LEAST_EFFICIENCY = 0.01  # of pumps, as in EPANET
 GRAVITY = 32.2 * FOOT  # of EPANET, in minor losses and Darcy-Weisbach [m/s2]
 DENSITY = WEIGHT / GRAVITY  # of water [kg/m3]
@@ -21,7 +24,8 @@ ROUNDING = 1e-9  # loss of a curve at no flow that counts as none, over its last
 FAST = 5.0  # velocity in a PBV at the second point of its constant loss [m/s]
 MINOR_LOSS = 0.02517 / FOOT  # head loss over K Q^2 / d^4, of EPANET [s2/m]
 LEAST_SPAN = 0.01  # range of flows of points of a square law that no flow reaches, over the least
-LINE_ERROR, MOST_POINTS = 5e-4, 200  # error of lines between points of a square law [m]; number of points at most
+# error of lines between points of a square law [m]; number of points at most
+LINE_ERROR, MOST_POINTS = 5e-4, 200
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -71,17 +75,31 @@ def tank(elevation: float, area: float, level: float, height: float, position: A
 
     level, height : water level at the start and greatest water level, above the bottom [m]
     """
-    part = {"type": "tank", "elevation": quantity_text(elevation, "m"), "area": quantity_text(area, "m2")}
+    part = {
+        "type": "tank",
+        "elevation": quantity_text(elevation, "m"),
+        "area": quantity_text(area, "m2"),
+    }
     part |= {"level": quantity_text(level, "m"), "height": quantity_text(height, "m")}
     return part | _position(position)
 
 
-def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
+def pipe(
+    ends: tuple[str, str],
+    length: float,
+    diameter: float,
+    friction: Part,
+    minor: float,
+    speed: float,
+) -> Part:
     """Table of a pipe with length [m], diameter [m] and its table of friction.
 
     ends : names of the nodes `from` and `to`; minor : minor loss coefficient; speed : wave speed [m/s]
     """
-    part = _link("pipe", ends) | {"length": quantity_text(length, "m"), "diameter": quantity_text(diameter, "mm")}
+    part = _link("pipe", ends) | {
+        "length": quantity_text(length, "m"),
+        "diameter": quantity_text(diameter, "mm"),
+    }
     part |= {"friction": friction}
     if minor:
         part["minor_loss"] = rounded_number(minor)
@@ -105,7 +123,10 @@ def friction(formula: str, roughness: float, diameter: float) -> Part:
     if formula == "H-W":
         return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
     if formula == "C-M":
-        return {"model": "chezy-manning", "coefficient": rounded_number(roughness * manning_share(diameter))}
+        return {
+            "model": "chezy-manning",
+            "coefficient": rounded_number(roughness * manning_share(diameter)),
+        }
     return {"model": "swamee-jain", "roughness": quantity_text(roughness, "mm")}
 
 
@@ -127,7 +148,10 @@ def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 
 def loss_curve(ends: tuple[str, str], points: list[tuple[float, float]]) -> Part:
     """Table of a link whose head loss follows points of flow [m3/s] and loss [m]."""
     flow, loss = zip(*points, strict=True)
-    keys = {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in loss]}
+    keys = {
+        "flow": [quantity_text(q, "l/s") for q in flow],
+        "head": [quantity_text(h, "m") for h in loss],
+    }
     return _link("loss-curve", ends) | {"loss": keys}
 
 
@@ -146,7 +170,12 @@ def curve(points: list[tuple[float, float]]) -> Part:
     fvsolve and EPANET make the same curve from the points.
     """
     flow, head = zip(*points, strict=True)
-    return {"curve": {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in head]}}
+    return {
+        "curve": {
+            "flow": [quantity_text(q, "l/s") for q in flow],
+            "head": [quantity_text(h, "m") for h in head],
+        }
+    }
 
 
 def power(watts: float) -> Part:
@@ -164,7 +193,12 @@ def check_valve(ends: tuple[str, str], diameter: float, loss: float = 0.0) -> Pa
 
 
 def regulating(
-    kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float, time_constant: str = TIME_CONSTANT
+    kind: str,
+    ends: tuple[str, str],
+    diameter: float,
+    setting: float,
+    loss: float,
+    time_constant: str = TIME_CONSTANT,
 ) -> Part:
     """Table of a regulating valve with diameter [m]; ends : names of the nodes `from` and `to`
 
@@ -187,8 +221,11 @@ def leak(place: str, coefficient: float, exponent: float) -> Part:
     """
     per_pascal = coefficient / (WEIGHT) ** exponent
     return {
-        "type": "leak", "from": place, "coefficient": rounded_number(per_pascal), "exponent": rounded_number(exponent),
-    }  # fmt: skip
+        "type": "leak",
+        "from": place,
+        "coefficient": rounded_number(per_pascal),
+        "exponent": rounded_number(exponent),
+    }
 
 
 def general_losses(curve: list[list[float]]) -> tuple[list[tuple[float, float]], bool]:
@@ -197,7 +234,11 @@ def general_losses(curve: list[list[float]]) -> tuple[list[tuple[float, float]],
     EPANET continues the first section down to no flow, and the last section beyond the last point. No points if the
     loss falls anywhere, or is never above 0.
     """
-    if len(curve) < 2 or curve[-1][1] <= 0.0 or any(b[1] < a[1] for a, b in zip(curve, curve[1:], strict=False)):
+    if (
+        len(curve) < 2
+        or curve[-1][1] <= 0.0
+        or any(b[1] < a[1] for a, b in zip(curve, curve[1:], strict=False))
+    ):
         return [], False
     first = max(k for k, (flow, _) in enumerate(curve[:-1]) if k == 0 or flow <= 0.0)
     (q0, h0), (q1, h1) = curve[first : first + 2]
@@ -212,7 +253,9 @@ def general_losses(curve: list[list[float]]) -> tuple[list[tuple[float, float]],
     return [(0.0, 0.0), (q0 - h0 * (q1 - q0) / (h1 - h0), 0.0), *points[k:]], True
 
 
-def breaker_losses(setting: float, loss: float, diameter: float, most: float) -> list[tuple[float, float]]:
+def breaker_losses(
+    setting: float, loss: float, diameter: float, most: float
+) -> list[tuple[float, float]]:
     """Points of flow [m3/s] and loss [m] of a PBV: its setting [m], or the loss of the open valve if greater.
 
     loss : loss coefficient of the open valve for the velocity in the diameter [m], 0 for none; most : greatest loss [m]

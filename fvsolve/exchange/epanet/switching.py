@@ -60,7 +60,9 @@ class Clause:
 
     def text(self, names: dict[Source, str]) -> str:
         """Formula that is 1 while the clause holds, else 0; names : source -> its name in the formula"""
-        factors = [interval_text(self.intervals)] if self.intervals != ALWAYS or not self.sources else []
+        factors = (
+            [interval_text(self.intervals)] if self.intervals != ALWAYS or not self.sources else []
+        )
         return "*".join([*factors, self.formula(names)] if self.sources else factors)
 
 
@@ -93,7 +95,9 @@ def statements(network: EpanetNetwork, end: float) -> tuple[list[Statement], lis
             found.append(Statement(label, clause, control["link"], tuple(control["action"])))
         except Untranslatable as reason:
             refused.append((str(reason), label))
-    for _, rule in sorted(enumerate(network.rules), key=lambda item: (item[1]["priority"], -item[0])):
+    for _, rule in sorted(
+        enumerate(network.rules), key=lambda item: (item[1]["priority"], -item[0])
+    ):
         label = f"rule {rule['name']}"
         try:
             clause = rule_clause(network, rule["premises"], end)
@@ -101,7 +105,10 @@ def statements(network: EpanetNetwork, end: float) -> tuple[list[Statement], lis
             refused.append((str(reason), label))
             continue
         for side, when in (("else", opposite(clause)), ("then", clause)):
-            found += [Statement(label, when, link, tuple(action), True) for link, action in reversed(rule[side])]
+            found += [
+                Statement(label, when, link, tuple(action), True)
+                for link, action in reversed(rule[side])
+            ]
     return found, refused
 
 
@@ -139,15 +146,22 @@ def rule_clause(network: EpanetNetwork, premises: list[dict[str, Any]], end: flo
 
 def premise_clause(network: EpanetNetwork, premise: dict[str, Any], end: float) -> Clause:
     """Clause of a premise of a rule; raises Untranslatable."""
-    variable, relation, value, name = (premise[key] for key in ("variable", "relation", "value", "name"))
+    variable, relation, value, name = (
+        premise[key] for key in ("variable", "relation", "value", "name")
+    )
     if premise["object"] == "system":
         if variable == "time":
-            return time_clause(relation, [float(value)], (float(value) + PULSE, 2.0 * end + PULSE), end)
+            return time_clause(
+                relation, [float(value)], (float(value) + PULSE, 2.0 * end + PULSE), end
+            )
         if variable == "clocktime":
-            if float(value) >= DAY and relation not in ("=", "<>"):  # 24:00 is after all times of EPANET's clock
+            # 24:00 is after all times of EPANET's clock
+            if float(value) >= DAY and relation not in ("=", "<>"):
                 return interval_clause(ALWAYS if relation in ("<", "<=") else ())
             since = float(value) % DAY  # midnight
-            return time_clause(relation, daily_moments(network, since, end), (since, DAY - since), end)
+            return time_clause(
+                relation, daily_moments(network, since, end), (since, DAY - since), end
+            )
         raise Untranslatable(f"acts by the {variable} of the whole system")
     if premise["object"] == "node":
         return node_clause(network, network.nodes[name], variable, relation, value)
@@ -165,13 +179,18 @@ def premise_clause(network: EpanetNetwork, premise: dict[str, Any], end: float) 
     raise Untranslatable(f"acts by the {variable} of a link")
 
 
-def node_clause(network: EpanetNetwork, node: Any, variable: str, relation: str, value: float) -> Clause:
+def node_clause(
+    network: EpanetNetwork, node: Any, variable: str, relation: str, value: float
+) -> Clause:
     """Clause of a premise on a node, by its level or its head; raises Untranslatable."""
     gravity, length = network.options["gravity"], FOOT if network.us_units else 1.0
-    tolerance = RULE_TOLERANCE * (network.options["pressure_unit"] / gravity if variable == "pressure" else length)
+    tolerance = RULE_TOLERANCE * (
+        network.options["pressure_unit"] / gravity if variable == "pressure" else length
+    )
     if node.kind == "reservoir" or variable not in ("level", "head", "grade", "pressure"):
         raise Untranslatable(f"acts by the {variable} of a {node.kind}")
-    above = value / gravity if variable == "pressure" else value  # the bottom of a tank, or the junction [m]
+    # the bottom of a tank, or the junction [m]
+    above = value / gravity if variable == "pressure" else value
     if variable in ("head", "grade"):
         above -= node.elevation
     if node.kind == "tank":
@@ -190,8 +209,13 @@ def value_clause(source: Source, relation: str, threshold: float, tolerance: flo
     tolerance : by which EPANET's rules are early for > and <, and late for >= and <=
     """
     if relation in ("=", "<>"):
-        inside = combined(True, [_comparison(source, ">=", threshold - tolerance),
-                                 _comparison(source, "<=", threshold + tolerance)])  # fmt: skip
+        inside = combined(
+            True,
+            [
+                _comparison(source, ">=", threshold - tolerance),
+                _comparison(source, "<=", threshold + tolerance),
+            ],
+        )
         return inside if relation == "=" else opposite(inside)
     late = tolerance if relation in (">=", "<") else -tolerance
     return _comparison(source, relation, threshold + late)
@@ -207,9 +231,13 @@ def _comparison(source: Source, relation: str, threshold: float) -> Clause:
 
     levels = ((source[1], relation in (">", ">="), threshold),) if source[0] == "level" else ()
     return Clause(
-        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})", holds, (source,), ALWAYS,
-        compared, levels,
-    )  # fmt: skip
+        lambda names: f"({shown.format(names[source])} {relation} {threshold:.10g})",
+        holds,
+        (source,),
+        ALWAYS,
+        compared,
+        levels,
+    )
 
 
 def daily_moments(network: EpanetNetwork, clock: float, end: float) -> list[float]:
@@ -218,7 +246,9 @@ def daily_moments(network: EpanetNetwork, clock: float, end: float) -> list[floa
     return [first + k * DAY for k in range(-1, int(end // DAY) + 2)]
 
 
-def time_clause(relation: str, moments: list[float], reach: tuple[float, float], end: float) -> Clause:
+def time_clause(
+    relation: str, moments: list[float], reach: tuple[float, float], end: float
+) -> Clause:
     """Clause of a condition on the time.
 
     moments : times at which its threshold is reached [s]; end : end of the run [s]
@@ -236,8 +266,11 @@ def time_clause(relation: str, moments: list[float], reach: tuple[float, float],
 
 def clipped(spans: Iterable[Interval], end: float) -> list[Interval]:
     """Intervals [s] that reach into a run, infinite on the sides where they extend beyond it; end : of the run [s]"""
-    return [(begin if begin > 0.0 else -inf, stop if stop <= end else inf)
-            for begin, stop in spans if stop > 0.0 and begin <= end]  # fmt: skip
+    return [
+        (begin if begin > 0.0 else -inf, stop if stop <= end else inf)
+        for begin, stop in spans
+        if stop > 0.0 and begin <= end
+    ]
 
 
 def interval_clause(spans: Iterable[Interval]) -> Clause:
@@ -255,7 +288,9 @@ def interval_text(spans: Iterable[Interval]) -> str:
     return terms[0] if len(terms) == 1 else f"({' + '.join(terms)})" if terms else "0"
 
 
-def spans_where(parts: list[tuple[Interval, ...]], test: Callable[[float], bool]) -> tuple[Interval, ...]:
+def spans_where(
+    parts: list[tuple[Interval, ...]], test: Callable[[float], bool]
+) -> tuple[Interval, ...]:
     """Intervals in which a test of the time [s] is true; it changes only at the ends of intervals in `parts`."""
     ends = sorted({-inf, inf, *(at for spans in parts for span in spans for at in span)})
     found: list[Interval] = []
@@ -305,9 +340,13 @@ def opposite(clause: Clause) -> Clause:
         source, relation, threshold = clause.compared
         compared = source, OPPOSITE[relation], threshold
     return Clause(
-        lambda names: f"(1 - {clause.text(names)})", lambda values: not clause.holds(values), clause.sources, ALWAYS,
-        compared, tuple(map(other_side, clause.levels)),
-    )  # fmt: skip
+        lambda names: f"(1 - {clause.text(names)})",
+        lambda values: not clause.holds(values),
+        clause.sources,
+        ALWAYS,
+        compared,
+        tuple(map(other_side, clause.levels)),
+    )
 
 
 def other_side(level: Level) -> Level:
@@ -334,9 +373,14 @@ def relay_keys(actions: list[tuple[Clause, Any]], on: Any) -> tuple[str, float, 
     """
     if len(actions) != 2 or {value == on for _, value in actions} != {True, False}:
         return None
-    turns_on, turns_off = (next(clause for clause, value in actions if (value == on) is side)
-                           for side in (True, False))  # fmt: skip
-    if turns_on.compared is None or turns_off.compared is None or {turns_on.intervals, turns_off.intervals} != {ALWAYS}:
+    turns_on, turns_off = (
+        next(clause for clause, value in actions if (value == on) is side) for side in (True, False)
+    )
+    if (
+        turns_on.compared is None
+        or turns_off.compared is None
+        or {turns_on.intervals, turns_off.intervals} != {ALWAYS}
+    ):
         return None
     (source, relation, upper), (other, against, lower) = turns_on.compared, turns_off.compared
     rises = relation in (">", ">=")
@@ -354,19 +398,37 @@ def lacks_dead_band(actions: list[tuple[Clause, Any]]) -> bool:
     """
     reads = [(level, clause, value) for clause, value in actions for level in clause.levels]
     return any(
-        above and not below and tank == other and value != result and high >= low and overlap(first, second)
+        above
+        and not below
+        and tank == other
+        and value != result
+        and high >= low
+        and overlap(first, second)
         for (tank, above, low), first, value in reads
         for (other, below, high), second, result in reads
     )
 
 
-def schedule_keys(actions: list[tuple[Clause, Any]], begins: Any, end: float) -> tuple[list[float], list[Any]]:
+def schedule_keys(
+    actions: list[tuple[Clause, Any]], begins: Any, end: float
+) -> tuple[list[float], list[Any]]:
     """Times [s] and values of a quantity that is switched by the time alone.
 
     actions : pairs (clause, value), of which the last that holds prevails; begins : value before any action
     """
-    ends = {0.0, *(at for clause, _ in actions for span in clause.intervals for at in span if 0.0 < at < end)}
-    times, values, value = [], [], begins
+    ends = {
+        0.0,
+        *(
+            at
+            for clause, _ in actions
+            for span in clause.intervals
+            for at in span
+            if 0.0 < at < end
+        ),
+    }
+    times = []
+    values = []
+    value = begins
     for at in sorted(ends):
         for clause, result in actions:
             value = result if within(at, clause.intervals) else value
@@ -389,7 +451,8 @@ def simplified(actions: list[tuple[Clause, Any]]) -> list[tuple[Clause, Any]]:
             if result == value:
                 clauses.append(clause)
                 break
-            if not all(exclude(clause, other) for other in clauses):  # so that it prevails over an action between
+            # so that it prevails over an action between
+            if not all(exclude(clause, other) for other in clauses):
                 runs.append(([clause], value))
                 break
         else:
@@ -416,7 +479,9 @@ def joined(clauses: list[Clause]) -> list[Clause]:
     """Clauses of which one holds where one of the given clauses holds, one for all thresholds of a source."""
     groups: dict[Any, list[Clause]] = {}
     for clause in clauses:
-        groups.setdefault(clause.compared[:2] if clause.compared is not None else id(clause), []).append(clause)
+        groups.setdefault(
+            clause.compared[:2] if clause.compared is not None else id(clause), []
+        ).append(clause)
     return [group[0] if len(group) == 1 else varying(group) for group in groups.values()]
 
 
@@ -430,19 +495,31 @@ def varying(clauses: list[Clause]) -> Clause:
     parts = [clause.intervals for clause in clauses]
     spans = spans_where(parts, lambda time: any(within(time, part) for part in parts))
     times, values = [], []
-    for begin in sorted({span[0] for part in parts for span in part} | {span[1] for part in parts for span in part}):
+    for begin in sorted(
+        {span[0] for part in parts for span in part} | {span[1] for part in parts for span in part}
+    ):
         active = [clause.compared[2] for clause in clauses if within(begin, clause.intervals)]
-        if active and (not values or farthest(active) != values[-1]):  # without a threshold, the last one remains
+        # without a threshold, the last one remains
+        if active and (not values or farthest(active) != values[-1]):
             times.append(max(begin, 0.0))
             values.append(farthest(active))
     if len(values) == 1:
         clause = _comparison(source, relation, values[0])
-        return Clause(clause.formula, lambda found: any(item.holds(found) for item in clauses), (source,), spans,
-                      clause.compared)  # fmt: skip
+        return Clause(
+            clause.formula,
+            lambda found: any(item.holds(found) for item in clauses),
+            (source,),
+            spans,
+            clause.compared,
+        )
     margin = "margin", ThresholdSteps(source, tuple(times), tuple(values))
     sign = ">" if farthest is max else "<"
-    return Clause(lambda names: f"({names[margin]} {sign} 0)",
-                  lambda found: any(item.holds(found) for item in clauses), (margin,), spans)  # fmt: skip
+    return Clause(
+        lambda names: f"({names[margin]} {sign} 0)",
+        lambda found: any(item.holds(found) for item in clauses),
+        (margin,),
+        spans,
+    )
 
 
 def prevailing(actions: list[tuple[Clause, Any]], names: dict[Source, str]) -> dict[Any, str]:

@@ -84,8 +84,12 @@ class Library:
     def settimeparam(self, project: Any, code: int, value: int) -> None:
         self.call("settimeparam", project, code, ctypes.c_long(value))
 
-    def setdemandmodel(self, project: Any, kind: int, minimum: float, required: float, exponent: float) -> None:
-        self.call("setdemandmodel", project, kind, *map(ctypes.c_double, (minimum, required, exponent)))
+    def setdemandmodel(
+        self, project: Any, kind: int, minimum: float, required: float, exponent: float
+    ) -> None:
+        self.call(
+            "setdemandmodel", project, kind, *map(ctypes.c_double, (minimum, required, exponent))
+        )
 
     def openH(self, project: Any) -> None:
         self.call("openH", project)

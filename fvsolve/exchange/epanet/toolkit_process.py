@@ -20,13 +20,24 @@ from typing import Any
 
 FOOT, INCH, HORSEPOWER = 0.3048, 0.0254, 745.699872
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
-CUBIC_FOOT, GALLON, IMPERIAL_GALLON, ACRE_FOOT = FOOT**3, 3.785411784e-3, 4.54609e-3, 43560.0 * FOOT**3
+CUBIC_FOOT = FOOT**3
+GALLON = 3.785411784e-3
+IMPERIAL_GALLON = 4.54609e-3
+ACRE_FOOT = 43560.0 * FOOT**3
 # Units of flow [m3/s]; EPANET's own factors are rounded to four or five digits
 FLOW_UNITS = {
-    "CFS": CUBIC_FOOT, "GPM": GALLON / MINUTE, "MGD": 1e6 * GALLON / DAY, "IMGD": 1e6 * IMPERIAL_GALLON / DAY,
-    "AFD": ACRE_FOOT / DAY, "LPS": 1e-3, "LPM": 1e-3 / MINUTE, "MLD": 1e3 / DAY, "CMH": 1.0 / HOUR, "CMD": 1.0 / DAY,
+    "CFS": CUBIC_FOOT,
+    "GPM": GALLON / MINUTE,
+    "MGD": 1e6 * GALLON / DAY,
+    "IMGD": 1e6 * IMPERIAL_GALLON / DAY,
+    "AFD": ACRE_FOOT / DAY,
+    "LPS": 1e-3,
+    "LPM": 1e-3 / MINUTE,
+    "MLD": 1e3 / DAY,
+    "CMH": 1.0 / HOUR,
+    "CMD": 1.0 / DAY,
     "CMS": 1.0,
-}  # fmt: skip
+}
 US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
 PSI_PER_FOOT, KPA_PER_PSI, BAR_PER_PSI = 0.4333, 6.895, 0.068948  # EPANET's figures for water
 ACCURACIES, TRIALS = (1e-6, 1e-5), 500  # of EPANET's iteration
@@ -53,23 +64,30 @@ class Units(FlowUnits):
         self.diameter = INCH if self.us else 1e-3
         self.power = HORSEPOWER  # the toolkit states horsepower for files in metric units too
         per_foot = {
-            tk.PSI: PSI_PER_FOOT, tk.KPA: KPA_PER_PSI * PSI_PER_FOOT, tk.METERS: FOOT,
-            tk.BAR: BAR_PER_PSI * PSI_PER_FOOT, tk.FEET: 1.0,
-        }  # fmt: skip
+            tk.PSI: PSI_PER_FOOT,
+            tk.KPA: KPA_PER_PSI * PSI_PER_FOOT,
+            tk.METERS: FOOT,
+            tk.BAR: BAR_PER_PSI * PSI_PER_FOOT,
+            tk.FEET: 1.0,
+        }
         self.pressure = FOOT / per_foot[int(tk.getoption(project, tk.PRESS_UNITS))]
 
 
 def contents(tk: Any, project: Any) -> dict[str, Any]:
     """Contents of an open network file in SI, as plain lists and dictionaries."""
     unit = Units(tk, project)
-    count = {key: tk.getcount(project, getattr(tk, key)) for key in (
-        "NODECOUNT", "LINKCOUNT", "PATCOUNT", "CURVECOUNT", "CONTROLCOUNT", "RULECOUNT")}  # fmt: skip
+    count = {
+        key: tk.getcount(project, getattr(tk, key))
+        for key in ("NODECOUNT", "LINKCOUNT", "PATCOUNT", "CURVECOUNT", "CONTROLCOUNT", "RULECOUNT")
+    }
     return {
         "version": tk.getversion(),
         "title": [line for line in tk.gettitle(project) if line.strip()],
         "units": unit.name,
         "options": _options(tk, project, unit),
-        "times": {name: tk.gettimeparam(project, getattr(tk, code)) for name, code in TIMES.items()},
+        "times": {
+            name: tk.gettimeparam(project, getattr(tk, code)) for name, code in TIMES.items()
+        },
         "patterns": [_pattern(tk, project, k) for k in range(1, count["PATCOUNT"] + 1)],
         "curves": [_curve(tk, project, k) for k in range(1, count["CURVECOUNT"] + 1)],
         "nodes": [_node(tk, project, k, unit) for k in range(1, count["NODECOUNT"] + 1)],
@@ -80,18 +98,33 @@ def contents(tk: Any, project: Any) -> dict[str, Any]:
 
 
 TIMES = {
-    "duration": "DURATION", "hydraulic_step": "HYDSTEP", "pattern_step": "PATTERNSTEP", "pattern_start": "PATTERNSTART",
-    "rule_step": "RULESTEP", "start_clock": "STARTTIME",
-}  # fmt: skip
+    "duration": "DURATION",
+    "hydraulic_step": "HYDSTEP",
+    "pattern_step": "PATTERNSTEP",
+    "pattern_start": "PATTERNSTART",
+    "rule_step": "RULESTEP",
+    "start_clock": "STARTTIME",
+}
 
 
 def _options(tk: Any, project: Any, unit: Units) -> dict[str, Any]:
     kind, minimum, required, exponent = tk.getdemandmodel(project)
-    option = {name: tk.getoption(project, getattr(tk, code)) for name, code in {
-        "formula": "HEADLOSSFORM", "gravity": "SP_GRAVITY", "viscosity": "SP_VISCOS", "multiplier": "DEMANDMULT",
-        "emitter_exponent": "EMITEXPON", "emitter_backflow": "EMITBACKFLOW", "default_pattern": "DEMANDPATTERN",
-        "efficiency": "GLOBALEFFIC", "price": "GLOBALPRICE", "price_pattern": "GLOBALPATTERN",
-        "demand_charge": "DEMANDCHARGE"}.items()}  # fmt: skip
+    option = {
+        name: tk.getoption(project, getattr(tk, code))
+        for name, code in {
+            "formula": "HEADLOSSFORM",
+            "gravity": "SP_GRAVITY",
+            "viscosity": "SP_VISCOS",
+            "multiplier": "DEMANDMULT",
+            "emitter_exponent": "EMITEXPON",
+            "emitter_backflow": "EMITBACKFLOW",
+            "default_pattern": "DEMANDPATTERN",
+            "efficiency": "GLOBALEFFIC",
+            "price": "GLOBALPRICE",
+            "price_pattern": "GLOBALPATTERN",
+            "demand_charge": "DEMANDCHARGE",
+        }.items()
+    }
     quality, _, _, traced = tk.getqualinfo(project)
     return option | {
         "formula": {tk.HW: "H-W", tk.DW: "D-W", tk.CM: "C-M"}[int(option["formula"])],
@@ -103,19 +136,26 @@ def _options(tk: Any, project: Any, unit: Units) -> dict[str, Any]:
         "minimum_pressure": minimum * unit.pressure,
         "required_pressure": required * unit.pressure,
         "pressure_exponent": exponent,
-        "quality": {tk.NONE: "none", tk.CHEM: "chemical", tk.AGE: "age", tk.TRACE: "trace"}[quality],
+        "quality": {tk.NONE: "none", tk.CHEM: "chemical", tk.AGE: "age", tk.TRACE: "trace"}[
+            quality
+        ],
         "traced": traced,
     }
 
 
 def _pattern(tk: Any, project: Any, index: int) -> dict[str, Any]:
-    values = [tk.getpatternvalue(project, index, k) for k in range(1, tk.getpatternlen(project, index) + 1)]
+    values = [
+        tk.getpatternvalue(project, index, k)
+        for k in range(1, tk.getpatternlen(project, index) + 1)
+    ]
     return {"name": tk.getpatternid(project, index), "values": values}
 
 
 def _curve(tk: Any, project: Any, index: int) -> dict[str, Any]:
     """Points of a curve in the units of the file: its kind is not always stated."""
-    points = [tk.getcurvevalue(project, index, k) for k in range(1, tk.getcurvelen(project, index) + 1)]
+    points = [
+        tk.getcurvevalue(project, index, k) for k in range(1, tk.getcurvelen(project, index) + 1)
+    ]
     return {"name": tk.getcurveid(project, index), "points": points}
 
 
@@ -128,19 +168,27 @@ def _node(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
     def value(code: str) -> float:
         return tk.getnodevalue(project, index, getattr(tk, code))
 
-    kind = {tk.JUNCTION: "junction", tk.RESERVOIR: "reservoir", tk.TANK: "tank"}[tk.getnodetype(project, index)]
+    kind = {tk.JUNCTION: "junction", tk.RESERVOIR: "reservoir", tk.TANK: "tank"}[
+        tk.getnodetype(project, index)
+    ]
     node: dict[str, Any] = {
         "name": tk.getnodeid(project, index),
         "kind": kind,
         "elevation": unit.length * value("ELEVATION"),
         "position": None,
     }
-    with contextlib.suppress(Exception):  # the toolkit raises Exception for a node without coordinates
+    # the toolkit raises Exception for a node without coordinates
+    with contextlib.suppress(Exception):
         node["position"] = list(tk.getcoord(project, index))
     if kind == "junction":
         amounts = range(1, tk.getnumdemands(project, index) + 1)
-        node["demands"] = [[unit.flow * tk.getbasedemand(project, index, k), tk.getdemandpattern(project, index, k)]
-                           for k in amounts]  # fmt: skip
+        node["demands"] = [
+            [
+                unit.flow * tk.getbasedemand(project, index, k),
+                tk.getdemandpattern(project, index, k),
+            ]
+            for k in amounts
+        ]
         exponent = tk.getoption(project, tk.EMITEXPON)
         node["emitter"] = value("EMITTER") * unit.flow / unit.pressure**exponent
     elif kind == "reservoir":
@@ -166,7 +214,9 @@ def _link(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
         return tk.getlinkvalue(project, index, getattr(tk, code))
 
     code = tk.getlinktype(project, index)
-    kinds = {tk.CVPIPE: "pipe", tk.PIPE: "pipe", tk.PUMP: "pump"} | {getattr(tk, name): name for name in VALVES}
+    kinds = {tk.CVPIPE: "pipe", tk.PIPE: "pipe", tk.PUMP: "pump"} | {
+        getattr(tk, name): name for name in VALVES
+    }
     kind = kinds[code]
     start, end = tk.getlinknodes(project, index)
     link: dict[str, Any] = {
@@ -201,7 +251,10 @@ def _link(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
             "price_pattern": int(value("PUMP_EPAT")),
         }
     setting = value("INITSETTING")
-    table: dict[str, Any] = {"diameter": unit.diameter * value("DIAMETER"), "minor_loss": value("MINORLOSS")}
+    table: dict[str, Any] = {
+        "diameter": unit.diameter * value("DIAMETER"),
+        "minor_loss": value("MINORLOSS"),
+    }
     if kind == "GPV":
         table["curve"] = _points(tk, project, int(value("GPV_CURVE")), unit.flow, unit.length)
     if kind == "PCV":
@@ -218,7 +271,9 @@ def _setting_unit(kind: str, unit: Units) -> float:
 
 def _control(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
     code, link, setting, node, level = tk.getcontrol(project, index)
-    kind = {tk.LOWLEVEL: "below", tk.HILEVEL: "above", tk.TIMER: "time", tk.TIMEOFDAY: "clock"}[code]
+    kind = {tk.LOWLEVEL: "below", tk.HILEVEL: "above", tk.TIMER: "time", tk.TIMEOFDAY: "clock"}[
+        code
+    ]
     valves = {getattr(tk, name): name for name in VALVES}
     link_code = tk.getlinktype(project, link)
     control = {
@@ -289,10 +344,27 @@ def _rule(tk: Any, project: Any, index: int, unit: Units) -> dict[str, Any]:
 
 
 def _premise(tk: Any, project: Any, rule: int, index: int, unit: Units) -> dict[str, Any]:
-    logic, object_kind, target, variable, relation, status, value = tk.getpremise(project, rule, index)
-    variables = {getattr(tk, f"R_{name}"): name.lower() for name in (
-        "DEMAND", "HEAD", "GRADE", "LEVEL", "PRESSURE", "FLOW", "STATUS", "SETTING", "POWER", "TIME", "CLOCKTIME",
-        "FILLTIME", "DRAINTIME")}  # fmt: skip
+    logic, object_kind, target, variable, relation, status, value = tk.getpremise(
+        project, rule, index
+    )
+    variables = {
+        getattr(tk, f"R_{name}"): name.lower()
+        for name in (
+            "DEMAND",
+            "HEAD",
+            "GRADE",
+            "LEVEL",
+            "PRESSURE",
+            "FLOW",
+            "STATUS",
+            "SETTING",
+            "POWER",
+            "TIME",
+            "CLOCKTIME",
+            "FILLTIME",
+            "DRAINTIME",
+        )
+    }
     name = variables[variable]
     where, kind = "", ""
     if object_kind == tk.R_NODE:
@@ -302,11 +374,26 @@ def _premise(tk: Any, project: Any, rule: int, index: int, unit: Units) -> dict[
         valves = {getattr(tk, name): name for name in VALVES}
         kind = valves.get(tk.getlinktype(project, target), "")
     factor = {
-        "demand": unit.flow, "flow": unit.flow, "head": unit.length, "grade": unit.length, "level": unit.length,
-        "pressure": unit.pressure, "setting": _setting_unit(kind, unit),
-    }.get(name, 1.0)  # fmt: skip
-    relations = {tk.R_EQ: "=", tk.R_NE: "<>", tk.R_LE: "<=", tk.R_GE: ">=", tk.R_LT: "<", tk.R_GT: ">", tk.R_IS: "=",
-                 tk.R_NOT: "<>", tk.R_BELOW: "<", tk.R_ABOVE: ">"}  # fmt: skip
+        "demand": unit.flow,
+        "flow": unit.flow,
+        "head": unit.length,
+        "grade": unit.length,
+        "level": unit.length,
+        "pressure": unit.pressure,
+        "setting": _setting_unit(kind, unit),
+    }.get(name, 1.0)
+    relations = {
+        tk.R_EQ: "=",
+        tk.R_NE: "<>",
+        tk.R_LE: "<=",
+        tk.R_GE: ">=",
+        tk.R_LT: "<",
+        tk.R_GT: ">",
+        tk.R_IS: "=",
+        tk.R_NOT: "<>",
+        tk.R_BELOW: "<",
+        tk.R_ABOVE: ">",
+    }
     states = {tk.R_IS_OPEN: "open", tk.R_IS_CLOSED: "closed", tk.R_IS_ACTIVE: "active"}
     return {
         "or": logic == 3,
@@ -323,7 +410,9 @@ SWITCHED_OFF = (1.0, 2.0)  # EPANET's codes of a link that is closed for a time,
 LINK_VALUES = {"flow": "FLOW", "status": "STATUS", "setting": "SETTING", "loss": "HEADLOSS"}
 
 
-def solution(tk: Any, project: Any, seconds: int, step: int | None, rows: list[int]) -> dict[str, Any]:
+def solution(
+    tk: Any, project: Any, seconds: int, step: int | None, rows: list[int]
+) -> dict[str, Any]:
     """EPANET's solution at times, with all controls and rules.
 
     seconds : end of the run [s]; step : hydraulic step [s], None for that of the file
@@ -378,12 +467,17 @@ def _row(tk: Any, project: Any, nodes: int, links: int, unit: FlowUnits) -> dict
     row = {}
     for name, code in NODE_VALUES.items():
         factor = unit.length if name == "head" else unit.flow
-        row[name] = [factor * tk.getnodevalue(project, k, getattr(tk, code)) for k in range(1, nodes + 1)]
+        row[name] = [
+            factor * tk.getnodevalue(project, k, getattr(tk, code)) for k in range(1, nodes + 1)
+        ]
     for name, code in LINK_VALUES.items():
         factor = {"flow": unit.flow, "loss": unit.length}.get(name, 1.0)
-        row[name] = [factor * tk.getlinkvalue(project, k, getattr(tk, code)) for k in range(1, links + 1)]
+        row[name] = [
+            factor * tk.getlinkvalue(project, k, getattr(tk, code)) for k in range(1, links + 1)
+        ]
     for k in range(1, links + 1):
-        if tk.getlinktype(project, k) == tk.PUMP:  # a pump that lacks head counts as closed, but is not switched off
+        # a pump that lacks head counts as closed, but is not switched off
+        if tk.getlinktype(project, k) == tk.PUMP:
             row["status"][k - 1] = tk.getlinkvalue(project, k, tk.PUMP_STATE) not in SWITCHED_OFF
     return row
 
@@ -395,7 +489,10 @@ def first_version(text: str) -> str:
     computes the shutoff head of the second form as 1.33334 times the head. A line `MULTIPLY factor` of [DEMANDS]
     becomes an option.
     """
-    lines, curves, options, section = text.splitlines(), [], [], ""
+    lines = text.splitlines()
+    curves = []
+    options = []
+    section = ""
     for number, line in enumerate(lines):
         words = line.partition(";")[0].split()
         if words and words[0].startswith("["):
@@ -403,9 +500,15 @@ def first_version(text: str) -> str:
         elif section.startswith("[DEMA") and len(words) == 2 and words[0].upper() == "MULTIPLY":
             lines[number] = ""
             options.append(f"DEMAND MULTIPLIER {words[1]}")
-        elif section.startswith("[PUMP") and len(words) > 3 and (values := _numbers(words[3:])) is not None:
+        elif (
+            section.startswith("[PUMP")
+            and len(words) > 3
+            and (values := _numbers(words[3:])) is not None
+        ):
             lines[number] = _pump_line(words, values, curves)
-    end = next((k for k, line in enumerate(lines) if line.strip().upper().startswith("[END")), len(lines))
+    end = next(
+        (k for k, line in enumerate(lines) if line.strip().upper().startswith("[END")), len(lines)
+    )
     added = ["[CURVES]", *curves, "[OPTIONS]", *options]
     return "\n".join([*lines[:end], *added, *lines[end:]]) + "\n"
 
@@ -449,13 +552,16 @@ def opened(tk: Any, path: str, files: tuple[str, str]) -> tuple[Any, list[str]]:
         tk.close(project)
         found = report_lines(_read(Path(files[0])), "Error")
         return None, [line for line in found if not line.startswith("Error 200")] or [str(error)]
-    if hasattr(tk, "NOCURVE"):  # EPANET 2.3 reads a pump of EPANET 1 with its power alone as a pump without law
+    # EPANET 2.3 reads a pump of EPANET 1 with its power alone as a pump without law
+    if hasattr(tk, "NOCURVE"):
         links = range(1, tk.getcount(project, tk.LINKCOUNT) + 1)
         pumps = [k for k in links if tk.getlinktype(project, k) == tk.PUMP]
         bare = [tk.getlinkid(project, k) for k in pumps if tk.getpumptype(project, k) == tk.NOCURVE]
         if bare:
             tk.close(project)
-            return None, [f"Error 226: no curve or power of pump {name} in [PUMPS] section" for name in bare]
+            return None, [
+                f"Error 226: no curve or power of pump {name} in [PUMPS] section" for name in bare
+            ]
     return project, []
 
 

@@ -43,7 +43,9 @@ def run(path: Path, tanks: list[str], links: list[str], step: int = 2, end: int 
         bottoms = [engine.ENgetnodevalue(node, ELEVATION) for node in nodes]
         engine.ENopenH()
         engine.ENinitH(0)
-        times, heads, states = [], [], []
+        times = []
+        heads = []
+        states = []
         while True:
             times.append(float(engine.ENrunH()))
             heads.append([engine.ENgetnodevalue(node, HEAD) for node in nodes])
@@ -56,5 +58,7 @@ def run(path: Path, tanks: list[str], links: list[str], step: int = 2, end: int 
     switches = []
     for k, name in enumerate(links):
         own = np.array([state[k] for state in states])
-        switches += [(times[i + 1], name, bool(own[i + 1])) for i in np.flatnonzero(own[1:] != own[:-1])]
+        switches += [
+            (times[i + 1], name, bool(own[i + 1])) for i in np.flatnonzero(own[1:] != own[:-1])
+        ]
     return Day(np.array(times), dict(zip(tanks, levels.T, strict=True)), sorted(switches))

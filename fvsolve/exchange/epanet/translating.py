@@ -6,7 +6,12 @@ from typing import Any
 
 from fvsolve.errors import listing
 from fvsolve.exchange.epanet import part_tables
-from fvsolve.exchange.epanet.network_file import EpanetLink, EpanetNetwork, EpanetNode, EpanetSolution
+from fvsolve.exchange.epanet.network_file import (
+    EpanetLink,
+    EpanetNetwork,
+    EpanetNode,
+    EpanetSolution,
+)
 from fvsolve.parts.pipe.part import QUASI_STEADY
 from fvsolve.parts.tolerances import is_head_above, is_shorter_than_rise
 
@@ -19,7 +24,8 @@ RISE_TOLERANCE = 1e-9  # of the rise over the length of a pipe
 SUSTAIN_TOLERANCE = 1e-2  # of the head before a PSV [m]
 SET_TOLERANCE = 1e-6  # of set heads and heads of sources [m]
 LOWEST_HEAD = -9.0  # least set pressure of a case: a head of water near vacuum [m]
-NARROW = 1e-3  # diameter below which a pipe stands for one to be designed: it carries hardly any water [m]
+# diameter below which a pipe stands for one to be designed: it carries hardly any water [m]
+NARROW = 1e-3
 STILL = 1e-6  # velocity below which a pipe counts as still [m/s]
 GRAVITY = part_tables.GRAVITY
 
@@ -63,8 +69,15 @@ class Translation:
     notes : list of (text, EPANET's names)
     """
 
-    def __init__(self, network: EpanetNetwork, solution: EpanetSolution, wave_speed: float, shortest: float) -> None:
-        self.network, self.solution, self.speed, self.shortest = network, solution, wave_speed, shortest
+    def __init__(
+        self, network: EpanetNetwork, solution: EpanetSolution, wave_speed: float, shortest: float
+    ) -> None:
+        self.network, self.solution, self.speed, self.shortest = (
+            network,
+            solution,
+            wave_speed,
+            shortest,
+        )
         self.nodes: dict[str, part_tables.Part] = {}
         self.links: dict[str, part_tables.Part] = {}
         self.lengths: dict[str, float] = {}
@@ -76,7 +89,9 @@ class Translation:
         self.formula, self.gravity = self.option["formula"], self.option["gravity"]
         self.pressure_driven = self.option["pressure_driven"]
         self.elevation = self.elevations()
-        self.widest = max((link.diameter for link in network.links.values() if link.kind == "pipe"), default=1.0)
+        self.widest = max(
+            (link.diameter for link in network.links.values() if link.kind == "pipe"), default=1.0
+        )
         for name in network.nodes:
             self.node_names.add(name)
         for name in network.links:
@@ -126,9 +141,13 @@ class Translation:
         moved is lengthened, see `length`.
         """
         network = self.network
-        result = {name: node.elevation for name, node in network.nodes.items() if node.kind != "reservoir"}
+        result = {
+            name: node.elevation for name, node in network.nodes.items() if node.kind != "reservoir"
+        }
         pipes = [
-            link for link in network.links.values() if link.kind == "pipe" and {link.start, link.end} <= result.keys()
+            link
+            for link in network.links.values()
+            if link.kind == "pipe" and {link.start, link.end} <= result.keys()
         ]
         self.lowered = self.lower_regulated(result)
         for _ in range(MOST_PASSES):
@@ -200,7 +219,11 @@ class Translation:
         return part_tables.reservoir(self.solution.head[node.name], node.position)
 
     def tank(self, node: EpanetNode) -> part_tables.Part:
-        level = node.level if self.solution.seconds == 0.0 else self.solution.head[node.name] - node.elevation
+        level = (
+            node.level
+            if self.solution.seconds == 0.0
+            else self.solution.head[node.name] - node.elevation
+        )
         area = math.pi / 4.0 * node.diameter**2
         if node.volume is not None:
             area = curve_slope(node.volume, level)
@@ -231,10 +254,14 @@ class Translation:
             return self.narrow(link, (start, end))
         if link.check_valve or self.is_shut(link):
             place = self.junction_before_end(link)
-            ours = self.link_names.new(f"{self.link_names.given[link.name]}-{'check' if link.check_valve else 'shut'}")
+            ours = self.link_names.new(
+                f"{self.link_names.given[link.name]}-{'check' if link.check_valve else 'shut'}"
+            )
             last = (place, end)
             shut = part_tables.valve(last, link.diameter, 0.0, opening=0.0)
-            self.links[ours] = part_tables.check_valve(last, link.diameter) if link.check_valve else shut
+            self.links[ours] = (
+                part_tables.check_valve(last, link.diameter) if link.check_valve else shut
+            )
             reason = "check valve" if link.check_valve else "shut at this hour"
             valve = "a check valve" if link.check_valve else "a shut valve"
             self.note(f"{reason}: imported as a pipe with {valve} at its end", link.name)
@@ -243,7 +270,9 @@ class Translation:
 
     def narrow(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a closed pipe that stands for a pipe to be designed, with a diameter of almost 0: a shut valve."""
-        self.note(f"closed pipe narrower than {1e3 * NARROW:g} mm: imported as a shut valve", link.name)
+        self.note(
+            f"closed pipe narrower than {1e3 * NARROW:g} mm: imported as a shut valve", link.name
+        )
         return part_tables.valve(ends, NARROW, 0.0, opening=0.0)
 
     def pipe_table(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
@@ -252,11 +281,16 @@ class Translation:
         length = self.lengths[link.name] = self.length(link)
         if length > link.length:
             law = self.spread(link, length)
-            self.note(f"lengthened to {length:.4g} m; the friction loss is that of the original length", link.name)
+            self.note(
+                f"lengthened to {length:.4g} m; the friction loss is that of the original length",
+                link.name,
+            )
         part = part_tables.pipe(ends, length, link.diameter, law, link.minor_loss, self.speed)
         if link.diameter < NARROW:
             text = f"narrower than {1e3 * NARROW:g} mm, it stands for a pipe to be designed"
-            self.note(f"{text}: imported without waves, which its friction would damp at once", link.name)
+            self.note(
+                f"{text}: imported without waves, which its friction would damp at once", link.name
+            )
             part["pipe_model"] = QUASI_STEADY
         return part
 
@@ -278,7 +312,9 @@ class Translation:
         """
         ratio = link.length / length
         if self.formula == "H-W":
-            return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852), link.diameter)
+            return part_tables.friction(
+                "H-W", link.roughness * ratio ** (-1.0 / 1.852), link.diameter
+            )
         if self.formula == "C-M":
             return part_tables.friction("C-M", link.roughness * math.sqrt(ratio), link.diameter)
         return part_tables.darcy(ratio * self.darcy_factor(link))
@@ -297,7 +333,9 @@ class Translation:
             return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         if link.power is not None and abs(self.solution.flow[link.name]) < STALL_FLOW:
             return self.stalled(link, self.ends(link))
-        return part_tables.pump(self.ends(link), self.head_law(link), self.solution.setting[link.name])
+        return part_tables.pump(
+            self.ends(link), self.head_law(link), self.solution.setting[link.name]
+        )
 
     def stalled(self, link: EpanetLink, ends: tuple[str, str]) -> part_tables.Part:
         """Table of a pump of constant power that has no flow in EPANET: a shut valve."""
@@ -321,7 +359,8 @@ class Translation:
             return begins
         if link.kind == "GPV":
             return ("closed",) if self.is_shut(link) else ("setting", link.setting)
-        if setting == 0.0 and (begins[0] != "setting" or link.setting != 0.0):  # EPANET states 0 for a fixed valve
+        # EPANET states 0 for a fixed valve
+        if setting == 0.0 and (begins[0] != "setting" or link.setting != 0.0):
             return ("closed",) if self.is_shut(link) else ("open",)
         return ("setting", setting)
 
@@ -332,7 +371,9 @@ class Translation:
         acted |= {name for rule in network.rules for name, _ in (*rule["then"], *rule["else"])}
         return link.name in acted
 
-    def valve_table(self, link: EpanetLink, ends: tuple[str, str], state: tuple[Any, ...]) -> part_tables.Part:
+    def valve_table(
+        self, link: EpanetLink, ends: tuple[str, str], state: tuple[Any, ...]
+    ) -> part_tables.Part:
         """Table of a valve between two nodes of the case; state : as from `valve_state`"""
         kind = link.kind
         if kind == "GPV" and state[0] == "setting":
@@ -363,14 +404,18 @@ class Translation:
         share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)  # of a PCV
         return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
 
-    def regulating(self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float) -> part_tables.Part:
+    def regulating(
+        self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float
+    ) -> part_tables.Part:
         """Table of a regulating valve that moves with a time constant."""
         loss = self.full_open_loss(link, diameter)
         text = f"{link.kind}: EPANET states neither a time constant nor a stroke, {part_tables.TIME_CONSTANT} is used"
         if loss > link.minor_loss:
             text += f", and the loss coefficient by which it is {part_tables.OPENING:.0%} open at this hour"
         self.note(text, link.name)
-        return part_tables.regulating(link.kind, ends, diameter, self.set_point(link, setting), loss)
+        return part_tables.regulating(
+            link.kind, ends, diameter, self.set_point(link, setting), loss
+        )
 
     def full_open_loss(self, link: EpanetLink, diameter: float) -> float:
         """Loss coefficient of a regulating valve at full opening, by which it is partly open at this hour if it acts.
@@ -378,9 +423,12 @@ class Translation:
         EPANET's valve has no loss when it is open. It would regulate within a thousandth of its stroke, so it would
         act within microseconds, whatever its time constant.
         """
-        flow, drop = self.solution.flow[link.name], self.solution.head[link.start] - self.solution.head[link.end]
+        flow = self.solution.flow[link.name]
+        drop = self.solution.head[link.start] - self.solution.head[link.end]
         if self.solution.open[link.name] and flow > STALL_FLOW:
-            least = part_tables.OPENING**2 * part_tables.loss_coefficient(max(drop, 0.0), flow, diameter)
+            least = part_tables.OPENING**2 * part_tables.loss_coefficient(
+                max(drop, 0.0), flow, diameter
+            )
             return max(link.minor_loss, least)
         return max(link.minor_loss, part_tables.CONTROL_VALVE_LOSS)
 
@@ -393,9 +441,18 @@ class Translation:
         if points:
             return part_tables.loss_curve(ends, points)
         text = "GPV: the loss of its curve falls as the flow rises"
-        self.note(f"{text}: imported as a valve with the constant loss coefficient of this hour", link.name, True)
-        flow, drop = self.solution.flow[link.name], self.solution.head[link.start] - self.solution.head[link.end]
-        loss = part_tables.loss_coefficient(drop, flow, link.diameter) if flow * drop > 0.0 else link.minor_loss
+        self.note(
+            f"{text}: imported as a valve with the constant loss coefficient of this hour",
+            link.name,
+            True,
+        )
+        flow = self.solution.flow[link.name]
+        drop = self.solution.head[link.start] - self.solution.head[link.end]
+        loss = (
+            part_tables.loss_coefficient(drop, flow, link.diameter)
+            if flow * drop > 0.0
+            else link.minor_loss
+        )
         return part_tables.valve(ends, link.diameter, abs(loss))
 
     def breaker(self, link: EpanetLink, ends: tuple[str, str], setting: float) -> part_tables.Part:
@@ -411,7 +468,9 @@ class Translation:
             return part_tables.valve(ends, self.valve_diameter(link), link.minor_loss)
         heads = self.solution.head.values()
         most = max(heads) - min(heads)
-        points = part_tables.breaker_losses(setting / self.gravity, link.minor_loss, link.diameter, most)
+        points = part_tables.breaker_losses(
+            setting / self.gravity, link.minor_loss, link.diameter, most
+        )
         return part_tables.loss_curve(ends, points)
 
     def bore(self, link: EpanetLink) -> float:
@@ -429,7 +488,8 @@ class Translation:
         widest = self.bore(link)
         if abs(widest - link.diameter) > 1e-6 * widest:
             self.note(
-                "valve without loss coefficient: imported with the diameter of the widest pipe next to it", link.name
+                "valve without loss coefficient: imported with the diameter of the widest pipe next to it",
+                link.name,
             )
         return widest
 
@@ -439,7 +499,9 @@ class Translation:
         sources = [name for name, node in network.nodes.items() if node.kind != "junction"]
         greatest = max(self.solution.head[source] for source in sources)
         head = setting / self.gravity + network.nodes[controlled].elevation
-        pumps = any(other.kind == "pump" and self.may_run(other) for other in network.links.values())
+        pumps = any(
+            other.kind == "pump" and self.may_run(other) for other in network.links.values()
+        )
         return not pumps and is_head_above(head, greatest)
 
     def may_run(self, link: EpanetLink) -> bool:
@@ -472,10 +534,14 @@ class Translation:
             if not node.emitter:
                 continue
             place = self.node_names.given[name]
-            self.links[self.link_names.new(f"{place}-emitter")] = part_tables.leak(place, node.emitter, exponent)
+            self.links[self.link_names.new(f"{place}-emitter")] = part_tables.leak(
+                place, node.emitter, exponent
+            )
             if backflow and self.solution.head[name] < node.elevation:
                 text = "emitter above its pressure: EPANET lets it feed the network, here it has no flow"
-                self.note(f"{text} (`BACKFLOW ALLOWED NO` in EPANET 2.3), so heads differ", name, True)
+                self.note(
+                    f"{text} (`BACKFLOW ALLOWED NO` in EPANET 2.3), so heads differ", name, True
+                )
 
     def join_parts(self) -> None:
         """Join separate networks of the file by shut valves between their sources, since a case is one network."""
@@ -496,7 +562,9 @@ class Translation:
         first, *others = sources.values()
         for other in others:
             ends = self.node_names.given[first], self.node_names.given[other]
-            self.links[self.link_names.new("separate")] = part_tables.valve(ends, self.widest, 0.0, opening=0.0)
+            self.links[self.link_names.new("separate")] = part_tables.valve(
+                ends, self.widest, 0.0, opening=0.0
+            )
             self.note("a separate network: joined to the first by a shut valve", other)
 
     def note_omissions(self) -> None:
@@ -507,9 +575,14 @@ class Translation:
         if self.formula == "C-M":
             text = "EPANET rounds the constants of Manning's formula: each coefficient is changed to the same loss"
             self.note(text, "C-M")
-        study = {"age": "`fvsolve quality`", "trace": "`fvsolve quality --trace NODE`"}.get(self.option["quality"])
+        study = {"age": "`fvsolve quality`", "trace": "`fvsolve quality --trace NODE`"}.get(
+            self.option["quality"]
+        )
         if study:
-            self.note(f"water {self.option['quality']} is computed from a run over a day by {study}", "[QUALITY]")
+            self.note(
+                f"water {self.option['quality']} is computed from a run over a day by {study}",
+                "[QUALITY]",
+            )
         elif self.option["quality"] == "chemical":
             self.note("the chemical and its reactions are not imported", "[QUALITY]")
         if self.network.rewritten:

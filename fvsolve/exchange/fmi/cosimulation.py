@@ -39,8 +39,13 @@ class CoSimulation:
         self.targets, self.variables = free_inputs(self.model), variables_of(self.model)
         names = [probe.text for probe in self.model.probes]
         self.places = [None if item.is_input else names.index(item.name) for item in self.variables]
-        self.aliases = {  # other names of the same key, such as the head and the pressure of a reservoir
-            name: [other for other, its in self.targets.items() if other != name and its.schedule == target.schedule]
+        # other names of the same key, such as the head and the pressure of a reservoir
+        self.aliases = {
+            name: [
+                other
+                for other, its in self.targets.items()
+                if other != name and its.schedule == target.schedule
+            ]
             for name, target in self.targets.items()
         }
         self.state, self.held, self.observed = initial_state(self.model), {}, None
@@ -50,11 +55,15 @@ class CoSimulation:
         print(f"fvsolve FMU {self.instance_name}: {text}", file=sys.stderr, flush=True)
         self.log(text, status, "logStatusWarning" if status == WARNING else "logStatusError")
 
-    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None, tolerance: float | None
+    ) -> None:
         """Check the times of the host against those of the case."""
         numerics = self.model.case.numerics
         if start_time != numerics.start:
-            text = f"the start time is {start_time:g} s, but the case starts at {numerics.start:g} s"
+            text = (
+                f"the start time is {start_time:g} s, but the case starts at {numerics.start:g} s"
+            )
             self.refuse(f"{text}; expected startTime = {numerics.start:g}")
         if stop_time is not None and stop_time > numerics.end:
             text = f"the stop time is {stop_time:g} s; kinks of schedules after numerics.end = {numerics.end:g} s"
@@ -67,9 +76,13 @@ class CoSimulation:
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance to the end of a communication step; False if the run cannot continue, and the state is as before."""
-        if abs(current_time - self.state.t) > max(TIME_TOLERANCE * step_size, 1e-12 * abs(current_time)):
+        if abs(current_time - self.state.t) > max(
+            TIME_TOLERANCE * step_size, 1e-12 * abs(current_time)
+        ):
             text = f"the host is at t = {current_time:.9g} s, and the FMU at {self.state.t:.9g} s"
-            self.refuse(f"{text}; expected equal times; fmi2SetFMUstate goes back to an earlier time")
+            self.refuse(
+                f"{text}; expected equal times; fmi2SetFMUstate goes back to an earlier time"
+            )
         try:
             self.state = advance(self.model, self.state, current_time + step_size, self.held)
         except FvsolveError as error:
@@ -97,7 +110,9 @@ class CoSimulation:
         for reference, value in zip(references, values, strict=True):
             name = self.variables[reference].name
             if name not in self.targets:
-                self.refuse(f"{name} is an output of the FMU, which cannot be set; expected an input")
+                self.refuse(
+                    f"{name} is an output of the FMU, which cannot be set; expected an input"
+                )
             try:
                 number = checked(name, value, self.targets[name])
             except FvsolveError as error:
@@ -126,7 +141,11 @@ class CoSimulation:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         parts = {
-            kind: {name.removeprefix(kind): array for name, array in arrays.items() if name.startswith(kind)}
+            kind: {
+                name.removeprefix(kind): array
+                for name, array in arrays.items()
+                if name.startswith(kind)
+            }
             for kind in ("memory ", "input ")
         }
         state = State(float(arrays["t"]), arrays["y"], parts["memory "])

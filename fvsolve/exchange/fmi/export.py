@@ -72,16 +72,22 @@ def write_fmu(case: Case, path: str | Path | None = None) -> tuple[Path, list[Va
     package = folder_of_pythonfmu()
     variables = variables_of(build(case))
     version, identifier = fvsolve.__version__, identifier_of(case.name)
-    module = f"fvsolve_{re.sub(r'[^0-9A-Za-z]', '_', version)}_slave"  # FMUs of one version share it in a host
+    # FMUs of one version share it in a host
+    module = f"fvsolve_{re.sub(r'[^0-9A-Za-z]', '_', version)}_slave"
     needs = NEEDS.format(version=version)
     files = {f"resources/{name}": data for name, data in case_files(case).items()}
     guid = hashlib.sha256(repr(sorted(files.items())).encode() + version.encode()).hexdigest()[:32]
     description = f"{case.title or case.name}. {needs}"
-    files["modelDescription.xml"] = model_description(case, variables, identifier, guid, version, description)
+    files["modelDescription.xml"] = model_description(
+        case, variables, identifier, guid, version, description
+    )
     files["documentation/index.html"] = documentation(case, variables, needs)
     files[f"resources/{module}.py"] = SLAVE.format(version=version).encode()
     files["resources/slavemodule.txt"] = module.encode()
-    files |= {f"resources/pythonfmu/{file.name}": file.read_bytes() for file in sorted(package.glob("*.py"))}
+    files |= {
+        f"resources/pythonfmu/{file.name}": file.read_bytes()
+        for file in sorted(package.glob("*.py"))
+    }
     for file in sorted((package / "resources" / "binaries").rglob("*.*")):
         files[f"binaries/{file.parent.name}/{identifier}{file.suffix}"] = file.read_bytes()
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +100,9 @@ def write_fmu(case: Case, path: str | Path | None = None) -> tuple[Path, list[Va
 def case_files(case: Case) -> dict[str, bytes]:
     """Resolved case and its files : path in the resources of an FMU -> contents."""
     files = {f"{CASE_FOLDER}/{case.name}.toml": case.resolved().encode()}
-    return files | {f"{CASE_FOLDER}/{name}": Path(source).read_bytes() for name, source in case.copies.items()}
+    return files | {
+        f"{CASE_FOLDER}/{name}": Path(source).read_bytes() for name, source in case.copies.items()
+    }
 
 
 def folder_of_pythonfmu() -> Path:
@@ -102,7 +110,9 @@ def folder_of_pythonfmu() -> Path:
     try:
         return Path(import_module("pythonfmu").__file__).parent
     except ImportError:
-        raise FvsolveError('an FMU needs the package PythonFMU: pip install "fvsolve[fmi]"') from None
+        raise FvsolveError(
+            'an FMU needs the package PythonFMU: pip install "fvsolve[fmi]"'
+        ) from None
 
 
 def identifier_of(name: str) -> str:

@@ -19,12 +19,23 @@ def model_description(
     """
     numerics = case.numerics
     root = Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=case.name, guid=guid, description=description,
-        generationTool=f"fvsolve {version}", variableNamingConvention="flat",
-    )  # fmt: skip
-    options = {"canHandleVariableCommunicationStepSize": "true", "canGetAndSetFMUstate": "true",
-               "canSerializeFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}  # fmt: skip
-    SubElement(root, "CoSimulation", modelIdentifier=identifier, needsExecutionTool="true", **options)
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=case.name,
+        guid=guid,
+        description=description,
+        generationTool=f"fvsolve {version}",
+        variableNamingConvention="flat",
+    )
+    options = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "canNotUseMemoryManagementFunctions": "true",
+    }
+    SubElement(
+        root, "CoSimulation", modelIdentifier=identifier, needsExecutionTool="true", **options
+    )
     root.append(unit_definitions(variables))
     categories = SubElement(root, "LogCategories")
     for name in LOG_CATEGORIES:
@@ -49,11 +60,19 @@ def variable_element(variable: Variable, reference: int) -> Element:
     """Element of a variable; reference : its value reference."""
     causality = "input" if variable.is_input else "output"
     element = Element(
-        "ScalarVariable", name=variable.name, valueReference=str(reference), description=variable.description,
-        causality=causality, variability="continuous",
-    )  # fmt: skip
+        "ScalarVariable",
+        name=variable.name,
+        valueReference=str(reference),
+        description=variable.description,
+        causality=causality,
+        variability="continuous",
+    )
     numbers = {"start": variable.start, "min": variable.least, "max": variable.greatest}
-    given = {key: repr(float(value)) for key, value in numbers.items() if value is not None and math.isfinite(value)}
+    given = {
+        key: repr(float(value))
+        for key, value in numbers.items()
+        if value is not None and math.isfinite(value)
+    }
     if variable.unit:
         given["unit"] = variable.unit
     if variable.display is not None:
@@ -73,7 +92,13 @@ def unit_definitions(variables: list[Variable]) -> Element:
         if variable.display is not None:
             name, factor, offset = variable.display
             if known[variable.unit].find(f"DisplayUnit[@name='{name}']") is None:
-                SubElement(known[variable.unit], "DisplayUnit", name=name, factor=repr(factor), offset=repr(offset))
+                SubElement(
+                    known[variable.unit],
+                    "DisplayUnit",
+                    name=name,
+                    factor=repr(factor),
+                    offset=repr(offset),
+                )
     return section
 
 

@@ -40,9 +40,10 @@ def free_inputs(model: Model) -> dict[str, Input]:
     """
     schedules = model.tables.schedules
     return {
-        name: target for name, target in inputs_of(model).items()
+        name: target
+        for name, target in inputs_of(model).items()
         if target.held is None and schedules[target.schedule]["pieces"] != 0  # 0: follows a control
-    }  # fmt: skip
+    }
 
 
 def variables_of(model: Model) -> list[Variable]:
@@ -55,19 +56,31 @@ def variables_of(model: Model) -> list[Variable]:
     for name, target in free_inputs(model).items():
         value, sort = input_value(model, start, model.start, target), target.sort
         if math.isfinite(value):  # without gravity there is no head
-            inputs.append(Variable(name, unit_name(sort.unit), sort.expected, value, sort.least, sort.greatest))
-    taken, stated = {variable.name for variable in inputs}, {probe.text for probe in model.case.output.probes}
-    faults = [shared_name(probe) for probe in model.probes if probe.text in taken and probe.text in stated]
+            inputs.append(
+                Variable(
+                    name, unit_name(sort.unit), sort.expected, value, sort.least, sort.greatest
+                )
+            )
+    taken = {variable.name for variable in inputs}
+    stated = {probe.text for probe in model.case.output.probes}
+    faults = [
+        shared_name(probe) for probe in model.probes if probe.text in taken and probe.text in stated
+    ]
     if faults:
         raise CaseError(faults, f"{model.case.name}.toml")
-    outputs = [output_variable(model.case, probe) for probe in model.probes if probe.text not in taken]
+    outputs = [
+        output_variable(model.case, probe) for probe in model.probes if probe.text not in taken
+    ]
     return inputs + list({variable.name: variable for variable in outputs}.values())
 
 
 def shared_name(probe) -> Fault:
     """Fault of a probe with the name of an input."""
     text = f'"{probe.text}" is the name of an input and of a probe, and variables of an FMU cannot share a name'
-    return Fault("output.probes", f'{text}; expected "{probe.part}.{probe.text}" for the probe, or no such probe')
+    return Fault(
+        "output.probes",
+        f'{text}; expected "{probe.part}.{probe.text}" for the probe, or no such probe',
+    )
 
 
 def unit_name(si: str) -> str:
@@ -81,6 +94,9 @@ def output_variable(case, probe) -> Variable:
     text = f"{probe.quantity.replace('_', ' ')} of {probe.name}"
     stated, display = case.unit_of(probe.dimension), None
     if not probe.unit and stated != unit and probe.dimension != "number":
-        offset, unity = (units.convert(value, probe.dimension, stated, case.ambient_pressure) for value in (0.0, 1.0))
+        offset, unity = (
+            units.convert(value, probe.dimension, stated, case.ambient_pressure)
+            for value in (0.0, 1.0)
+        )
         display = stated, float(unity - offset), float(offset)
     return Variable(probe.text, unit, text, display=display)

@@ -7,8 +7,23 @@ from fvsolve.jit import add_sources
 
 FOLDER = Path(__file__).parent
 # of files without compiled functions
-UNCOMPILED_PREFIXES = ("part", "lower", "feature", "pattern", "accounts", "facts", "held", "__init__")
-COMPILED = [path for path in sorted(FOLDER.rglob("*.py")) if not path.name.startswith(UNCOMPILED_PREFIXES)]
+UNCOMPILED_PREFIXES = (
+    "part",
+    "lower",
+    "feature",
+    "pattern",
+    "accounts",
+    "facts",
+    "held",
+    "__init__",
+)
+COMPILED = [
+    path for path in sorted(FOLDER.rglob("*.py")) if not path.name.startswith(UNCOMPILED_PREFIXES)
+]
 
 # functions of basins call those of scalars
-add_sources(FOLDER, *(str(path.relative_to(FOLDER)) for path in COMPILED), called=[Path(scalars.__file__).parent])
+add_sources(
+    FOLDER,
+    *(str(path.relative_to(FOLDER)) for path in COMPILED),
+    called=[Path(scalars.__file__).parent],
+)

@@ -17,7 +17,9 @@ def energy_refusal(case, feature) -> str:
         text = f"the energy of water through driven patches ({listing(driven)}) is not supported"
         return f"{text}; expected walls, open sides, or links"
     if conduits := [name for name, link in case.links.items() if link.kind == "conduit"]:
-        return f"the energy of conduits ({listing(conduits)}) is not supported; expected other links"
+        return (
+            f"the energy of conduits ({listing(conduits)}) is not supported; expected other links"
+        )
     if basins and not case.law.linear:
         return 'the energy of basins is computed for law = "linear" only; expected this density law'
     return ""
@@ -38,4 +40,6 @@ def end_accounts(accounts, basins: list) -> None:
         accounts.hold(basin.name, "basin", at + 3)
         if basin.part.on is not None:
             accounts.add("law", basin.name, "basin", at + 4)
-        accounts.accounts.append(Account("scheme", basin.name, "basin", tuple(range(at, at + 5)), (1, *[-1] * 4)))
+        accounts.accounts.append(
+            Account("scheme", basin.name, "basin", tuple(range(at, at + 5)), (1, *[-1] * 4))
+        )

@@ -28,8 +28,10 @@ from fvsolve.core.kernels.dtypes import MUSCL, UPWIND
 from fvsolve.core.kernels.reconstruction import by_limiter, minmod, slope
 from fvsolve.jit import inline, njit
 
-THIN = 1e-6  # least depth in rates, which limit the step: flows through thinner films are far below those of waves [m]
-DRY = 1e-14  # depth below which values fade to zero [m]: there the rounding of amounts and depths decides them
+# least depth in rates, which limit the step: flows through thinner films are far below those of waves [m]
+THIN = 1e-6
+# depth below which values fade to zero [m]: there the rounding of amounts and depths decides them
+DRY = 1e-14
 
 
 class AdvectionGrid(NamedTuple):
@@ -180,7 +182,9 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
         q[1] = by_scheme(single_face_value, scheme, limiter, factor * flow[1] > 0.0, *cells)
     if nx > 2:
         cells = c[nx - 3], c[nx - 2], c[nx - 1], 2.0 * after - c[nx - 1]
-        q[nx - 1] = by_scheme(single_face_value, scheme, limiter, factor * flow[nx - 1] > 0.0, *cells)
+        q[nx - 1] = by_scheme(
+            single_face_value, scheme, limiter, factor * flow[nx - 1] > 0.0, *cells
+        )
 
 
 @inline
@@ -196,7 +200,9 @@ def north_values_and_rates(limiter, face_value, factor, kx, ky, cells, flows, va
     for i in range(rate.size):
         q = face_value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
         qn[i] = q
-        rate[i] = cell_rate(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+        rate[i] = cell_rate(
+            factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q
+        )
 
 
 @njit
@@ -210,19 +216,25 @@ def second_order_rates(scheme, limiter, grid, begin, until, flows, c, work, rate
     nx, ny, _, stop, kx, ky = grid
     factor, flow_x, flow_y, outside = flows
     fresh = begin == grid.begin
-    below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
+    below = work[:nx]
+    above = work[nx : 2 * nx]
+    north = work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
     last = (ny - 1) * nx
     for i in range(nx if fresh else 0):
         rows[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
         north[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
         below[i], above[i] = 2.0 * rows[i] - c[i], 2.0 * north[i] - c[last + i]
-    first = max(begin - 1, 0) if fresh else begin  # only for values at its northern faces; its rate may be wrong
-    for j in range(first - 1 if fresh else begin, until):  # values along a row are computed one row ahead
+    # only for values at its northern faces; its rate may be wrong
+    first = max(begin - 1, 0) if fresh else begin
+    # values along a row are computed one row ahead
+    for j in range(first - 1 if fresh else begin, until):
         if j < stop - 1:
             k = j + 1
             fx, qx = flow_x[k * (nx + 1) :], rest[(k % 2) * (nx + 2) :]
-            row_values(scheme, limiter, nx, factor, fx, c[k * nx :], outside[k], outside[ny + k], qx)
+            row_values(
+                scheme, limiter, nx, factor, fx, c[k * nx :], outside[k], outside[ny + k], qx
+            )
         if j >= first:
             a, z = j * nx, (j + 1) * nx
             b = c[a - nx : a] if j > 0 else below
@@ -230,9 +242,22 @@ def second_order_rates(scheme, limiter, grid, begin, until, flows, c, work, rate
             e = c[z + nx : z + 2 * nx] if j < ny - 2 else above if j < ny - 1 else north
             fx, qx = flow_x[j * (nx + 1) :], rest[(j % 2) * (nx + 2) :]
             qs, qn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx :]
-            cells, around, values = (b, c[a:], d, e), (fx, flow_y[a:], flow_y[z:]), (qx, qs, qn)
+            cells = (b, c[a:], d, e)
+            around = (fx, flow_y[a:], flow_y[z:])
+            values = (qx, qs, qn)
             row = rate[a:z]
-            by_scheme(north_values_and_rates, scheme, limiter, factor, kx, ky[j], cells, around, values, row)
+            by_scheme(
+                north_values_and_rates,
+                scheme,
+                limiter,
+                factor,
+                kx,
+                ky[j],
+                cells,
+                around,
+                values,
+                row,
+            )
 
 
 @njit
@@ -264,7 +289,10 @@ def add_row_diffusion(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, to
     wx, ws, wn : conductances of faces across x, and of the southern and northern faces
     top : greatest rate of each column so far [1/s], updated here
     """
-    w, e, ww, we = p, p[2:], wx, wx[1:]
+    w = p
+    e = p[2:]
+    ww = wx
+    we = wx[1:]
     for i in range(rate.size):
         x = kx[i] * (we[i] * (e[i] - here[i]) - ww[i] * (here[i] - w[i]))
         y = ky * (wn[i] * (north[i] - here[i]) - ws[i] * (here[i] - south[i]))
@@ -294,17 +322,30 @@ def grid_diffusion(grid, diffusivity, flows, depth, s, work, rate):
     if depth.size > 0:
         stencil_values(grid, s, depth, work)
         c = work[: nx * ny]
-    p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
-    rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
-    below, above, most = beyond[:nx], beyond[nx:], 0.0
+    p = rest[: nx + 2]
+    wx = rest[nx + 2 : 2 * nx + 3]
+    rest = rest[2 * nx + 3 :]
+    rows = rest[: 2 * nx]
+    beyond = rest[2 * nx : 4 * nx]
+    top = rest[4 * nx : 5 * nx]
+    below = beyond[:nx]
+    above = beyond[nx:]
+    most = 0.0
     inflow_factor = 2.0 * diffusivity if depth.size == 0 else 0.0
     for i in range(nx):
-        below[i], rows[i] = outside[2 * ny + i], ky[0] * inflow_factor if factor * flow_y[i] > 0.0 else 0.0
+        below[i], rows[i] = (
+            outside[2 * ny + i],
+            ky[0] * inflow_factor if factor * flow_y[i] > 0.0 else 0.0,
+        )
         above[i], top[i] = outside[2 * ny + nx + i], 0.0
     for j in range(max(begin - 1, 0), stop):
-        a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
+        a = j * nx
+        z = (j + 1) * nx
+        f = j * (nx + 1)
         h, hn = depth[a:], depth[z:]
-        inner_p, row, inner_w = p[1:], c[a:], wx[1:nx]
+        inner_p = p[1:]
+        row = c[a:]
+        inner_w = wx[1:nx]
         for i in range(nx):
             inner_p[i] = row[i]
         p[0], p[nx + 1] = outside[j], outside[ny + j]

@@ -26,13 +26,26 @@ import numpy as np
 from fvsolve.core.kernels.dtypes import UPWIND
 from fvsolve.features.basins import cell_sides as side
 from fvsolve.features.basins.advection import DRY, THIN
-from fvsolve.features.basins.cell_sides import BLOCK, HEAD, INDICES, MEASURES, TINY, edges_before, gather, side_numbers
+from fvsolve.features.basins.cell_sides import (
+    BLOCK,
+    HEAD,
+    INDICES,
+    MEASURES,
+    TINY,
+    edges_before,
+    gather,
+    side_numbers,
+)
 from fvsolve.jit import njit
 
 # Rows of BLOCK in the scratch of a block: four for `limited_sides`, also used for value, depth and gradients beyond;
 # then value beyond the side, outward flow, rate, divergence, sum for the step.
-_DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _OUTFLOW, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
-_REACH, _WX, _WY = side.REACH * BLOCK, side.WX * BLOCK, side.WY * BLOCK
+_DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _OUTFLOW, _TOP, _FREE = (
+    k * BLOCK for k in range(1, 11)
+)
+_REACH = side.REACH * BLOCK
+_WX = side.WX * BLOCK
+_WY = side.WY * BLOCK
 _PER_AREA, _PER_DISTANCE = side.PER_AREA * BLOCK, side.PER_DISTANCE * BLOCK
 _OBLIQUE_X, _OBLIQUE_Y = side.OBLIQUE_X * BLOCK, side.OBLIQUE_Y * BLOCK
 ROWS = 11
@@ -89,8 +102,13 @@ def put_gradients(j, mesh, edges, shown, values):
     edges : numbers of the boundary sides of the block; shown : values beyond them
     """
     floats, integers = mesh
-    slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
-    c, gx, gy, w = values.c[at:], values.gx[at:], values.gy[at:], values.w
+    slots = integers[0]
+    at = j % integers[4] * BLOCK
+    places = integers[HEAD:].view(np.int32)
+    c = values.c[at:]
+    gx = values.gx[at:]
+    gy = values.gy[at:]
+    w = values.w
     for i in range(BLOCK):
         gx[i], gy[i] = 0.0, 0.0
     for k in range(slots):
@@ -152,7 +170,9 @@ def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
         k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
-        oblique = far[_OBLIQUE_X + i] * (gx[i] + w[_GX + i]) + far[_OBLIQUE_Y + i] * (gy[i] + w[_GY + i])
+        oblique = far[_OBLIQUE_X + i] * (gx[i] + w[_GX + i]) + far[_OBLIQUE_Y + i] * (
+            gy[i] + w[_GY + i]
+        )
         w[_RATE + i] += k * (far[_PER_DISTANCE + i] * (w[i] - c[i]) + 0.5 * oblique)
         w[_OUTFLOW + i] += k * far[_PER_DISTANCE + i] / max(a, THIN)
 
@@ -185,12 +205,19 @@ def work_size(integers):
 def mesh_values(integers, limited, work):
     """`MeshValues` in a work array; without `limited` the values at sides are those of the cells."""
     near, b = integers[4] * BLOCK, integers[3]
-    c, sides, rest = work[:near], work[4 * near : 8 * near], work[8 * near :]
+    c = work[:near]
+    sides = work[4 * near : 8 * near]
+    rest = work[8 * near :]
     at_sides = sides if limited else c
     return MeshValues(
-        c, work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near], at_sides, rest[: 2 * b],
+        c,
+        work[near : 2 * near],
+        work[2 * near : 3 * near],
+        work[3 * near : 4 * near],
+        at_sides,
+        rest[: 2 * b],
         rest[2 * b :],
-    )  # fmt: skip
+    )
 
 
 @njit
@@ -200,9 +227,13 @@ def put_sides(j, first, last, wide_by, diffuses, mesh, flows, depth, bounds, val
     first, last : its boundary sides are the entries first to last - 1 of the list of boundary sides
     """
     floats, integers = mesh
-    f, b, ring = integers[2], integers[3], integers[4]
+    f = integers[2]
+    b = integers[3]
+    ring = integers[4]
     _, edges, number, _ = side_numbers(integers)
-    shown, free, here = values.beyond, values.w[_FREE:], edges[first:last]
+    shown = values.beyond
+    free = values.w[_FREE:]
+    here = edges[first:last]
     for q in range(first, last):
         value, face = values.c[side.ring_place(edges[q], ring)], f - b + number[q]
         enters = flows.factor * flows.through[face] < 0.0
@@ -211,8 +242,17 @@ def put_sides(j, first, last, wide_by, diffuses, mesh, flows, depth, bounds, val
     if wide_by > 0.0:
         put_allowed(values.c[j % ring * BLOCK :], bounds[0], bounds[1], free)
         side.limited_sides(
-            j, floats, integers, values.c, wide_by, free, shown[first:], here, values.w, values.at_sides
-        )  # fmt: skip
+            j,
+            floats,
+            integers,
+            values.c,
+            wide_by,
+            free,
+            shown[first:],
+            here,
+            values.w,
+            values.at_sides,
+        )
     if diffuses:
         put_gradients(j, mesh, here, shown[b + first :], values)
 
@@ -224,12 +264,22 @@ def put_block_rates(j, edge, limited, diffusivity, mesh, flows, values, rate):
     edge : number of boundary sides of the blocks before j
     """
     floats, integers = mesh
-    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    slots = integers[0]
+    n = integers[1]
+    f = integers[2]
+    b = integers[3]
+    ring = integers[4]
     _, edges, number, faces = side_numbers(integers)
     places, w = integers[HEAD:].view(np.int32), values.w
     distances = floats[MEASURES * side.blocks(integers) * slots * BLOCK + 2 * b + f :]
-    first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
-    c, d, gx, gy, at_sides = values.c, values.d, values.gx, values.gy, values.at_sides
+    first = j * BLOCK
+    last = min((j + 1) * BLOCK, n)
+    o = (j % ring) * BLOCK
+    c = values.c
+    d = values.d
+    gx = values.gx
+    gy = values.gy
+    at_sides = values.at_sides
     clear(w)
     for k in range(slots):
         slot = j * slots + k
@@ -271,7 +321,9 @@ def advection_rates(scheme, wide_by, diffusivity, mesh, flows, depth, bounds, s,
     wide_by = wide_by if limited else 0.0
     need, edges, _, _ = side_numbers(integers)
     values = mesh_values(integers, limited, work)
-    c, d, w = values.c, values.d, values.w
+    c = values.c
+    d = values.d
+    w = values.w
     for i in range(BLOCK):
         w[_TOP + i] = 0.0
     cells_done, sides_done = 0, 0  # blocks with computed cells and sides
@@ -279,7 +331,9 @@ def advection_rates(scheme, wide_by, diffusivity, mesh, flows, depth, bounds, s,
     for j in range(need.size):
         while sides_done < need[j]:
             while cells_done < need[sides_done]:
-                i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
+                i = cells_done * BLOCK
+                k = min((cells_done + 1) * BLOCK, n)
+                o = (cells_done % ring) * BLOCK
                 put_values(s[i:k], depth[i:k], c[o:], d[o:])
                 cells_done += 1
             k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)

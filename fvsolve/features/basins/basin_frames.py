@@ -22,8 +22,10 @@ from fvsolve.jit import inline, njit
 
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].
 ORIGIN, AXES = 0, 3  # position of the origin and rotation matrix (by rows) in the axes of the body
-GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n (GN of the kernels), W and dW/dt in the axes of the basin
-REST_SURFACE = 21  # offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above it
+# G, g_n (GN of the kernels), W and dW/dt in the axes of the basin
+GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)
+# offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above it
+REST_SURFACE = 21
 CELL_POSITIONS = 22  # offset in `plane` of the positions of columns and rows of a grid, or of cells
 FRAME_GRAVITY = 23  # gravity alone, three numbers
 REST_LEVEL = 26  # level of the water at rest above the origin [m]
@@ -68,12 +70,16 @@ def set_frame(tables, basin, out):
     [rad/s2], and gravity alone [m/s2]. The component of the first vector along the normal is written with the opposite
     sign (entry GN). The accelerations are those for zero accelerations of all joints.
     """
-    plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
+    plane = tables.plane
+    at = basin["frame"]
+    row = body_row(tables, basin["body"])
     rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
     ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
     vx, vy, vz = cross(out, row + SPIN, rx, ry, rz)
     cx, cy, cz = cross(out, row + SPIN, vx, vy, vz)
-    b, s, e = row + BIAS, row + SPIN, row + SPIN_BIAS
+    b = row + BIAS
+    s = row + SPIN
+    e = row + SPIN_BIAS
     gx, gy = -(out[b] + ex + cx), -(out[b + 1] + ey + cy)
     weight = -tables.settings[0]["gravity"]
     gz = weight - (out[b + 2] + ez + cz)
@@ -82,8 +88,12 @@ def set_frame(tables, basin, out):
     plane[at + GY] = frame_component(out, row, plane, axes, 1, gx, gy, gz)
     plane[at + GN] = -frame_component(out, row, plane, axes, 2, gx, gy, gz)
     for k in range(3):
-        plane[at + WX + k] = frame_component(out, row, plane, axes, k, out[s], out[s + 1], out[s + 2])
-        plane[at + AX + k] = frame_component(out, row, plane, axes, k, out[e], out[e + 1], out[e + 2])
+        plane[at + WX + k] = frame_component(
+            out, row, plane, axes, k, out[s], out[s + 1], out[s + 2]
+        )
+        plane[at + AX + k] = frame_component(
+            out, row, plane, axes, k, out[e], out[e + 1], out[e + 2]
+        )
         plane[at + FRAME_GRAVITY + k] = frame_component(out, row, plane, axes, k, 0.0, 0.0, weight)
 
 
@@ -93,7 +103,9 @@ def potential_coefficients(plane, at, per):
 
     per phi = x (fx + xx x + xy y) + y (fy + yy y); phi : potential of inertial and gravity forces [J/kg]
     """
-    wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
+    wx = plane[at + WX]
+    wy = plane[at + WY]
+    wz = plane[at + WZ]
     fx, fy = -per * plane[at + GX], -per * plane[at + GY]
     return fx, fy, -0.5 * per * (wy * wy + wz * wz), per * wx * wy, -0.5 * per * (wx * wx + wz * wz)
 
@@ -114,12 +126,16 @@ def tilt_bed(plane, basin):
 @njit
 def add_potential(plane, basin, per, values, lifted):
     """Write values of all cells of a basin plus `per` times the potential of its frame [J/kg] to `lifted`."""
-    n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
+    n = basin["n"]
+    nx = basin["nx"]
+    at = int(plane[basin["frame"] + CELL_POSITIONS])
     phi = potential_coefficients(plane, basin["frame"], per)
     if nx == 0:
         add_potential_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], values, lifted)
     else:
-        add_potential_rows(phi, plane[at : at + nx], plane[at + nx : at + nx + basin["ny"]], values, lifted)
+        add_potential_rows(
+            phi, plane[at : at + nx], plane[at + nx : at + nx + basin["ny"]], values, lifted
+        )
 
 
 @njit
@@ -158,7 +174,9 @@ def add_potential_row(x, values, slope, xx, constant, lifted):
 @njit(forceinline=True)
 def cell_position(plane, basin, i):
     """Centre (x, y) of cell i in the axes of its basin [m]."""
-    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
+    n = basin["n"]
+    nx = basin["nx"]
+    places = int(plane[basin["frame"] + CELL_POSITIONS])
     if nx == 0:
         return plane[places + i], plane[places + n + i]
     return plane[places + i % nx], plane[places + nx + i // nx]
@@ -168,4 +186,6 @@ def cell_position(plane, basin, i):
 def bed_height(plane, basin, i):
     """Height of the bed of cell i above the origin of its basin [m]."""
     at = basin["frame"]
-    return plane[int(plane[at + REST_SURFACE]) + i] - plane[basin["plan"] + i] + plane[at + REST_LEVEL]
+    return (
+        plane[int(plane[at + REST_SURFACE]) + i] - plane[basin["plan"] + i] + plane[at + REST_LEVEL]
+    )

@@ -20,7 +20,8 @@ from fvsolve.core.kernels.network_energy import total_pressure
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.jit import njit
 
-U, V, SPEED, FIRST_OWN = range(4)  # fields of velocities; numbers from FIRST_OWN on are fields of the physics
+# fields of velocities; numbers from FIRST_OWN on are fields of the physics
+U, V, SPEED, FIRST_OWN = range(4)
 
 
 @njit
@@ -46,7 +47,9 @@ def observe_dense_flows(t, y, out, handle, values):
     The volume flow is that at the density of the liquid at the patch.
     """
     tables = open_tables(handle)
-    st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
+    st = tables.settings[0]
+    probes = tables.probes
+    at = tables.layout[0]["pressure"]
     for k in range(probes.size):
         if probes[k]["kind"] == PATCH_FLOW:
             i = probes[k]["index"]
@@ -77,10 +80,14 @@ def rest_potential(st, basin):
 def patch_power(t, y, dydt, out, handle, power):
     """Set the entries of basins in `power` to zero, and add the power of the inflow through all patches [W]."""
     tables = open_tables(handle)
-    rho, patches, layout = tables.settings[0]["rho"], tables.patches, tables.layout[0]
+    rho = tables.settings[0]["rho"]
+    patches = tables.patches
+    layout = tables.layout[0]
     for k in range(basin_first_row(tables, power, 0), power.size):
         power[k] = 0.0
     for k in range(patches.size):
         node = patches[k]["node"]
         flow = out[layout["net"] + node] + out[layout["supply"] + node]
-        power[basin_first_row(tables, power, patches[k]["basin"])] += total_pressure(tables, out, node) * flow / rho
+        power[basin_first_row(tables, power, patches[k]["basin"])] += (
+            total_pressure(tables, out, node) * flow / rho
+        )

@@ -11,7 +11,8 @@ from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.boundary_cells import patch_inflow
 from fvsolve.jit import njit
 
-LEAST_SUPPLY = 1e-7  # mass flow from outside up to which a patch is not short of water [kg/s]: rounding
+# mass flow from outside up to which a patch is not short of water [kg/s]: rounding
+LEAST_SUPPLY = 1e-7
 
 
 def physics_code(package: str) -> int:
@@ -43,7 +44,9 @@ def put_open_flows(tables, b, per, out):
     patches = tables.patches
     for k in range(patches.size):
         if patches[k]["basin"] == b and patches[k]["open"] == 1:
-            out[tables.layout[0]["supply"] + patches[k]["node"]] = per * patch_inflow(tables, patches[k])
+            out[tables.layout[0]["supply"] + patches[k]["node"]] = per * patch_inflow(
+                tables, patches[k]
+            )
 
 
 @njit
@@ -57,7 +60,12 @@ def put_boundary_flows(t, y, dydt, out, handle):
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["given"] == 0 and basin["through"] >= 0:
-            put_open_flows(tables, b, tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"], out)
+            put_open_flows(
+                tables,
+                b,
+                tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"],
+                out,
+            )
 
 
 @njit
@@ -68,7 +76,10 @@ def record_patches(t, y, out, handle, values):
     patches are excluded.
     """
     tables = open_tables(handle)
-    patches, marks, nodes, layout = tables.patches, tables.marks, tables.nodes, tables.layout[0]
+    patches = tables.patches
+    marks = tables.marks
+    nodes = tables.nodes
+    layout = tables.layout[0]
     for k in range(patches.size):
         i = patches[k]["node"]
         at = tables.pipes.size + nodes.size + i

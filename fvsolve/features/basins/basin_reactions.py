@@ -1,6 +1,12 @@
 """Reactions of scalars in the cells of basins, see `features.scalars.kernels.reactions`."""
 
-from fvsolve.core.kernels.dtypes import CELL_SCALAR, LOCAL_AFFINITY, RATE, RATE_UNWANTED, REACTION_VALUE
+from fvsolve.core.kernels.dtypes import (
+    CELL_SCALAR,
+    LOCAL_AFFINITY,
+    RATE,
+    RATE_UNWANTED,
+    REACTION_VALUE,
+)
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.advection import THIN
 from fvsolve.features.basins.basin_scalars import cell_value
@@ -14,7 +20,7 @@ from fvsolve.features.scalars.kernels.reactions import (
     react,
     read_amounts,
     sums_of_network,
-)  # fmt: skip
+)
 from fvsolve.jit import njit
 
 
@@ -43,7 +49,19 @@ def add_reactions(t, y, dydt, out, handle):
         for i in range(n if basin["carried"] >= 0 else 0):
             depth, weight = cell_depth(tables, basin, seen, i), mass_per_depth(tables, basin, i)
             first, entry = basin["carried"] + i, basin["lost"] + i
-            react(seen, dydt, out, tables, first, n, max(depth, THIN), tables.pipes.size, depth, weight, entry)
+            react(
+                seen,
+                dydt,
+                out,
+                tables,
+                first,
+                n,
+                max(depth, THIN),
+                tables.pipes.size,
+                depth,
+                weight,
+                entry,
+            )
 
 
 @njit
@@ -51,7 +69,11 @@ def limit_rates_in_basins(t, y, dydt, out, handle):
     """Raise the greatest rate of change by reactions in `out` to that in basins, if it limits steps [1/s]."""
     tables = open_tables(handle)
     at = tables.layout[0]["quickest"]
-    for b in range(tables.basins.size if out[RATE] != RATE_UNWANTED and tables.reactions[0]["limits"] == 1 else 0):
+    for b in range(
+        tables.basins.size
+        if out[RATE] != RATE_UNWANTED and tables.reactions[0]["limits"] == 1
+        else 0
+    ):
         basin = tables.basins[b]
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
         for i in range(n if basin["carried"] >= 0 else 0):
@@ -72,15 +94,24 @@ def observe_reactions_in_basins(t, y, out, handle, values):
             for b in range(tables.basins.size):
                 basin = tables.basins[b]
                 for i in range(basin["n"] if basin["carried"] >= 0 else 0):
-                    depth, weight = cell_depth(tables, basin, y, i), mass_per_depth(tables, basin, i)
-                    read_amounts(tables, y, basin["carried"] + i, basin["n"], max(depth, THIN), tables.pipes.size)
+                    depth = cell_depth(tables, basin, y, i)
+                    weight = mass_per_depth(tables, basin, i)
+                    read_amounts(
+                        tables,
+                        y,
+                        basin["carried"] + i,
+                        basin["n"],
+                        max(depth, THIN),
+                        tables.pipes.size,
+                    )
                     add_observed(tables, k, depth * weight / tables.settings[0]["rho"], sums)
             values[j] = chosen(probe["side"], sums)
         elif probe["kind"] == LOCAL_AFFINITY and probe["head"] == CELL_SCALAR:
             for q in range(tables.scalars.size):
                 value = 0.0
                 for m in range(probe["count"]):
-                    i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+                    i = tables.integers[probe["cell"] + m]
+                    weight = tables.floats[probe["weights"] + m]
                     value += weight * cell_value(tables, tables.basins[probe["scalar"]], q, y, i)
                 tables.stack[q] = value * tables.scalars[q]["molar"]
             ahead, back = rates_both_ways(tables, k)

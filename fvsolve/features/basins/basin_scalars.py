@@ -8,7 +8,15 @@ amounts per area.
 from math import cos, pi
 
 from fvsolve.core.kernels import stage_sums
-from fvsolve.core.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, INTERIOR, MUSCL, NO_CLOSURE, RATE, UPWIND
+from fvsolve.core.kernels.dtypes import (
+    CELL_SCALAR,
+    GIVEN_FLOW,
+    INTERIOR,
+    MUSCL,
+    NO_CLOSURE,
+    RATE,
+    UPWIND,
+)
 from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import advection, fifth_order
@@ -52,7 +60,9 @@ def patch_values(t, y, dydt, out, handle):
         basin = tables.basins[patch["basin"]]
         seen = deviations_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
-            deep, total, amount = basin["deep"] == 1, 0.0, 0.0
+            deep = basin["deep"] == 1
+            total = 0.0
+            amount = 0.0
             for m in range(patch["count"]):
                 i = tables.integers[patch["first"] + m]
                 part = tables.plane[basin["area"] + i]
@@ -74,7 +84,9 @@ def observe_values(t, y, out, handle, values):
             values[k] = 0.0
             for m in range(probe["count"]):
                 i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
-                values[k] += weight * cell_value(tables, tables.basins[probe["index"]], probe["scalar"], y, i)
+                values[k] += weight * cell_value(
+                    tables, tables.basins[probe["index"]], probe["scalar"], y, i
+                )
 
 
 @njit
@@ -113,8 +125,13 @@ def prepare_scalars(t, tables, b, y):
 
     Depths are written only for a basin with depth, in the cells of `stencil_cells`.
     """
-    plane, basin, patches = tables.plane, tables.basins[b], tables.patches
-    n, o, at, seen = basin["n"], basin["y"], basin["plan"], deviations_of(basin, tables.seen, y)
+    plane = tables.plane
+    basin = tables.basins[b]
+    patches = tables.patches
+    n = basin["n"]
+    o = basin["y"]
+    at = basin["plan"]
+    seen = deviations_of(basin, tables.seen, y)
     if basin["deep"] == 1:
         depth = tables.work[basin["scalar_work"] : basin["scalar_work"] + n]
         rest, change = plane[at : at + n], seen[o : o + n]
@@ -156,9 +173,17 @@ def on_grid(basin, dydt):
 def grid_arrays(tables, b):
     """(grid, depths, work array) of basin b, a grid with scalars."""
     basin = tables.basins[b]
-    plane, nx, ny, k = tables.plane, basin["nx"], basin["ny"], basin["spacing"]
+    plane = tables.plane
+    nx = basin["nx"]
+    ny = basin["ny"]
+    k = basin["spacing"]
     grid = AdvectionGrid(
-        nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], plane[k : k + nx], plane[k + nx : k + nx + ny]
+        nx,
+        ny,
+        tables.bands[2 * b],
+        tables.bands[2 * b + 1],
+        plane[k : k + nx],
+        plane[k + nx : k + nx + ny],
     )
     first, last = depth_range(basin)
     return grid, tables.work[first:last], tables.work[basin["scalar_work"] + basin["n"] :]
@@ -167,7 +192,9 @@ def grid_arrays(tables, b):
 @njit(forceinline=True)
 def grid_flows(t, tables, basin, q):
     """Flows through the faces of a grid at time t, and values of scalar q beyond its boundary."""
-    nx, ny, f = basin["nx"], basin["ny"], basin["flows"]
+    nx = basin["nx"]
+    ny = basin["ny"]
+    f = basin["flows"]
     flows = tables.plane if has_given_flows(basin) else tables.work
     across = f + ny * (nx + 1)
     first, last = outside_range(basin, q)
@@ -189,16 +216,21 @@ def advect_on_grids(t, y, dydt, out, handle):
         prepare_scalars(t, tables, b, y)
         grid, depth, work = grid_arrays(tables, b)
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
-        quick = basin["unsplit"] * basin["fastest"]  # at full speed: a periodic velocity may grow within a step
+        # at full speed: a periodic velocity may grow within a step
+        quick = basin["unsplit"] * basin["fastest"]
         for q in range(tables.scalars.size):
             out[RATE] = max(out[RATE], quick + change_rate(out, tables, q))
             flows = grid_flows(t, tables, basin, q)
-            at, scheme, limiter = basin["carried"] + q * n, basin["scheme"], basin["limiter"]
+            at = basin["carried"] + q * n
+            scheme = basin["scheme"]
+            limiter = basin["limiter"]
             rate = dydt[at : at + n]
             if stage_sums.requested_mode(tables, b) != stage_sums.OFF:
                 by_blocks(tables.sums, at, scheme, limiter, grid, flows, y, work, rate)
             else:
-                advection.grid_advection(scheme, limiter, grid, flows, depth, seen[at : at + n], work, rate)
+                advection.grid_advection(
+                    scheme, limiter, grid, flows, depth, seen[at : at + n], work, rate
+                )
     if tables.sums.size > 0 and tables.sums[stage_sums.MODE] == stage_sums.STAGE_AND_END:
         stage_sums.form_checked_runs(tables.sums)
 
@@ -209,7 +241,11 @@ def by_blocks(sums, at, scheme, limiter, grid, flows, y, work, rate):
 
     Both happen in the same pass. sums : see `kernels.stage_sums`; at : index in the states y of the first amount
     """
-    nx, begin, stop, n, mode = grid.nx, grid.begin, grid.stop, rate.size, sums[stage_sums.MODE]
+    nx = grid.nx
+    begin = grid.begin
+    stop = grid.stop
+    n = rate.size
+    mode = sums[stage_sums.MODE]
     formed_ahead, formed_end = begin, begin
     rows = max(sums[stage_sums.CELLS] // nx, 1)
     for row in range(begin, stop, rows):
@@ -219,7 +255,9 @@ def by_blocks(sums, at, scheme, limiter, grid, flows, y, work, rate):
             stage_sums.form_rows(sums, False, at, nx, formed_ahead, ahead, 0, nx)
         formed_ahead = ahead
         first, c = scheme if scheme == MUSCL else UPWIND, y[at : at + n]
-        advection.second_order_rates(first, limiter, grid, row, block_stop, flows, c, work[n:], rate)
+        advection.second_order_rates(
+            first, limiter, grid, row, block_stop, flows, c, work[n:], rate
+        )
         if mode == stage_sums.CHECK:
             stage_sums.check_rows(sums, y, at, nx, row, block_stop, 0, nx)
         elif mode == stage_sums.STAGE_AND_END:  # rates of the next row read the last of these rows
@@ -240,12 +278,17 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
         if not on_grid(basin, dydt):
             continue
         grid, depth, work = grid_arrays(tables, b)
-        seen, n, fastest = deviations_of(basin, tables.seen, y), basin["n"], basin["fastest"]
+        seen = deviations_of(basin, tables.seen, y)
+        n = basin["n"]
+        fastest = basin["fastest"]
         for q in range(tables.scalars.size):
             flows = grid_flows(t, tables, basin, q)
-            at, bounds = basin["carried"] + q * n, (tables.scalars[q]["least"], tables.scalars[q]["greatest"])
+            at = basin["carried"] + q * n
+            bounds = (tables.scalars[q]["least"], tables.scalars[q]["greatest"])
             s, rate = seen[at : at + n], dydt[at : at + n]
-            fifth_order.add_fifth_order(basin["scheme"], grid, flows, depth, bounds, fastest, s, work, rate)
+            fifth_order.add_fifth_order(
+                basin["scheme"], grid, flows, depth, bounds, fastest, s, work, rate
+            )
 
 
 @njit
@@ -263,7 +306,9 @@ def diffuse_on_grids(t, y, dydt, out, handle):
             if diffusivity > 0.0:
                 flows = grid_flows(t, tables, basin, q)
                 s, rate = seen[at : at + n], dydt[at : at + n]
-                diffusion_rate = advection.grid_diffusion(grid, diffusivity, flows, depth, s, work, rate)
+                diffusion_rate = advection.grid_diffusion(
+                    grid, diffusivity, flows, depth, s, work, rate
+                )
                 other_rates = basin["unsplit"] * basin["fastest"] + change_rate(out, tables, q)
                 out[RATE] = max(out[RATE], other_rates + diffusion_rate)
 
@@ -292,9 +337,17 @@ def advect_on_meshes(t, y, dydt, out, handle):
             first, last = outside_range(basin, q)
             flows = MeshFlows(factor, flow, tables.work[first:last])
             quickest = advection_rates(
-                basin["scheme"], basin["wide"], scalars[q]["diffusivity"], mesh, flows, depth, bounds,
-                seen[at : at + n], work, dydt[at : at + n],
-            )  # fmt: skip
+                basin["scheme"],
+                basin["wide"],
+                scalars[q]["diffusivity"],
+                mesh,
+                flows,
+                depth,
+                bounds,
+                seen[at : at + n],
+                work,
+                dydt[at : at + n],
+            )
             # a periodic velocity returns to full speed
             full_rate = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]
             out[RATE] = max(out[RATE], quickest + full_rate + change_rate(out, tables, q))
@@ -307,7 +360,11 @@ def add_sources(t, y, dydt, out, handle):
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         seen = deviations_of(basin, tables.seen, y)
-        per = tables.settings[0]["rho"] if basin["deep"] == 1 else basin["density"] * basin["thickness"]
+        per = (
+            tables.settings[0]["rho"]
+            if basin["deep"] == 1
+            else basin["density"] * basin["thickness"]
+        )
         for q in range(tables.scalars.size if basin["carried"] >= 0 else 0):
             at = basin["carried"] + q * basin["n"]
             rate = dydt[at : at + basin["n"]]
@@ -329,10 +386,14 @@ def add_decay(tables, basin, q, per, s, rate, out):
     """
     scalar, (first, last) = tables.scalars[q], depth_range(basin)
     depth = tables.work[first:last]
-    decay, ambient, area = scalar["decay"], scalar["ambient"], tables.plane[basin["area"] : basin["area"] + s.size]
+    decay = scalar["decay"]
+    ambient = scalar["ambient"]
+    area = tables.plane[basin["area"] : basin["area"] + s.size]
     for i in range(s.size):
         cell_depth = depth[i] if depth.size > 0 else 1.0
-        record_loss(out, tables, q, basin["lost"] + i, per * decay * area[i] * (s[i] - cell_depth * ambient))
+        record_loss(
+            out, tables, q, basin["lost"] + i, per * decay * area[i] * (s[i] - cell_depth * ambient)
+        )
     advection.add_decay(decay, ambient, depth, s, rate)
 
 
@@ -343,7 +404,10 @@ def record_boundary(t, tables, b, q, per, rate, out):
     The outflow of all patches (the rate of change in all cells minus these inflows) is counted, with its negative sign,
     at the patch with the greatest outflow.
     """
-    plane, patches, nodes, basin = tables.plane, tables.patches, tables.nodes.size, tables.basins[b]
+    plane = tables.plane
+    patches = tables.patches
+    nodes = tables.nodes.size
+    basin = tables.basins[b]
     factor, (begin, end) = flow_factor(t, basin), outside_range(basin, q)
     outside = tables.work[begin:end]
     flows = plane if has_given_flows(basin) else tables.work
@@ -373,7 +437,9 @@ def add_link_inflow(tables, patch, basin, q, y, rate, out):
 
     Where water leaves, each cell loses its own value. rate : rates of the amounts of the scalar per area
     """
-    layout, nodes, rho = tables.layout[0], tables.nodes.size, tables.settings[0]["rho"]
+    layout = tables.layout[0]
+    nodes = tables.nodes.size
+    rho = tables.settings[0]["rho"]
     node = patch["node"]
     supplied = out[layout["gain"] + q * nodes + node]
     flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0)

@@ -12,7 +12,8 @@ COMMON = RhsTerms(
     observe="basin_output: observe_flows",
     power="basin_output: patch_power",
 )
-DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_output: observe_dense_flows")  # all laws but linear
+# all laws but linear
+DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_output: observe_dense_flows")
 SHORTAGES = RhsTerms(package=PACKAGE, record="basin_patches: record_patches")
 WALLS = RhsTerms(
     package=PACKAGE,
@@ -24,7 +25,9 @@ WALLS = RhsTerms(
     power="moving_walls: wall_power",
 )
 MOVING_SIDES = RhsTerms(
-    package=PACKAGE, derive_state="moving_meshes: update_meshes", prepare="moving_meshes: set_side_speeds"
+    package=PACKAGE,
+    derive_state="moving_meshes: update_meshes",
+    prepare="moving_meshes: set_side_speeds",
 )
 FRAMES = RhsTerms(package=PACKAGE, prepare="basin_frames: set_frames")  # before patches
 FRAME_FORCES = RhsTerms(
@@ -35,7 +38,9 @@ FRAME_FORCES = RhsTerms(
     stored="frame_forces: add_stored",
 )
 PATCH_VALUES = RhsTerms(
-    package=PACKAGE, outlet_values="basin_scalars: patch_values", observe="basin_scalars: observe_values"
+    package=PACKAGE,
+    outlet_values="basin_scalars: patch_values",
+    observe="basin_scalars: observe_values",
 )
 GRIDS = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: advect_on_grids")
 FIFTH = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_fifth_order_on_grids")
@@ -47,7 +52,9 @@ PATCH_FACES = RhsTerms(  # of links at patches of water
     outlet_values="patch_scalars: values_at_faces",
     scalar_rates="patch_scalars: add_face_flows",
 )
-CONDUIT_ENDS = RhsTerms(package="fvsolve.features.basins.conduit", scalar_rates="conduit_rates: add_end_scalars")
+CONDUIT_ENDS = RhsTerms(
+    package="fvsolve.features.basins.conduit", scalar_rates="conduit_rates: add_end_scalars"
+)
 REACTIONS = RhsTerms(
     package=PACKAGE,
     prepare="basin_reactions: limit_rates_in_basins",
@@ -55,16 +62,37 @@ REACTIONS = RhsTerms(
     observe="basin_reactions: observe_reactions_in_basins",
 )
 # in the order in which they run within a phase
-SCALAR_TERMS = (PATCH_VALUES, MIXED, GRIDS, FIFTH, DIFFUSION, MESHES, SOURCES, PATCH_FACES, CONDUIT_ENDS, REACTIONS)
+SCALAR_TERMS = (
+    PATCH_VALUES,
+    MIXED,
+    GRIDS,
+    FIFTH,
+    DIFFUSION,
+    MESHES,
+    SOURCES,
+    PATCH_FACES,
+    CONDUIT_ENDS,
+    REACTIONS,
+)
 
 
 def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
     """`RhsTerms` of all basins without those of scalars, each once; valves : True if the network contains valves."""
-    shared = [COMMON] if basins and basins[0].case.law.linear else [COMMON, DENSITY_LAWS] if basins else []
+    shared = (
+        [COMMON]
+        if basins and basins[0].case.law.linear
+        else [COMMON, DENSITY_LAWS]
+        if basins
+        else []
+    )
     shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
     moving += [MOVING_SIDES] if any(basin.moves and not basin.is_grid for basin in basins) else []
-    return tuple(dict.fromkeys([*shared, *(terms for basin in basins for terms in basin.pieces(valves)), *moving]))
+    return tuple(
+        dict.fromkeys(
+            [*shared, *(terms for basin in basins for terms in basin.pieces(valves)), *moving]
+        )
+    )
 
 
 def terms_of_scalars(basins: list) -> tuple[RhsTerms, ...]:

@@ -6,8 +6,10 @@ A band is a range of rows of cells that one thread steps.
 from fvsolve.jit import njit
 
 SHALLOW = 1e-3  # depth at a patch below which only a fraction of the demanded outflow can leave [m]
-LEAST_DEPTH = 1e-9  # volume at a patch over its area below which its surface tends to the lowest bed [m]
-BAND_MARGIN = 5  # rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
+# volume at a patch over its area below which its surface tends to the lowest bed [m]
+LEAST_DEPTH = 1e-9
+# rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
+BAND_MARGIN = 5
 
 
 @njit
@@ -60,7 +62,9 @@ def weighted_volume(tables, patch, leaves, y):
 
     leaves : True for outflow
     """
-    basin, plane, total = tables.basins[patch["basin"]], tables.plane, 0.0
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    total = 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         total += plane[basin["area"] + i] * flow_weight(plane, basin, leaves, i, y)
@@ -100,5 +104,6 @@ def band_cells(tables, b):
 def stencil_cells(tables, b):
     """(first, last + 1) of the cells of basin b whose values the rates in the band of this thread read."""
     basin = tables.basins[b]
-    begin, stop = max(tables.bands[2 * b] - BAND_MARGIN, 0), min(tables.bands[2 * b + 1] + BAND_MARGIN, basin["ny"])
+    begin = max(tables.bands[2 * b] - BAND_MARGIN, 0)
+    stop = min(tables.bands[2 * b + 1] + BAND_MARGIN, basin["ny"])
     return (basin["nx"] * begin, basin["nx"] * stop) if basin["nx"] > 0 else (0, basin["n"])

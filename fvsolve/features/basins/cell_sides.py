@@ -131,12 +131,17 @@ CELL, SIDE, INDICES = 0, 1, 2
 NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
 PER_AREA, PER_DISTANCE, OBLIQUE_X, OBLIQUE_Y, DISTANCES = range(5)
 HEAD = 5
-STEEPEST = 0.75  # in liquids, bound of the norm of the map from differences to neighbours to those at sides
+# in liquids, bound of the norm of the map from differences to neighbours to those at sides
+STEEPEST = 0.75
 BLOCK = 256  # cells whose geometry and neighbours stay in the nearest cache
 TINY = 1e-300
 HUGE = 1e300
 
-_WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
+_WX = WX * BLOCK
+_WY = WY * BLOCK
+_DX = DX * BLOCK
+_DY = DY * BLOCK
+_SIDE = MEASURES * BLOCK
 
 
 @njit(forceinline=True)
@@ -154,10 +159,17 @@ def gradient_share(sides, squares, weighted, steepest):
     wxx, wxy, wyy = weighted
     dxx, dxy, dyy = sides
     per = 1.0 / (sxx * syy - sxy * sxy)
-    ixx, ixy, iyy = per * syy, -per * sxy, per * sxx
+    ixx = per * syy
+    ixy = -per * sxy
+    iyy = per * sxx
     # A = S^-1 weighted, K = A S^-1
-    axx, axy, ayx, ayy = ixx * wxx + ixy * wxy, ixx * wxy + ixy * wyy, ixy * wxx + iyy * wxy, ixy * wxy + iyy * wyy
-    kxx, kxy, kyy = axx * ixx + axy * ixy, axx * ixy + axy * iyy, ayx * ixy + ayy * iyy
+    axx = ixx * wxx + ixy * wxy
+    axy = ixx * wxy + ixy * wyy
+    ayx = ixy * wxx + iyy * wxy
+    ayy = ixy * wxy + iyy * wyy
+    kxx = axx * ixx + axy * ixy
+    kxy = axx * ixy + axy * iyy
+    kyy = ayx * ixy + ayy * iyy
     trace = dxx * kxx + 2.0 * dxy * kxy + dyy * kyy
     product = (dxx * dyy - dxy * dxy) * (kxx * kyy - kxy * kxy)
     largest = 0.5 * trace + sqrt(max(0.25 * trace * trace - product, 0.0))
@@ -234,14 +246,17 @@ def limit_three_sides(p, wide, cap, beyond, geo, out):
     back = 2.0 * wide
     for i in range(BLOCK):
         here = p[i]
-        a, b, c = beyond[i] - here, beyond[BLOCK + i] - here, beyond[2 * BLOCK + i] - here
+        a = beyond[i] - here
+        b = beyond[BLOCK + i] - here
+        c = beyond[2 * BLOCK + i] - here
         gx = geo[_WX + i] * a + geo[_SIDE + _WX + i] * b + geo[2 * _SIDE + _WX + i] * c
         gy = geo[_WY + i] * a + geo[_SIDE + _WY + i] * b + geo[2 * _SIDE + _WY + i] * c
         r = gx * geo[_DX + i] + gy * geo[_DY + i]
         s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
         t = -(r + s)  # the middles of a triangle's sides have its centre
         most, least = max(max(a, b), max(c, 0.0)), min(min(a, b), min(c, 0.0))
-        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        low = max(max(wide * least, -back * most), -cap[i])
+        high = min(min(wide * most, -back * least), cap[i])
         out[i] = here + min(max(r, low), high)
         out[BLOCK + i] = here + min(max(s, low), high)
         out[2 * BLOCK + i] = here + min(max(t, low), high)
@@ -268,7 +283,8 @@ def limit_four_sides(p, wide, cap, beyond, geo, out):
         t = gx * geo[2 * _SIDE + _DX + i] + gy * geo[2 * _SIDE + _DY + i]
         u = gx * geo[3 * _SIDE + _DX + i] + gy * geo[3 * _SIDE + _DY + i]
         most, least = max(max(a, b), max(max(c, d), 0.0)), min(min(a, b), min(min(c, d), 0.0))
-        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        low = max(max(wide * least, -back * most), -cap[i])
+        high = min(min(wide * most, -back * least), cap[i])
         out[i] = here + min(max(r, low), high)
         out[BLOCK + i] = here + min(max(s, low), high)
         out[2 * BLOCK + i] = here + min(max(t, low), high)
@@ -302,7 +318,9 @@ def limit_gathered(j, floats, integers, values, wide, cap, shown, edges, beyond,
     for q in range(edges.size):
         beyond[edges[q] % (4 * BLOCK)] = shown[q]
     at, slots = (j % integers[4]) * BLOCK, integers[0]
-    p, geo, out = values[at:], floats[j * slots * MEASURES * BLOCK :], sides[4 * at :]
+    p = values[at:]
+    geo = floats[j * slots * MEASURES * BLOCK :]
+    out = sides[4 * at :]
     if slots == 3:
         limit_three_sides(p, wide, cap, beyond, geo, out)
     else:

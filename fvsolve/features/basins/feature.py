@@ -43,7 +43,8 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
             from fvsolve.features.basins.free_surface.patch_closures import DEEPEST
 
             settings["unmarked"] = (
-                settings["vapor"] - 0.5 * DEEPEST * draft.case.properties.density * draft.case.gravity
+                settings["vapor"]
+                - 0.5 * DEEPEST * draft.case.properties.density * draft.case.gravity
             )
 
     def reserve(self, draft) -> None:
@@ -51,7 +52,9 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
 
     def start(self, draft, y: np.ndarray) -> None:
         lower.start_basins(self.meshed, y)
-        draft.warnings += [notice for basin in self.meshed for notice in basin.notices(basin.deviations(y))]
+        draft.warnings += [
+            notice for basin in self.meshed for notice in basin.notices(basin.deviations(y))
+        ]
 
     def level(self, draft, y: np.ndarray, attitudes=None) -> list[str]:
         names = list(WALL_LOADS) if (draft.wall_table["body"] >= 0).any() else []
@@ -94,7 +97,8 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
     def cell_states(self, model) -> list[np.ndarray]:
         from fvsolve.features.basins.lower_pattern import all_states
 
-        walls = [[at for at, _, _ in basin.stretches] for basin in self.meshed]  # every cell's volume follows these
+        # every cell's volume follows these
+        walls = [[at for at, _, _ in basin.stretches] for basin in self.meshed]
         return [*(all_states(basin) for basin in self.meshed), *walls]
 
     def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
@@ -104,13 +108,16 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
     def masses(self, model, y: np.ndarray) -> Iterator[tuple[float, float]]:
         for basin in self.meshed:
             rest, per = basin.mass()
-            for own, start in zip(basin.states_of(y)[:1], basin.states_of(model.start)[:1], strict=True):
+            for own, start in zip(
+                basin.states_of(y)[:1], basin.states_of(model.start)[:1], strict=True
+            ):
                 yield rest + float(np.sum(per * start)), float(np.sum(per * (own - start)))
 
     def book_sources(self, y: np.ndarray, ledger: np.ndarray) -> None:
         sources = [(basin, name) for basin in self.meshed for name in basin.source_names]
         for k, (basin, name) in enumerate(sources):
-            if name == "infiltration":  # from its heights, whose sum needs no exchange between threads at every stage
+            # from its heights, whose sum needs no exchange between threads at every stage
+            if name == "infiltration":
                 ledger[1, k] = -basin.mass_in_soil(y)
 
     def open_nodes(self, model) -> set[int]:
@@ -127,7 +134,11 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
         for basin, row in zip(self.meshed, basins, strict=True):
             if row["period"] > 0.0:
                 grid = basin.mesh.grid
-                faces = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx if basin.is_grid else basin.mesh.left.size
+                faces = (
+                    grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
+                    if basin.is_grid
+                    else basin.mesh.left.size
+                )
                 factor = np.cos(np.pi * t / row["period"])
                 plane[row["flows"] : row["flows"] + faces] *= factor
                 row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
@@ -145,7 +156,9 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         for basin in self.meshed:
-            fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
+            fields[basin.name] = basin.fields(basin.deviations(y)) | (
+                basin.values(y) if basin.scalars else {}
+            )
             if basin.moves or basin.part.on is not None:
                 fields["points"][basin.name] = basin.points_at(y, out, model.layout)
 
@@ -171,10 +184,14 @@ class BasinRun(FeatureRun):
             self.run_data.tables.basins["loads_body"] = 1
 
     def critical_outflows(self, i: int) -> list[float]:
-        tables, work, found = self.run_data.tables, self.run_data.written.work, []
+        tables = self.run_data.tables
+        work = self.run_data.written.work
+        found = []
         for patch in tables.patches[tables.patches["valve"] >= 0]:
             basin = self.feature.meshed[patch["basin"]]
-            if tables.valves["from_node"][patch["valve"]] == i and hasattr(basin, "greatest_outflow"):
+            if tables.valves["from_node"][patch["valve"]] == i and hasattr(
+                basin, "greatest_outflow"
+            ):
                 found.append(basin.greatest_outflow(patch, work))
         return found
 

@@ -37,12 +37,19 @@ def add_fifth_order(scheme, grid, flows, depth, bounds, fastest, s, work, rate):
     Fluxes of weno5 are limited so that an Euler step of Courant number WENO_COURANT keeps the bounds.
     fastest : greatest rate of flow through a cell [1/s], for depth 1; work : float64[fifth_order_work(nx, ny)]
     """
-    nx, ny, factor = grid.nx, grid.ny, flows.factor
-    c, rest, mx, my = s, work[nx * ny :], (nx + 1) * ny, nx * (ny + 1)
+    nx = grid.nx
+    ny = grid.ny
+    factor = flows.factor
+    c = s
+    rest = work[nx * ny :]
+    mx = (nx + 1) * ny
+    my = nx * (ny + 1)
     if depth.size > 0:
         put_values(s, depth, work[: nx * ny])
         c = work[: nx * ny]
-    ax, ay, rest = rest[:mx], rest[mx : mx + my], rest[mx + my :]
+    ax = rest[:mx]
+    ay = rest[mx : mx + my]
+    rest = rest[mx + my :]
     grid_excesses(scheme, grid, flows, c, rest, ax, ay)
     if scheme == WENO5 and (bounds[0] > -INFINITE or bounds[1] < INFINITE):
         limit_excesses(grid, flows, depth, bounds, abs(factor) * fastest, s, rate, ax, ay, rest)
@@ -56,7 +63,10 @@ def ghost_means(known, o, a, b, c, d, e):
     a, b, c, d, e : means of the five cells inside that determine the polynomial, the nearest first
     known : True if o, the value at the side, is used in place of e
     """
-    p, q, r, s = a - b, b - c, c - d, d - e
+    p = a - b
+    q = b - c
+    r = c - d
+    s = d - e
     if known:
         nearest = (60.0 * (o - a) - 29.0 * p + 14.0 * q - 3.0 * r) / 12.0
         return a + nearest, a + (300.0 * (o - a) - 217.0 * p + 118.0 * q - 27.0 * r) / 12.0
@@ -81,9 +91,16 @@ def face_difference_weno(p, q, r, s):
     b0 = 13.0 / 12.0 * (q - p) ** 2 + 0.25 * (3.0 * q - p) ** 2 + SMALL
     b1 = 13.0 / 12.0 * (r - q) ** 2 + 0.25 * (r + q) ** 2 + SMALL
     b2 = 13.0 / 12.0 * (s - r) ** 2 + 0.25 * (s - 3.0 * r) ** 2 + SMALL
-    t, b0, b1, b2 = (b0 - b2) ** 2, b0 * b0, b1 * b1, b2 * b2
-    w0, w1, w2 = 0.1 * (b0 + t) * (b1 * b2), 0.6 * (b1 + t) * (b0 * b2), 0.3 * (b2 + t) * (b0 * b1)
-    return (w0 * (5.0 * q - 2.0 * p) + w1 * (q + 2.0 * r) + w2 * (4.0 * r - s)) / (6.0 * (w0 + w1 + w2))
+    t = (b0 - b2) ** 2
+    b0 = b0 * b0
+    b1 = b1 * b1
+    b2 = b2 * b2
+    w0 = 0.1 * (b0 + t) * (b1 * b2)
+    w1 = 0.6 * (b1 + t) * (b0 * b2)
+    w2 = 0.3 * (b2 + t) * (b0 * b1)
+    return (w0 * (5.0 * q - 2.0 * p) + w1 * (q + 2.0 * r) + w2 * (4.0 * r - s)) / (
+        6.0 * (w0 + w1 + w2)
+    )
 
 
 @inline
@@ -93,8 +110,12 @@ def put_excesses(face_difference, factor, flow, cells, q, excess):
     for i in range(q.size):
         forward = factor * flow[i] > 0.0
         p, s = b[i] - a[i], g[i] - e[i]
-        m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
-        difference = face_difference(p if forward else s, m if forward else n, r, n if forward else m)
+        m = c[i] - b[i]
+        r = d[i] - c[i]
+        n = e[i] - d[i]
+        difference = face_difference(
+            p if forward else s, m if forward else n, r, n if forward else m
+        )
         q[i] = c[i] + difference if forward else d[i] - difference
         excess[i] = flow[i] * (difference if forward else -difference)
 
@@ -118,7 +139,12 @@ def pad_sides(grid, flows, c, v):
     The two nearest ghost cells are those of `ghost_values`; the third is equal to the second.
     v : float64[ny + 6, nx + 6] as one array
     """
-    nx, ny, factor, flow_x, flow_y, outside = grid.nx, grid.ny, flows.factor, flows.x, flows.y, flows.outside
+    nx = grid.nx
+    ny = grid.ny
+    factor = flows.factor
+    flow_x = flows.x
+    flow_y = flows.y
+    outside = flows.outside
     wide = nx + 2 * GHOSTS
     for j in range(ny):
         to, fx = v[(j + GHOSTS) * wide :], flow_x[j * (nx + 1) :]
@@ -126,9 +152,13 @@ def pad_sides(grid, flows, c, v):
         for i in range(nx):
             inner[i] = row[i]
         to[2], to[1] = ghost_values(nx, factor * fx[0] > 0.0, outside[j], to, GHOSTS, 1)
-        to[nx + 3], to[nx + 4] = ghost_values(nx, factor * fx[nx] < 0.0, outside[ny + j], to, nx + 2, -1)
+        to[nx + 3], to[nx + 4] = ghost_values(
+            nx, factor * fx[nx] < 0.0, outside[ny + j], to, nx + 2, -1
+        )
         to[0], to[nx + 5] = to[1], to[nx + 4]
-    south, north, last = outside[2 * ny :], outside[2 * ny + nx :], ny * nx
+    south = outside[2 * ny :]
+    north = outside[2 * ny + nx :]
+    last = ny * nx
     for i in range(nx):
         at, end = GHOSTS * wide + GHOSTS + i, (ny + 2) * wide + GHOSTS + i
         low, lower = ghost_values(ny, factor * flow_y[i] > 0.0, south[i], v, at, wide)
@@ -147,7 +177,9 @@ def ghost_values(n, known, o, v, at, step):
     """
     if n < LEAST_CELLS:
         return (o, o) if known else (v[at], v[at])
-    return ghost_means(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
+    return ghost_means(
+        known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step]
+    )
 
 
 @inline
@@ -174,7 +206,9 @@ def extrapolate_rows(v, wide, rows):
     first, last = 2 * wide, (rows + 1) * wide
     for i in range(wide):
         v[wide + i], v[i] = ghost_values(rows, False, 0.0, v, first + i, wide)
-        v[last + wide + i], v[last + 2 * wide + i] = ghost_values(rows, False, 0.0, v, last + i, -wide)
+        v[last + wide + i], v[last + 2 * wide + i] = ghost_values(
+            rows, False, 0.0, v, last + i, -wide
+        )
 
 
 @njit
@@ -195,15 +229,26 @@ def grid_excesses_work(nx, ny):
 @njit
 def grid_excesses(scheme, grid, flows, c, work, ax, ay):
     """Write the excesses through all faces to ax and ay; work : float64[grid_excesses_work(nx, ny)]."""
-    nx, ny, factor, flow_x, flow_y, outside = grid.nx, grid.ny, flows.factor, flows.x, flows.y, flows.outside
+    nx = grid.nx
+    ny = grid.ny
+    factor = flows.factor
+    flow_x = flows.x
+    flow_y = flows.y
+    outside = flows.outside
     wide, m = nx + 2 * GHOSTS, nx + 1
     mx, my = m * (ny + 4), nx * (ny + 1)
     v, rest = work[: wide * (ny + 6)], work[wide * (ny + 6) :]
-    fx, qx, rest = rest[:mx], rest[mx : 2 * mx], rest[2 * mx :]
-    qy, f, q = rest[:my], rest[my : my + nx + 4], rest[my + nx + 4 :]
+    fx = rest[:mx]
+    qx = rest[mx : 2 * mx]
+    rest = rest[2 * mx :]
+    qy = rest[:my]
+    f = rest[my : my + nx + 4]
+    q = rest[my + nx + 4 :]
     pad_sides(grid, flows, c, v)
     for j in range(ny):
-        p, qj, a = v[(j + GHOSTS) * wide :], qx[(j + 2) * m : (j + 3) * m], ax[j * m : (j + 1) * m]
+        p = v[(j + GHOSTS) * wide :]
+        qj = qx[(j + 2) * m : (j + 3) * m]
+        a = ax[j * m : (j + 1) * m]
         fj, flow = fx[(j + 2) * m :], flow_x[j * m :]
         for i in range(m):
             fj[i] = flow[i]
@@ -214,8 +259,13 @@ def grid_excesses(scheme, grid, flows, c, work, ax, ay):
         if east <= 0.0:
             qj[nx], a[nx] = outside[ny + j] if east < 0.0 else p[nx + 2], 0.0
     for j in range(ny + 1):
-        p, qj, a = v[j * wide + GHOSTS :], qy[j * nx : (j + 1) * nx], ay[j * nx : (j + 1) * nx]
-        fy, b, d, e = flow_y[j * nx :], p[wide:], p[3 * wide :], p[4 * wide :]
+        p = v[j * wide + GHOSTS :]
+        qj = qy[j * nx : (j + 1) * nx]
+        a = ay[j * nx : (j + 1) * nx]
+        fy = flow_y[j * nx :]
+        b = p[wide:]
+        d = p[3 * wide :]
+        e = p[4 * wide :]
         face_excesses(scheme, factor, fy, (p, b, p[2 * wide :], d, e, p[5 * wide :]), qj, a)
         if j == 0 or j == ny:
             side, turn = (outside[2 * ny :], 1.0) if j == 0 else (outside[2 * ny + nx :], -1.0)
@@ -228,7 +278,8 @@ def grid_excesses(scheme, grid, flows, c, work, ax, ay):
     extrapolate_rows(qx, m, ny)
     for j in range(ny):
         r, o = fx[j * m :], qx[j * m :]
-        five, values = (r, r[m:], r[2 * m :], r[3 * m :], r[4 * m :]), (o, o[m:], o[2 * m :], o[3 * m :], o[4 * m :])
+        five = (r, r[m:], r[2 * m :], r[3 * m :], r[4 * m :])
+        values = (o, o[m:], o[2 * m :], o[3 * m :], o[4 * m :])
         add_products(five, values, ax[j * m : (j + 1) * m])
     for j in range(ny + 1):
         pad_line(flow_y[j * nx :], nx, f)
@@ -240,10 +291,16 @@ def grid_excesses(scheme, grid, flows, c, work, ax, ay):
 @njit
 def add_excesses(grid, factor, ax, ay, rate):
     """Add the excesses through the faces of each cell to the rates of all cells."""
-    nx, ny, kx, ky = grid.nx, grid.ny, grid.kx, grid.ky
+    nx = grid.nx
+    ny = grid.ny
+    kx = grid.kx
+    ky = grid.ky
     for j in range(ny):
         k, to = ky[j], rate[j * nx : (j + 1) * nx]
-        aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]
+        aw = ax[j * (nx + 1) :]
+        ae = ax[j * (nx + 1) + 1 :]
+        south = ay[j * nx :]
+        north = ay[(j + 1) * nx :]
         for i in range(nx):
             to[i] += (factor * (kx[i] * k)) * ((aw[i] - ae[i]) + (south[i] - north[i]))
 
@@ -277,7 +334,10 @@ def row_fractions(paces, factor, kx, ky, flows, excesses, depth, bounds, s, rate
         scale = step * (factor * (kx[i] * ky))
         then = s[i] + step * rate[i]
         deep = (depth[i] if depth.size > 0 else 1.0) - scale * ((fe[i] - fw[i]) + (fn[i] - fs[i]))
-        a, b, c, d = scale * aw[i], -scale * ae[i], scale * south[i], -scale * north[i]
+        a = scale * aw[i]
+        b = -scale * ae[i]
+        c = scale * south[i]
+        d = -scale * north[i]
         up[i] = accepted_fraction(most * deep - then, sum_of_positive(a, b, c, d))
         down[i] = accepted_fraction(then - least * deep, sum_of_positive(-a, -b, -c, -d))
 
@@ -308,25 +368,54 @@ def limit_excesses(grid, flows, depth, bounds, fastest, s, rate, ax, ay, work):
     each cell, where it is no shorter than in the fastest cell, so that no rate depends on states far away.
     rate : float64[n]  rates by upwind; work : float64[limit_excesses_work(nx, ny)]
     """
-    nx, ny, kx, ky, factor, flow_x, flow_y = grid.nx, grid.ny, grid.kx, grid.ky, flows.factor, flows.x, flows.y
+    nx = grid.nx
+    ny = grid.ny
+    kx = grid.kx
+    ky = grid.ky
+    factor = flows.factor
+    flow_x = flows.x
+    flow_y = flows.y
     wide = nx + 2
-    up, down, paces = work[: wide * (ny + 2)], work[wide * (ny + 2) :], work[2 * wide * (ny + 2) :][:nx]
+    up = work[: wide * (ny + 2)]
+    down = work[wide * (ny + 2) :]
+    paces = work[2 * wide * (ny + 2) :][:nx]
     for i in range(wide * (ny + 2)):
         up[i], down[i] = 1.0, 1.0  # beyond the boundary this remains
     for i in range(nx):
         paces[i] = fastest
     for j in range(ny):
-        a, z, w, to = j * nx, (j + 1) * nx, j * (nx + 1), (j + 1) * wide + 1
+        a = j * nx
+        z = (j + 1) * nx
+        w = j * (nx + 1)
+        to = (j + 1) * wide + 1
         around = flow_x[w:], flow_x[w + 1 :], flow_y[a:], flow_y[z:]
         beyond = ax[w:], ax[w + 1 :], ay[a:], ay[z:]
         if depth.size > 0:
             put_row_rates(factor, kx, ky[j], around, depth[a:], paces)
         row_fractions(
-            paces, factor, kx, ky[j], around, beyond, depth[a:], bounds, s[a:z], rate[a:], up[to:], down[to:]
-        )  # fmt: skip
+            paces,
+            factor,
+            kx,
+            ky[j],
+            around,
+            beyond,
+            depth[a:],
+            bounds,
+            s[a:z],
+            rate[a:],
+            up[to:],
+            down[to:],
+        )
     for j in range(ny):
         at = (j + 1) * wide
-        limit_faces(factor, up[at:], down[at:], up[at + 1 :], down[at + 1 :], ax[j * (nx + 1) : (j + 1) * (nx + 1)])
+        limit_faces(
+            factor,
+            up[at:],
+            down[at:],
+            up[at + 1 :],
+            down[at + 1 :],
+            ax[j * (nx + 1) : (j + 1) * (nx + 1)],
+        )
     for j in range(ny + 1):
         at, to = j * wide + 1, (j + 1) * wide + 1
         limit_faces(factor, up[at:], down[at:], up[to:], down[to:], ay[j * nx : (j + 1) * nx])

@@ -34,7 +34,12 @@ from fvsolve.core.kernels.moving_frames import BASIN_ARM, BASIN_LOAD, EAST, MOME
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.vectors import cross, dot, rotate, rotate_back, write_vector
 from fvsolve.features.basins import basin_frames as frame
-from fvsolve.features.basins.basin_frames import CELL_POSITIONS, FRAME_GRAVITY, bed_height, cell_position
+from fvsolve.features.basins.basin_frames import (
+    CELL_POSITIONS,
+    FRAME_GRAVITY,
+    bed_height,
+    cell_position,
+)
 from fvsolve.features.basins.basin_output import basin_first_row
 from fvsolve.features.basins.free_surface.surface_energy import velocity_factor
 from fvsolve.jit import inline, njit
@@ -53,7 +58,8 @@ def add_frame_forces(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["frame"] < 0:
             continue
-        twice, euler = 2.0 * tables.plane[basin["frame"] + frame.WZ], tables.plane[basin["frame"] + frame.AZ]
+        twice = 2.0 * tables.plane[basin["frame"] + frame.WZ]
+        euler = tables.plane[basin["frame"] + frame.AZ]
         out[RATE] = max(out[RATE], abs(twice))
         to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
         own = 0.0 if basin["deep"] == 0 and tables.settings[0]["law"] == LAW_LINEAR else 1.0
@@ -75,7 +81,10 @@ def correct_for_bodies(t, y, dydt, out, handle):
         if basin["frame"] < 0:
             continue
         ax, ay, az, wx, wy, wz = extra_accelerations(tables, basin, out)
-        (x_part, y_part, _), (_, _, turn) = in_axes(tables, b, out, ax, ay, az), in_axes(tables, b, out, wx, wy, wz)
+        (x_part, y_part, _), (_, _, turn) = (
+            in_axes(tables, b, out, ax, ay, az),
+            in_axes(tables, b, out, wx, wy, wz),
+        )
         if x_part == 0.0 and y_part == 0.0 and turn == 0.0:
             continue
         accelerate_flow(tables.plane, basin, y, dydt, basin["y"], 1.0, 0.0, -x_part, -y_part, turn)
@@ -88,26 +97,45 @@ def accelerate_flow(plane, basin, y, rates, first, own, twice, east, north, turn
     depth : depth of water [m], or density of a liquid [kg/m3]; (X, Y) : position of the cell [m]
     east, north : uniform acceleration [m/s2]
     """
-    n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + CELL_POSITIONS])
+    n = basin["n"]
+    o = basin["y"]
+    p = basin["plan"]
+    places = int(plane[basin["frame"] + CELL_POSITIONS])
     for row in range(basin["ny"]):
         accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, turn)
     for i in range(n if basin["nx"] == 0 else 0):
         depth = max(plane[p + i] + own * y[o + i], 0.0)
-        rates[first + n + i] += twice * y[o + 2 * n + i] + depth * (east + turn * plane[places + n + i])
-        rates[first + 2 * n + i] += depth * (north - turn * plane[places + i]) - twice * y[o + n + i]
+        rates[first + n + i] += twice * y[o + 2 * n + i] + depth * (
+            east + turn * plane[places + n + i]
+        )
+        rates[first + 2 * n + i] += (
+            depth * (north - turn * plane[places + i]) - twice * y[o + n + i]
+        )
 
 
 @njit
 def accelerate_row(plane, basin, y, rates, first, row, own, twice, east, north, turn):
     """Add the terms of `accelerate_flow` to the rates of row `row` of the cells of a grid."""
-    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
+    n = basin["n"]
+    nx = basin["nx"]
+    places = int(plane[basin["frame"] + CELL_POSITIONS])
     at, level = row * nx, plane[places + nx + row]
-    a, p, to = basin["y"] + at, basin["plan"] + at, first + n + at
+    a = basin["y"] + at
+    p = basin["plan"] + at
+    to = first + n + at
     state = y[a : a + nx], y[a + n : a + n + nx], y[a + 2 * n : a + 2 * n + nx]
     accelerate_arrays(
-        plane[places : places + nx], plane[p : p + nx], state, own, twice, east + turn * level, north, turn,
-        rates[to : to + nx], rates[to + n : to + n + nx],
-    )  # fmt: skip
+        plane[places : places + nx],
+        plane[p : p + nx],
+        state,
+        own,
+        twice,
+        east + turn * level,
+        north,
+        turn,
+        rates[to : to + nx],
+        rates[to + n : to + n + nx],
+    )
 
 
 @inline
@@ -128,7 +156,9 @@ def accelerate_arrays(x, rest, state, own, twice, east, north, turn, rate_x, rat
 def basin_offset(tables, basin, out):
     """Vector from the origin of the body to the origin of the basin, in axes of the world [m]."""
     at = basin["frame"] + frame.ORIGIN
-    return rotate(out, body_row(tables, basin["body"]) + body.ATTITUDE, tables.plane[at : at + 3], 0)
+    return rotate(
+        out, body_row(tables, basin["body"]) + body.ATTITUDE, tables.plane[at : at + 3], 0
+    )
 
 
 @njit(forceinline=True)
@@ -153,11 +183,22 @@ def row_sums(deep, per_area, level, x, area, rest, surface, state, rates):
     r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
     for i in range(h.size):
         depth, per = max(rest[i] + h[i], 0.0), per_area * area[i]
-        mass, mass_rate, v, dv = per * depth, per * dh[i], per * qy[i], per * dy[i]
-        r0, r1, r2 = r0 + mass, r1 + mass * x[i], r2 + mass * x[i] * x[i]
-        d0, d1, d2 = d0 + mass_rate, d1 + mass_rate * x[i], d2 + mass_rate * x[i] * x[i]
-        p0, v0, v1 = p0 + per * qx[i], v0 + v, v1 + v * x[i]
-        p1, f0, f1 = p1 + per * dx[i], f0 + dv, f1 + dv * x[i]
+        mass = per * depth
+        mass_rate = per * dh[i]
+        v = per * qy[i]
+        dv = per * dy[i]
+        r0 = r0 + mass
+        r1 = r1 + mass * x[i]
+        r2 = r2 + mass * x[i] * x[i]
+        d0 = d0 + mass_rate
+        d1 = d1 + mass_rate * x[i]
+        d2 = d2 + mass_rate * x[i] * x[i]
+        p0 = p0 + per * qx[i]
+        v0 = v0 + v
+        v1 = v1 + v * x[i]
+        p1 = p1 + per * dx[i]
+        f0 = f0 + dv
+        f1 = f1 + dv * x[i]
         if deep:
             g0 += mass * (surface[i] - rest[i] + level + 0.5 * depth)
     return r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0
@@ -173,7 +214,10 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
     On grids the Coriolis and Euler terms of `accelerate_flow` are added to `rates` here, row by row; on other meshes
     `add_frame_forces` has added them.
     """
-    plane, n, o, per_area = tables.plane, basin["n"], basin["y"], mass_factor(tables, basin)
+    plane = tables.plane
+    n = basin["n"]
+    o = basin["y"]
+    per_area = mass_factor(tables, basin)
     m = sx = sy = xx = xy = yy = lever = 0.0
     dx = dy = dxx = dxy = dyy = 0.0
     qx = qy = turn = fx = fy = spin = 0.0
@@ -183,19 +227,42 @@ def mass_moments(tables, basin, y, rates, first, own, twice, euler):
     rows, wide = (basin["ny"], nx) if nx > 0 else (n, 1)
     for row in range(rows):
         z, at = plane[places + (nx if nx > 0 else n) + row], row * wide
-        a, b, x = o + at, first + at, places + (0 if nx > 0 else row)
+        a = o + at
+        b = first + at
+        x = places + (0 if nx > 0 else row)
         if nx > 0 and (twice != 0.0 or euler != 0.0):
             accelerate_row(plane, basin, y, rates, first, row, own, twice, 0.0, 0.0, euler)
-        state, change = (y[a : a + wide], y[a + n :], y[a + 2 * n :]), (rates[b:], rates[b + n :], rates[b + 2 * n :])
+        state = (y[a : a + wide], y[a + n :], y[a + 2 * n :])
+        change = (rates[b:], rates[b + n :], rates[b + 2 * n :])
         r0, r1, r2, d0, d1, d2, p0, v0, v1, p1, f0, f1, g0 = row_sums(
-            deep, per_area, level, plane[x : x + wide], plane[basin["area"] + at :], plane[basin["plan"] + at :],
-            plane[surface + at :], state, change,
-        )  # fmt: skip
-        m, sx, sy, lever = m + r0, sx + r1, sy + r0 * z, lever + g0
-        xx, xy, yy = xx + r2, xy + r1 * z, yy + r0 * z * z
-        dx, dy, dxx, dxy, dyy = dx + d1, dy + d0 * z, dxx + d2, dxy + d1 * z, dyy + d0 * z * z
-        qx, qy, turn = qx + p0, qy + v0, turn + v1 - p0 * z
-        fx, fy, spin = fx + p1, fy + f0, spin + f1 - p1 * z
+            deep,
+            per_area,
+            level,
+            plane[x : x + wide],
+            plane[basin["area"] + at :],
+            plane[basin["plan"] + at :],
+            plane[surface + at :],
+            state,
+            change,
+        )
+        m = m + r0
+        sx = sx + r1
+        sy = sy + r0 * z
+        lever = lever + g0
+        xx = xx + r2
+        xy = xy + r1 * z
+        yy = yy + r0 * z * z
+        dx = dx + d1
+        dy = dy + d0 * z
+        dxx = dxx + d2
+        dxy = dxy + d1 * z
+        dyy = dyy + d0 * z * z
+        qx = qx + p0
+        qy = qy + v0
+        turn = turn + v1 - p0 * z
+        fx = fx + p1
+        fy = fy + f0
+        spin = spin + f1 - p1 * z
     return m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin
 
 
@@ -209,19 +276,37 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
         tables, basin, y, rates, first, own, twice, euler
     )
     plane, at = tables.plane, basin["frame"]
-    gx, gy, gz = plane[at + frame.GX], plane[at + frame.GY], -plane[at + frame.GN]
-    wx, wy, wz = plane[at + frame.WX], plane[at + frame.WY], plane[at + frame.WZ]
-    ax, ay, az = plane[at + frame.AX], plane[at + frame.AY], plane[at + frame.AZ]
+    gx = plane[at + frame.GX]
+    gy = plane[at + frame.GY]
+    gz = -plane[at + frame.GN]
+    wx = plane[at + frame.WX]
+    wy = plane[at + frame.WY]
+    wz = plane[at + frame.WZ]
+    ax = plane[at + frame.AX]
+    ay = plane[at + frame.AY]
+    az = plane[at + frame.AZ]
     # force: M G - W' x S - W x (W x S + S' + Q) - Q'
-    px, py, pz = qx + dx - wz * sy, qy + dy + wz * sx, wx * sy - wy * sx
+    px = qx + dx - wz * sy
+    py = qy + dy + wz * sx
+    pz = wx * sy - wy * sx
     hx = m * gx + az * sy - (wy * pz - wz * py) - fx
     hy = m * gy - az * sx - (wz * px - wx * pz) - fy
     hz = m * gz - (ax * sy - ay * sx) - (wx * py - wy * px)
     # torque: S x G + lever n x g - I W' - I' W - H' - W x (I W + H)
-    lx, ly, lz = yy * wx - xy * wy, xx * wy - xy * wx, (xx + yy) * wz + turn
+    lx = yy * wx - xy * wy
+    ly = xx * wy - xy * wx
+    lz = (xx + yy) * wz + turn
     down_x, down_y = plane[at + FRAME_GRAVITY], plane[at + FRAME_GRAVITY + 1]
-    tx = sy * gz - lever * down_y - (yy * ax - xy * ay) - (dyy * wx - dxy * wy) - (wy * lz - wz * ly)
-    ty = -sx * gz + lever * down_x - (xx * ay - xy * ax) - (dxx * wy - dxy * wx) - (wz * lx - wx * lz)
+    tx = (
+        sy * gz - lever * down_y - (yy * ax - xy * ay) - (dyy * wx - dxy * wy) - (wy * lz - wz * ly)
+    )
+    ty = (
+        -sx * gz
+        + lever * down_x
+        - (xx * ay - xy * ax)
+        - (dxx * wy - dxy * wx)
+        - (wz * lx - wx * lz)
+    )
     tz = sx * gy - sy * gx - (xx + yy) * az - (dxx + dyy) * wz - spin - (wx * ly - wy * lx)
     row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     rx, ry, rz = basin_offset(tables, basin, out)
@@ -246,9 +331,16 @@ def extra_accelerations(tables, basin, out):
     """
     row = body_row(tables, basin["body"])
     rx, ry, rz = basin_offset(tables, basin, out)
-    s, e, a, o = row + body.SPIN_RATE, row + body.SPIN_BIAS, row + body.ACCELERATION, row + body.BIAS
-    wx, wy, wz = out[s] - out[e], out[s + 1] - out[e + 1], out[s + 2] - out[e + 2]
-    ax, ay, az = out[a] - out[o], out[a + 1] - out[o + 1], out[a + 2] - out[o + 2]
+    s = row + body.SPIN_RATE
+    e = row + body.SPIN_BIAS
+    a = row + body.ACCELERATION
+    o = row + body.BIAS
+    wx = out[s] - out[e]
+    wy = out[s + 1] - out[e + 1]
+    wz = out[s + 2] - out[e + 2]
+    ax = out[a] - out[o]
+    ay = out[a + 1] - out[o + 1]
+    az = out[a + 2] - out[o + 2]
     return ax + wy * rz - wz * ry, ay + wz * rx - wx * rz, az + wx * ry - wy * rx, wx, wy, wz
 
 
@@ -278,7 +370,9 @@ def origin_acceleration(tables, basin, b, out):
     cx, cy, cz = cross(out, row + body.SPIN, u, v, w)
     tx, ty, tz = cross(out, row + body.SPIN_RATE, x, y, z)
     a, t = row + body.ACCELERATION, row + body.SPIN_RATE
-    ax, ay, az = in_axes(tables, b, out, out[a] + cx + tx, out[a + 1] + cy + ty, out[a + 2] + cz + tz)
+    ax, ay, az = in_axes(
+        tables, b, out, out[a] + cx + tx, out[a + 1] + cy + ty, out[a + 2] + cz + tz
+    )
     bx, by, bz = in_axes(tables, b, out, out[t], out[t + 1], out[t + 2])
     return ax, ay, az, bx, by, bz
 
@@ -297,7 +391,14 @@ def body_load(tables, basin, b, out):
     normal_force = out[m] * a - out[m + 1] * c + out[m + 2] * d
     moment_x = out[m + 2] * a - out[m + 4] * c + out[m + 5] * d
     moment_y = out[m + 1] * a - out[m + 3] * c + out[m + 4] * d
-    return out[f], out[f + 1], out[f + 2] - normal_force, out[f + 3] - moment_x, out[f + 4] + moment_y, out[f + 5]
+    return (
+        out[f],
+        out[f + 1],
+        out[f + 2] - normal_force,
+        out[f + 3] - moment_x,
+        out[f + 4] + moment_y,
+        out[f + 5],
+    )
 
 
 @njit
@@ -314,20 +415,29 @@ def add_power(t, y, dydt, out, handle, power):
             continue
         at, row = basin["frame"], basin_first_row(tables, power, b)
         vx, vy, vz = origin_velocity(tables, basin, b, out)
-        wx, wy, wz = plane[at + frame.WX], plane[at + frame.WY], plane[at + frame.WZ]
+        wx = plane[at + frame.WX]
+        wy = plane[at + frame.WY]
+        wz = plane[at + frame.WZ]
         fx, fy, fz, tx, ty, tz = body_load(tables, basin, b, out)
         power[row] -= fx * vx + fy * vy + fz * vz + tx * wx + ty * wy + tz * wz
         own = 0.0 if basin["deep"] == 1 else power[row + 3]
         power[row + 3] = own + energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz)
-        power[row + 4] = (plane[at + frame.GN] + plane[at + FRAME_GRAVITY + 2]) * rise_moment(tables, basin, y, dydt)
+        power[row + 4] = (plane[at + frame.GN] + plane[at + FRAME_GRAVITY + 2]) * rise_moment(
+            tables, basin, y, dydt
+        )
 
 
 @njit
 def rise_moment(tables, basin, y, dydt):
     """Time derivative of the sum over cells of mass times depth / 2 [kg m/s]; 0 for a liquid."""
-    plane, total, n, o = tables.plane, 0.0, basin["n"], basin["y"]
+    plane = tables.plane
+    total = 0.0
+    n = basin["n"]
+    o = basin["y"]
     for i in range(n if basin["deep"] == 1 else 0):
-        total += plane[basin["area"] + i] * max(plane[basin["plan"] + i] + y[o + i], 0.0) * dydt[o + i]
+        total += (
+            plane[basin["area"] + i] * max(plane[basin["plan"] + i] + y[o + i], 0.0) * dydt[o + i]
+        )
     return tables.settings[0]["rho"] * total
 
 
@@ -337,36 +447,64 @@ def energy_rate(tables, basin, b, y, dydt, out, vx, vy, vz):
 
     For a liquid the energy in its own axes, see `liquid_energy`, is left out.
     """
-    plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_factor(tables, basin)
+    plane = tables.plane
+    n = basin["n"]
+    o = basin["y"]
+    at = basin["frame"]
+    per_area = mass_factor(tables, basin)
     m = tables.layout[0]["tank"] + TANK_OUT * b + MOMENTS
-    wx, wy, wz = plane[at + frame.WX], plane[at + frame.WY], plane[at + frame.WZ]
+    wx = plane[at + frame.WX]
+    wy = plane[at + frame.WY]
+    wz = plane[at + frame.WZ]
     ax, ay, az, bx, by, bz = origin_acceleration(tables, basin, b, out)
     qx = qy = turn = fx = fy = spin = own_rate = lever = high = 0.0
     dx = dy = dxx = dxy = dyy = 0.0
     for i in range(n):
         x, z = cell_position(plane, basin, i)
-        per, depth = per_area * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
-        p, q, mass_rate = y[o + n + i], y[o + 2 * n + i], per * dydt[o + i]
+        per = per_area * plane[basin["area"] + i]
+        depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
+        p = y[o + n + i]
+        q = y[o + 2 * n + i]
+        mass_rate = per * dydt[o + i]
         dp, dq = dydt[o + n + i], dydt[o + 2 * n + i]
-        qx, qy, turn = qx + per * p, qy + per * q, turn + per * (x * q - z * p)
-        fx, fy, spin = fx + per * dp, fy + per * dq, spin + per * (x * dq - z * dp)
+        qx = qx + per * p
+        qy = qy + per * q
+        turn = turn + per * (x * q - z * p)
+        fx = fx + per * dp
+        fy = fy + per * dq
+        spin = spin + per * (x * dq - z * dp)
         dx, dy = dx + mass_rate * x, dy + mass_rate * z
-        dxx, dxy, dyy = dxx + mass_rate * x * x, dxy + mass_rate * x * z, dyy + mass_rate * z * z
+        dxx = dxx + mass_rate * x * x
+        dxy = dxy + mass_rate * x * z
+        dyy = dyy + mass_rate * z * z
         if basin["deep"] == 1:
             share, bed = velocity_factor(depth), bed_height(plane, basin, i)
             u, v = share * p, share * q
             own_rate += per * (u * dp + v * dq) - 0.5 * mass_rate * (u * u + v * v)
-            lever, high = lever + per * depth * (bed + 0.5 * depth), high + mass_rate * (bed + depth)
-    mass, sx, sy, xx, xy, yy = out[m], out[m + 1], out[m + 2], out[m + 3], out[m + 4], out[m + 5]
-    ax, ay, az = ax - (wy * vz - wz * vy), ay - (wz * vx - wx * vz), az - (wx * vy - wy * vx)  # of its parts
-    px, py, pz = mass * vx + qx - wz * sy, mass * vy + qy + wz * sx, mass * vz + wx * sy - wy * sx
+            lever = lever + per * depth * (bed + 0.5 * depth)
+            high = high + mass_rate * (bed + depth)
+    mass = out[m]
+    sx = out[m + 1]
+    sy = out[m + 2]
+    xx = out[m + 3]
+    xy = out[m + 4]
+    yy = out[m + 5]
+    # of its parts
+    ax = ax - (wy * vz - wz * vy)
+    ay = ay - (wz * vx - wx * vz)
+    az = az - (wx * vy - wy * vx)
+    px = mass * vx + qx - wz * sy
+    py = mass * vy + qy + wz * sx
+    pz = mass * vz + wx * sy - wy * sx
     total = px * ax + py * ay + pz * az
     fz = bx * sy - by * sx + wx * dy - wy * dx
     total += vx * (fx - bz * sy - wz * dy) + vy * (fy + bz * sx + wz * dx) + vz * fz
     total += (yy * wx - xy * wy) * bx + (xx * wy - xy * wx) * by + (xx + yy) * wz * bz
     total += 0.5 * (dyy * wx * wx - 2.0 * dxy * wx * wy + dxx * wy * wy + (dxx + dyy) * wz * wz)
     total += bz * turn + wz * spin + own_rate
-    gx, gy, gz = plane[at + FRAME_GRAVITY], plane[at + FRAME_GRAVITY + 1], plane[at + FRAME_GRAVITY + 2]
+    gx = plane[at + FRAME_GRAVITY]
+    gy = plane[at + FRAME_GRAVITY + 1]
+    gz = plane[at + FRAME_GRAVITY + 2]
     total -= mass * (gx * vx + gy * vy + gz * vz) + gx * dx + gy * dy + gz * high
     return total + (wy * gz - wz * gy) * sx + (wz * gx - wx * gz) * sy + (wx * gy - wy * gx) * lever
 
@@ -384,27 +522,46 @@ def add_stored(t, y, dydt, out, handle, stored):
         basin = tables.basins[b]
         if basin["frame"] < 0:
             continue
-        n, o, at, m = basin["n"], basin["y"], basin["frame"], tables.layout[0]["tank"] + TANK_OUT * b
+        n = basin["n"]
+        o = basin["y"]
+        at = basin["frame"]
+        m = tables.layout[0]["tank"] + TANK_OUT * b
         per_area = mass_factor(tables, basin)
         vx, vy, vz = origin_velocity(tables, basin, b, out)
-        wx, wy, wz = plane[at + frame.WX], plane[at + frame.WY], plane[at + frame.WZ]
+        wx = plane[at + frame.WX]
+        wy = plane[at + frame.WY]
+        wz = plane[at + frame.WZ]
         qx = qy = turn = inner = lever = 0.0
         for i in range(n):
             x, z = cell_position(plane, basin, i)
-            per, depth = per_area * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
+            per = per_area * plane[basin["area"] + i]
+            depth = max(plane[basin["plan"] + i] + y[o + i], 0.0)
             p, q = y[o + n + i], y[o + 2 * n + i]
-            qx, qy, turn = qx + per * p, qy + per * q, turn + per * (x * q - z * p)
+            qx = qx + per * p
+            qy = qy + per * q
+            turn = turn + per * (x * q - z * p)
             if basin["deep"] == 1:
                 inner += 0.5 * per * velocity_factor(depth) * (p * p + q * q)
                 lever += per * depth * (bed_height(plane, basin, i) + 0.5 * depth)
-        mass, sx, sy, xx, xy, yy = out[m], out[m + 1], out[m + 2], out[m + 3], out[m + 4], out[m + 5]
+        mass = out[m]
+        sx = out[m + 1]
+        sy = out[m + 2]
+        xx = out[m + 3]
+        xy = out[m + 4]
+        yy = out[m + 5]
         total = 0.5 * mass * (vx * vx + vy * vy + vz * vz)
         total += vx * (qx - wz * sy) + vy * (qy + wz * sx) + vz * (wx * sy - wy * sx)
-        total += 0.5 * (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy + (xx + yy) * wz * wz) + wz * turn + inner
+        total += (
+            0.5 * (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy + (xx + yy) * wz * wz)
+            + wz * turn
+            + inner
+        )
         row = body_row(tables, basin["body"])
         height = out[row + body.POSITION + 2] + basin_offset(tables, basin, out)[2]
         total += mass * tables.settings[0]["gravity"] * height
-        gx, gy, gz = plane[at + FRAME_GRAVITY], plane[at + FRAME_GRAVITY + 1], plane[at + FRAME_GRAVITY + 2]
+        gx = plane[at + FRAME_GRAVITY]
+        gy = plane[at + FRAME_GRAVITY + 1]
+        gz = plane[at + FRAME_GRAVITY + 2]
         total -= gx * sx + gy * sy + gz * lever
         k = stored.size - tables.basins.size + b
         stored[k] = total + (0.0 if basin["deep"] == 1 else stored[k])

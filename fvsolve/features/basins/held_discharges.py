@@ -7,7 +7,10 @@ from fvsolve.core.solve.run_summary import Mark, scheduled_volume
 from fvsolve.features.basins.lower import HELD
 
 HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
-    ("the scheduled outflow", "less than scheduled have left; give less outflow, or `stage` or `rating`"),
+    (
+        "the scheduled outflow",
+        "less than scheduled have left; give less outflow, or `stage` or `rating`",
+    ),
     (
         "the flow drawn from it",
         "were added to meet it (`made_up` in the mass balance); draw less, or widen the patch",
@@ -23,16 +26,19 @@ def held_discharges(run_data, start: float, t: float, entered: np.ndarray) -> li
     model, marks = run_data.model, []
     times = run_data.marks[len(model.pipes) + len(model.node_names) :]
     for row in model.tables.patches[np.isin(model.tables.patches["closure"], HELD)]:
-        name, time = model.node_names[row["node"]].removesuffix(".inside"), float(times[row["node"]])
+        name = model.node_names[row["node"]].removesuffix(".inside")
+        time = float(times[row["node"]])
         if np.isfinite(time):
             basin, _, patch = name.partition(".")
-            volume, linked = (
-                float(entered[row["node"]]) / model.case.properties.density,
-                row["closure"] != rec.DISCHARGE,
-            )
+            volume = float(entered[row["node"]]) / model.case.properties.density
+            linked = row["closure"] != rec.DISCHARGE
             if not linked:
-                volume -= scheduled_volume(model.case.nodes[basin].patches[patch].discharge, start, t)
-            lack, when = (model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time")))
+                volume -= scheduled_volume(
+                    model.case.nodes[basin].patches[patch].discharge, start, t
+                )
+            lack, when = (
+                model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time"))
+            )
             drawn, result = HELD_TEXTS[int(linked)]
             text = f"{name}: from {when} on {drawn} is more than critical flow, which leaves instead; {lack} {result}"
             marks.append(Mark("discharge held", f"nodes.{name}", time, text, volume))

@@ -7,7 +7,8 @@ import numpy as np
 from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.kernels import dtypes as rec
 
-HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)  # closures of patches whose outflow is held at critical flow
+# closures of patches whose outflow is held at critical flow
+HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)
 
 
 def lower_basins(draft, own) -> None:
@@ -34,7 +35,9 @@ def lower_basins(draft, own) -> None:
 
 def reserve_basins(draft) -> None:
     """Reserve the arrays of basins and moving walls; rows of the ledger: rain, and negative infiltration."""
-    sizes, basins, walls = draft.sizes, len(draft.basin_table), len(draft.wall_table)
+    sizes = draft.sizes
+    basins = len(draft.basin_table)
+    walls = len(draft.wall_table)
     sizes.ledger("source", draft.sources)
     sizes.out("wall", walls)
     sizes.out("tank", rec.TANK_OUT * basins if frames_of(draft) else 0)
@@ -53,7 +56,9 @@ def rows_class(physics: type) -> type:
     return import_module("fvsolve.features.basins.lower_basin").BasinRows.physics[home]
 
 
-def start_basins(basins: list, y: np.ndarray, attitudes: dict[str, np.ndarray] | None = None) -> None:
+def start_basins(
+    basins: list, y: np.ndarray, attitudes: dict[str, np.ndarray] | None = None
+) -> None:
     """Write the states of basins at the start, as deviations from the initial steady state, to the states of a model.
 
     basins : `BasinRows` of all basins, with their stated start and values of scalars

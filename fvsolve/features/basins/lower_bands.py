@@ -20,7 +20,8 @@ class BandedRows(MeshedPart):
     """Rows of a grid, or blocks of cells of another mesh (`cell_sides.BLOCK`), which are its rows."""
 
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
-    banded_mesh: ClassVar[bool] = False  # True if threads can step bands of blocks of cells of another mesh
+    # True if threads can step bands of blocks of cells of another mesh
+    banded_mesh: ClassVar[bool] = False
     margin: ClassVar[int] = BAND_MARGIN
     row: Any  # of the table of basins
     number: int  # of this row
@@ -28,9 +29,13 @@ class BandedRows(MeshedPart):
     @property
     def undivided_reason(self) -> str:
         if not self.is_grid and (self.scalars or not self.banded_mesh):
-            return "its mesh is not a full rectangle" + " and carries scalars" * (len(self.scalars) > 0)
+            return "its mesh is not a full rectangle" + " and carries scalars" * (
+                len(self.scalars) > 0
+            )
         if not self.is_grid and self.n < LEAST_CELLS_DIVIDED:
-            return f"its mesh is not a full rectangle and has fewer than {LEAST_CELLS_DIVIDED} cells"
+            return (
+                f"its mesh is not a full rectangle and has fewer than {LEAST_CELLS_DIVIDED} cells"
+            )
         if self.moves:
             return "its walls move"
         if self.part.on is not None:
@@ -43,7 +48,11 @@ class BandedRows(MeshedPart):
             return f"{listing(decaying)} {'decay' if len(decaying) > 1 else 'decays'}"
         if self.scalars and self.case.reactions:
             return "its scalars react"
-        return "" if self.banded else f"its physics {self.part.physics} cannot be distributed over threads"
+        return (
+            ""
+            if self.banded
+            else f"its physics {self.part.physics} cannot be distributed over threads"
+        )
 
     @property
     def row_size(self) -> int:
@@ -66,9 +75,8 @@ class BandedRows(MeshedPart):
             return max(first - BAND_MARGIN, 0), min(stop + BAND_MARGIN, self.row_count)
         slots, count = self.integers[0], -(-self.n // BLOCK)
         at = HEAD + INDICES * count * slots * BLOCK // 2
-        need = self.integers[
-            at : at + count
-        ]  # array `need` of `cell_sides`: rates read values at sides, and these read the cells next to them
+        # array `need` of `cell_sides`: rates read values at sides, and these read the cells next to them
+        need = self.integers[at : at + count]
         sides = int(np.searchsorted(need, first, "right")), int(need[stop - 1])
         return int(np.searchsorted(need, sides[0], "right")), int(need[sides[1] - 1])
 
@@ -81,7 +89,9 @@ class BandedRows(MeshedPart):
             if patch["closure"] != rec.NO_CLOSURE:
                 yield cells_at_faces(integers, patch)
         probes = tables.probes
-        for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == number)]:
+        for probe in probes[
+            np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == number)
+        ]:
             yield integers[probe["cell"] : probe["cell"] + probe["count"]]
 
     def boundary_rows(self) -> tuple[int, np.ndarray]:
@@ -89,7 +99,9 @@ class BandedRows(MeshedPart):
         if at < 0:
             return at, np.zeros(0, int)
         if nx > 0:
-            return at, np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
+            return at, np.concatenate(
+                [np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)]
+            )
         return at, self.mesh.left[self.mesh.inner :] // BLOCK
 
     def maxima_of_rows(self, first: int, stop: int) -> list[slice]:
@@ -99,7 +111,9 @@ class BandedRows(MeshedPart):
         if self.row["nx"] > 0:
             return [slice(at + size * first, at + size * stop)]
         begin, end = self.cells_of_rows(first, stop)  # a row of each quantity
-        return [slice(at + q * self.n + begin, at + q * self.n + end) for q in range(size // self.n)]
+        return [
+            slice(at + q * self.n + begin, at + q * self.n + end) for q in range(size // self.n)
+        ]
 
     def band(self, first: int, stop: int) -> tuple[int, int]:
         return (first, stop) if self.row["nx"] > 0 else self.cells_of_rows(first, stop)

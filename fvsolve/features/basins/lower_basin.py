@@ -47,13 +47,18 @@ class BasinRows(BandedRows):
     """
 
     physics: ClassVar[dict[str, type[BasinRows]]] = {}  # by the package that declares it
-    deep: ClassVar[bool] = False  # True if its first quantity is a depth (minus that in `plan`) that contains scalars
-    steepest: ClassVar[float] = math.inf  # on meshes, bound of gradients in cells, see `cell_sides.gradient_share`
+    # True if its first quantity is a depth (minus that in `plan`) that contains scalars
+    deep: ClassVar[bool] = False
+    # on meshes, bound of gradients in cells, see `cell_sides.gradient_share`
+    steepest: ClassVar[float] = math.inf
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
-    has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
-    extrapolates: bool = False  # True if sides of cells at driven faces of a mesh depend on the cells around them
+    # True if outgoing waves are extrapolated by a polynomial of five cells
+    has_wide_closure: ClassVar[bool] = True
+    # True if sides of cells at driven faces of a mesh depend on the cells around them
+    extrapolates: bool = False
     no_fifth_order: ClassVar[str] = "does not support walls on faces"  # reason on a grid
-    fades: float = 0.0  # stored quantity below which velocities, the other quantities over it, fade to zero; 0 for none
+    # stored quantity below which velocities, the other quantities over it, fade to zero; 0 for none
+    fades: float = 0.0
     max_divergence: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:
@@ -66,7 +71,8 @@ class BasinRows(BandedRows):
         self.memory = 0  # size of its tables and its state [bytes]
         self.is_grid = is_grid(self.mesh)
         self.scalars = list(case.scalars) if self.part.physics_type.carries else []
-        self.quantities = tuple(self.part.physics_type.states)  # of cells; the first is the stored quantity
+        # of cells; the first is the stored quantity
+        self.quantities = tuple(self.part.physics_type.states)
         # for each moving wall: state, stretch of cells per travel [1/m], displacement of corners per travel
         self.stretches: list[tuple[int, np.ndarray, np.ndarray]] = []
 
@@ -103,7 +109,9 @@ class BasinRows(BandedRows):
         velocity, speed = self.speeds(self.deviations(y))
         if not self.is_grid:
             left, right = self.mesh.left, self.mesh.right[: self.mesh.inner]
-            across = np.abs(np.einsum("fd,fd->f", velocity[left, :2], self.mesh.normal)) + speed[left]
+            across = (
+                np.abs(np.einsum("fd,fd->f", velocity[left, :2], self.mesh.normal)) + speed[left]
+            )
             through = np.bincount(left, across * self.mesh.length, self.n)
             through += np.bincount(right, (across * self.mesh.length)[: right.size], self.n)
             return float((0.5 * through / self.mesh.area).max()), 1.0
@@ -140,7 +148,8 @@ class BasinRows(BandedRows):
         row["side"], row["scale"] = VELOCITIES[field], 1.0
 
     soil: Any = None  # keys of the soil into which water infiltrates; None without infiltration
-    soil_states: int = 0  # states of each cell that belong to the soil: infiltrated height, condensed time
+    # states of each cell that belong to the soil: infiltrated height, condensed time
+    soil_states: int = 0
     rains: bool = False  # True if rain falls on the basin
 
     @property
@@ -152,7 +161,9 @@ class BasinRows(BandedRows):
     def source_states(self) -> np.ndarray:
         """Indices in y of the heights of rain, and of the states of the soil."""
         rained = [int(self.row["rained"])] if self.rains else []
-        return np.append(rained, int(self.row["infiltrated"]) + np.arange(self.n * self.soil_states)).astype(int)
+        return np.append(
+            rained, int(self.row["infiltrated"]) + np.arange(self.n * self.soil_states)
+        ).astype(int)
 
     def lower_sources(self, draft, row) -> None:
         """Fill the columns of rain and infiltration, and add their states."""
@@ -250,7 +261,11 @@ class BasinRows(BandedRows):
 
         Interior patches are left out.
         """
-        return [name for name in self.mesh.patches if f"{self.name}.{name}" in self.case.patches_with_faces]
+        return [
+            name
+            for name in self.mesh.patches
+            if f"{self.name}.{name}" in self.case.patches_with_faces
+        ]
 
     @property
     def opening(self) -> str | None:
@@ -273,7 +288,10 @@ class BasinRows(BandedRows):
     @property
     def units_of_maxima(self) -> dict[str, str]:
         """SI unit of each quantity of `maxima`, by name."""
-        return {name: DIMENSIONS[dimension].si for name, dimension in self.part.physics_type.maxima.items()}
+        return {
+            name: DIMENSIONS[dimension].si
+            for name, dimension in self.part.physics_type.maxima.items()
+        }
 
     @property
     def records_maxima(self) -> bool:
@@ -284,7 +302,9 @@ class BasinRows(BandedRows):
     def sections(self) -> dict[str, FaceChain]:
         """Faces of its sections, by name."""
         stated = self.case.output.sections.items()
-        return {name: section.chain(self.mesh) for name, section in stated if section.basin == self.name}
+        return {
+            name: section.chain(self.mesh) for name, section in stated if section.basin == self.name
+        }
 
     @property
     def walls(self) -> list[str]:
@@ -302,9 +322,14 @@ class BasinRows(BandedRows):
 
     def node_points(self) -> dict[str, np.ndarray]:
         middle, faces = self.mesh.middle, self.mesh.faces
-        return {f"{self.name}.{patch}": middle[faces(patch).index].mean(axis=0) for patch in patch_names(self.mesh)}
+        return {
+            f"{self.name}.{patch}": middle[faces(patch).index].mean(axis=0)
+            for patch in patch_names(self.mesh)
+        }
 
-    def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
+    def vectors_at(
+        self, fields: dict[str, np.ndarray], out: np.ndarray, layout
+    ) -> dict[str, np.ndarray]:
         """Vectors in cells of a basin on a body, in axes of the world: "velocity" and "normal" -> float64[n, 3].
 
         "normal" is the unit normal of the basin. fields : result of `fields`
@@ -320,7 +345,9 @@ class BasinRows(BandedRows):
         For a basin on a body they are in axes of the world.
         """
         x, z = np.ascontiguousarray(self.mesh.points.T)
-        plan = self.mesh.points + sum((y[at] * weights for at, _, weights in self.stretches), np.zeros((1, 2)))
+        plan = self.mesh.points + sum(
+            (y[at] * weights for at, _, weights in self.stretches), np.zeros((1, 2))
+        )
         points = np.column_stack([plan, self.ground(x, z)])
         if self.part.on is None:
             return points
@@ -342,7 +369,9 @@ class BasinRows(BandedRows):
 
         The columns that all types have are filled here, the others by `lower`.
         """
-        numerics, mesh, before = self.case.numerics, self.mesh, draft.used_size()
+        numerics = self.case.numerics
+        mesh = self.mesh
+        before = draft.used_size()
         self.row, row["n"] = row, self.n
         row["kind"] = physics_code(type(self).__module__.rpartition(".")[0])
         row["deep"], row["given"] = self.deep, self.given
@@ -354,7 +383,9 @@ class BasinRows(BandedRows):
         if self.is_grid:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
-            row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
+            row["spacing"] = draft.to_plane(
+                np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)])
+            )
         else:
             floats, self.integers = lower_mesh(mesh, self.steepest)
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
@@ -370,7 +401,9 @@ class BasinRows(BandedRows):
         passes = any(self.reflection(patch) != 1.0 for patch in self.part.patches.values())
         row["through"] = draft.to_work(reflections.size) if passes else -1
         has_boundary_rates = reflections.size or self.moves or self.part.on or self.sections
-        row["boundary_rates"] = draft.to_work(len(self.quantities) * self.n if has_boundary_rates else 0)
+        row["boundary_rates"] = draft.to_work(
+            len(self.quantities) * self.n if has_boundary_rates else 0
+        )
         row["carried"] = row["flows"] = -1
         if self.moves:
             from fvsolve.features.basins.lower_motion import lower_lines
@@ -394,14 +427,19 @@ class BasinRows(BandedRows):
         self.lower_sources(draft, row)
         self.memory = 8 * (draft.used_size() + draft.size - before)
         place = f"nodes.{self.name}"
-        draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
+        draft.warnings += [
+            Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes
+        ]
 
     def limiter_code(self, limiter: str) -> int:
         """Code of a limiter for kernels. Raises FvsolveError on grids for one that is not symmetric."""
         own = LIMITERS[limiter].own
-        if self.is_grid and own is not None and not own.symmetric:  # flows through walls would not be zero
+        # flows through walls would not be zero
+        if self.is_grid and own is not None and not own.symmetric:
             text = f"numerics.limiter: {limiter} is not symmetric: {own.costs[-1]}"
-            raise FvsolveError(f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids")
+            raise FvsolveError(
+                f"{text}; expected a limiter with phi(r) / r = phi(1 / r) for basins on grids"
+            )
         return code_of_limiter(limiter, __name__ if self.is_grid else "")
 
     def lower_scalars(self, draft, row) -> None:
@@ -410,7 +448,11 @@ class BasinRows(BandedRows):
         row["outside"] = draft.to_work(len(self.scalars) * int(row["outer"]))
         if self.is_grid:
             flows = grid.ny * (grid.nx + 1) + (grid.ny + 1) * grid.nx
-            sizes = [advection_work, diffusion_work, *([fifth_order_work] if self.is_fifth_order else [])]
+            sizes = [
+                advection_work,
+                diffusion_work,
+                *([fifth_order_work] if self.is_fifth_order else []),
+            ]
             work_size = self.n + max(size(grid.nx, grid.ny) for size in sizes)
         else:
             flows, work_size = mesh.left.size, self.n + advection_faces.work_size(self.integers)
@@ -423,7 +465,9 @@ class BasinRows(BandedRows):
             limited = f", {numerics.limiter}" if self.scheme == "muscl" else ""
             text = f"basin {self.name}: scalars may leave their bounds ({self.scheme}{limited}; {numerics.method}): "
             key, reason, value, limit = violation
-            draft.warnings.append(Notice("bounds", f"nodes.{self.name}", text + reason, key, value, limit))
+            draft.warnings.append(
+                Notice("bounds", f"nodes.{self.name}", text + reason, key, value, limit)
+            )
 
     def bounds_violation(self, row) -> tuple[str, str, float | None, float | None] | None:
         """Reason why scalars may leave their bounds: (key of the case, text, value, limit); None if they cannot.
@@ -432,14 +476,30 @@ class BasinRows(BandedRows):
         """
         numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
         if row["scheme"] == rec.LINEAR:
-            return "scheme", "upwind5 does not keep scalars within bounds; upwind, muscl and weno5 do", None, None
+            return (
+                "scheme",
+                "upwind5 does not keep scalars within bounds; upwind, muscl and weno5 do",
+                None,
+                None,
+            )
         if method is None or not method.explicit or numerics.courant is None:
-            key = "step" if numerics.step is not None else "rtol" if numerics.rtol is not None else "method"
+            key = (
+                "step"
+                if numerics.step is not None
+                else "rtol"
+                if numerics.rtol is not None
+                else "method"
+            )
             return key, f"ssp-rk3 with courant = {COURANT:g} or less keeps the bounds", None, None
         diffusing = [name for name in self.scalars if self.case.scalars[name].diffusivity > 0.0]
         if diffusing and not self.is_grid:
             text = f"{listing(diffusing)} {'diffuse' if len(diffusing) > 1 else 'diffuses'} on a mesh that is "
-            return None, f"{text}not a full rectangle; a full rectangle keeps the bounds", None, None
+            return (
+                None,
+                f"{text}not a full rectangle; a full rectangle keeps the bounds",
+                None,
+                None,
+            )
         if self.max_divergence > ROUNDING * row["fastest"]:
             reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s"
             text = f"{reason}, which concentrates or dilutes scalars; a velocity by a stream function has no divergence"
@@ -449,7 +509,12 @@ class BasinRows(BandedRows):
             key, advice = "courant", f"Courant numbers up to {radius:g} keep the bounds"
             if not radius:
                 key, advice = "method", "with this method no Courant number keeps the bounds"
-            return key, f"{advice}; ssp-rk3 keeps the bounds up to a Courant number of 1", numerics.courant, radius
+            return (
+                key,
+                f"{advice}; ssp-rk3 keeps the bounds up to a Courant number of 1",
+                numerics.courant,
+                radius,
+            )
         return None
 
     def scalar_scale(self, name: str) -> float:
@@ -480,7 +545,9 @@ class BasinRows(BandedRows):
             yield bound_rows(states, none, none, self.at_rest(), 0.0, -1.0, np.inf)
         if self.fades > 0.0 and self.row["friction"] != rec.NO_DRAG:
             for k in range(1, len(self.quantities)):
-                yield bound_rows(states + k * self.n, states, none, self.at_rest(), 1.0, self.fades, -1.0)
+                yield bound_rows(
+                    states + k * self.n, states, none, self.at_rest(), 1.0, self.fades, -1.0
+                )
 
     def start_scalars(self, y: np.ndarray) -> None:
         """Write the amounts of scalars at the start to the states y of the model, for the depths of cells in y."""
@@ -499,8 +566,13 @@ class BasinRows(BandedRows):
 
         Below the depth DRY they tend to 0.
         """
-        depth = np.maximum(self.depth_of(self.deviations(y)), DRY) * (self.area_ratios(y) if self.moves else 1.0)
-        return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
+        depth = np.maximum(self.depth_of(self.deviations(y)), DRY) * (
+            self.area_ratios(y) if self.moves else 1.0
+        )
+        return {
+            name: amounts / depth
+            for name, amounts in zip(self.scalars, self.amounts(y), strict=True)
+        }
 
     def mass_per_depth(self) -> np.ndarray:
         """Mass of fluid per depth in each cell : float64[n] [kg/m]; times an amount per area, the mass of a scalar.
@@ -530,4 +602,6 @@ class BasinRows(BandedRows):
         row["open"], row["moves"] = self.is_open(patch), patch in self.walls
         given = stated.scalars if stated is not None else {}
         row["values"] = len(draft.integers)
-        draft.integers += [draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars]
+        draft.integers += [
+            draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars
+        ]

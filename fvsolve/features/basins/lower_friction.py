@@ -35,7 +35,9 @@ class RowsWithFriction(BasinRows):
         """
         method, on = METHODS.get(self.case.numerics.method), self.part.on
         is_moved_by_forces = on is not None and any(free_joints(on, self.case.nodes))
-        return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
+        return (
+            self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
+        )
 
     @property
     def has_rate_cap(self) -> bool:
@@ -68,7 +70,13 @@ class ErrorWatch:
     """
 
     def __init__(self, basin, by, notice, least: float) -> None:
-        self.basin, self.by, self.notice, self.least, self.greatest = basin, by, notice, least, np.full(4, np.nan)
+        self.basin, self.by, self.notice, self.least, self.greatest = (
+            basin,
+            by,
+            notice,
+            least,
+            np.full(4, np.nan),
+        )
 
     def check(self, t: float, y: np.ndarray) -> None:
         """Update the greatest error with the error of a state y of the model at time t [s]."""
@@ -101,7 +109,9 @@ def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
 
 def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too fast. error : result of `fast_film_error`; when : text of the time"""
-    remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
+    remedy = (
+        'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
+    )
     deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
         f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the decay rate by friction, "
@@ -118,7 +128,9 @@ def cap_checks(basin) -> list[tuple]:
 
 def start_notices(basin, y: np.ndarray, checks: list[tuple]) -> list[Notice]:
     """Notices of pairs such as `cap_checks` whose errors at deviations y are above FILM_ERROR."""
-    return [notice(basin, error) for look, notice in checks if (error := look(basin, y))[0] > FILM_ERROR]
+    return [
+        notice(basin, error) for look, notice in checks if (error := look(basin, y))[0] > FILM_ERROR
+    ]
 
 
 def run_checks(basin, y: np.ndarray, checks: list[tuple]) -> list[ErrorWatch]:

@@ -25,11 +25,16 @@ def lower_mesh(mesh: Mesh, steepest: float = math.inf) -> tuple[np.ndarray, np.n
 
     Cells and faces keep their numbers. steepest : see `cell_sides.gradient_share`
     """
-    n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
+    n = len(mesh.area)
+    f = len(mesh.left)
+    inner = mesh.inner
     slots, face, own, side = sides_of_cells(mesh)
-    block, lane, count = own // BLOCK, own % BLOCK, -(-n // BLOCK)
+    block = own // BLOCK
+    lane = own % BLOCK
+    count = -(-n // BLOCK)
     slot, at = (4 * block + side) * BLOCK + lane, (slots * block + side) * BLOCK + lane
-    other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])  # the side beyond, or itself
+    # the side beyond, or itself
+    other = np.concatenate([f + np.arange(inner), np.arange(inner, f), np.arange(inner)])
     step = np.abs(block[other] - block)
     ring = 1 << int(3 * step.max()).bit_length()
     need = np.zeros(count, np.int64)
@@ -47,7 +52,12 @@ def lower_mesh(mesh: Mesh, steepest: float = math.inf) -> tuple[np.ndarray, np.n
     measures[:, at] = _measures(mesh, face, own, n, steepest)
     rank = np.argsort(slot[inner:f])
     measures, distances = np.split(measures, [cell_sides.MEASURES])
-    floats = [_by_block(measures), mesh.normal[inner + rank].T.ravel(), mesh.length, _by_block(distances)]
+    floats = [
+        _by_block(measures),
+        mesh.normal[inner + rank].T.ravel(),
+        mesh.length,
+        _by_block(distances),
+    ]
     need = np.maximum.accumulate(need)
     places = _by_block(indices).astype(np.int32).view(np.int64)
     integers = [[slots, n, f, f - inner, ring], places, need, slot[inner + rank], rank, face_of]
@@ -66,9 +76,10 @@ def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     number, left = np.where(face >= 0, face, ~face), face >= 0
     ends = np.zeros((moving_meshes.ENDS, count * slots * BLOCK), np.int64)
     ends[:, at] = [
-        mesh.ends[number, np.where(left, 0, 1)], mesh.ends[number, np.where(left, 1, 0)],
+        mesh.ends[number, np.where(left, 0, 1)],
+        mesh.ends[number, np.where(left, 1, 0)],
         np.maximum(np.where(left, mesh.right[number], mesh.left[number]), -1),
-    ]  # fmt: skip
+    ]
     corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
     has_moving_corner = moves[corners].any(axis=1)
     is_affected = has_moving_corner.copy()
@@ -84,9 +95,12 @@ def sides_of_cells(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]
 
     The entry of `face` is ~f where the cell is to the right of face f.
     """
-    n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
+    n = len(mesh.area)
+    f = len(mesh.left)
+    inner = mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
-    face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
+    # ~f where the cell is on the right of it
+    face = np.concatenate([np.arange(f), ~np.arange(inner)])
     own = np.concatenate([mesh.left, mesh.right[:inner]])
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
     # angle of the outward normal plus pi: sides of rectangles in the order west, south, east, north
@@ -130,14 +144,21 @@ def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int, steepest: f
         share_of = _gradient_shares(around.T, square.T, weighted.T, steepest)
     (xx, xy), (_, yy) = square[:, :, own]
     scale = share_of[own] * weight / (xx * yy - xy * xy)
-    slope = scale * (yy * across[:, 0] - xy * across[:, 1]), scale * (xx * across[:, 1] - xy * across[:, 0])
+    slope = (
+        scale * (yy * across[:, 0] - xy * across[:, 1]),
+        scale * (xx * across[:, 1] - xy * across[:, 0]),
+    )
     gap = 1.0 / np.sum(across * normal, axis=1)
     offset = normal - across * gap[:, None]
     share = 1.0 / mesh.area[own]
-    return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *offset.T])
+    return np.stack(
+        [*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *offset.T]
+    )
 
 
-def _gradient_shares(sides: np.ndarray, squares: np.ndarray, weighted: np.ndarray, steepest: float) -> np.ndarray:
+def _gradient_shares(
+    sides: np.ndarray, squares: np.ndarray, weighted: np.ndarray, steepest: float
+) -> np.ndarray:
     """Factors on the gradients of cells, see `cell_sides.gradient_share` : float64[n]. Matrices : float64[n, 2, 2]"""
     inverse = np.linalg.inv(squares)
     largest = np.linalg.eigvals(sides @ inverse @ weighted @ inverse).real.max(axis=1)
@@ -156,7 +177,9 @@ def lower_frame(draft, basin, row) -> None:
     this point, and the mirror cells at walls neglect the Euler force beyond the wall. With this origin the error is
     least, and does not depend on the origin of the coordinates of the mesh.
     """
-    part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
+    part = basin.part
+    grid = basin.mesh.grid
+    middle = basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]
     if basin.is_grid:
         lines = [line - at for line, at in zip((grid.x, grid.y), middle, strict=True)]
@@ -172,12 +195,16 @@ def lower_frame(draft, basin, row) -> None:
             count = int(cell_sides.blocks(basin.integers) * basin.integers[0] * cell_sides.BLOCK)
             face = basin.integers[-count:]
             lines = basin.mesh.middle[np.where(face >= 0, face, ~face)].T - middle[:, None]
-        face_count = lines[0].size * grid.ny + grid.nx * lines[1].size if basin.is_grid else lines[0].size
+        face_count = (
+            lines[0].size * grid.ny + grid.nx * lines[1].size if basin.is_grid else lines[0].size
+        )
         numbers[frame.POTENTIALS], places = draft.to_work(basin.n + face_count), [*places, *lines]
     numbers[frame.CELL_POSITIONS] = draft.to_plane(np.concatenate(places))
     row["body"], row["frame"] = frames_of(draft).index(part.on), draft.to_plane(numbers)
     numbered = enumerate(draft.case.probes)
-    loads = [(k, p.name) for k, p in numbered if p.part == "nodes" and p.quantity.startswith("joint_")]
+    loads = [
+        (k, p.name) for k, p in numbered if p.part == "nodes" and p.quantity.startswith("joint_")
+    ]
     row["loads_body"] = any(loads) or any(free_joints(part.on, draft.case.nodes))
     chain = set(carriers(part.on, draft.case.nodes))
     for k, body in loads:
@@ -194,7 +221,11 @@ def position_in_frame(draft, basin, patch: str) -> list[float]:
     """
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
     own = part.rotation.T @ (np.array(place.at) - np.array(part.place))
-    return [*(own[:2] - basin.mesh.centroid).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
+    return [
+        *(own[:2] - basin.mesh.centroid).tolist(),
+        float(own[2]) - part.level,
+        draft.case.gravity * place.depth,
+    ]
 
 
 def potential_at_start(basin) -> np.ndarray:
@@ -213,7 +244,8 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
     The volume is that of the water at rest.
     attitude : rotation matrix of the body, None for that at the start
     """
-    part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
+    part = basin.part
+    turn = basin.case.poses[basin.part.on].attitude if attitude is None else attitude
     down = (turn @ part.rotation).T @ np.array([0.0, 0.0, -1.0])
     drawn, tilt = basin.bed - part.level, (down[0] * basin.x + down[1] * basin.y) / down[2]
     if not np.ptp(drawn + tilt - drawn) > 0.0:
@@ -239,7 +271,10 @@ def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarra
 def lower_walls(draft) -> None:
     """Fill the table of moving walls of a draft of a model, and add states for their travels."""
     parts = [(basin, patch) for basin in draft.meshed for patch in basin.walls]
-    draft.wall_table, draft.wall_names = np.zeros(len(parts), rec.WALL), [f"{b.name}.{patch}" for b, patch in parts]
+    draft.wall_table, draft.wall_names = (
+        np.zeros(len(parts), rec.WALL),
+        [f"{b.name}.{patch}" for b, patch in parts],
+    )
     for row, (basin, patch) in zip(draft.wall_table, parts, strict=True):
         stated, (axis, side) = basin.part.patches[patch], case.outward(basin.mesh, patch)
         row["basin"], row["outward"] = draft.meshed.index(basin), side
@@ -250,18 +285,32 @@ def lower_walls(draft) -> None:
         row["schedule"] = draft.schedules.add(stated.travel) if stated.travel is not None else -1
         if stated.body is not None:
             moved = coordinate_of(draft, stated.body)
-            row["mass"], row["body"], row["rate"], row["speed"] = moved.net, moved.frame, moved.rate, moved.velocity
-            row["inertia"], row["lightness"], row["schedule"] = moved.inertia, moved.lightness, moved.schedule
+            row["mass"], row["body"], row["rate"], row["speed"] = (
+                moved.net,
+                moved.frame,
+                moved.rate,
+                moved.velocity,
+            )
+            row["inertia"], row["lightness"], row["schedule"] = (
+                moved.inertia,
+                moved.lightness,
+                moved.schedule,
+            )
         if row["body"] >= 0:
             row["toward"] = np.sign(case.slide_direction(draft.case.nodes[stated.body])[axis])
         corner_weights = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
-        line_weights, stretch_per_travel = corner_weights, case.area_growth(basin.mesh, axis, corner_weights)
+        line_weights = corner_weights
+        stretch_per_travel = case.area_growth(basin.mesh, axis, corner_weights)
         per_cell = stretch_per_travel
         if basin.is_grid:
             grid, lines = basin.mesh.grid, (basin.mesh.grid.x, basin.mesh.grid.y)[axis]
             line_weights = case.weights(basin.part, basin.mesh, patch, lines)
             stretch_per_travel = np.diff(line_weights) / np.diff(lines)
-            per_cell = np.repeat(stretch_per_travel, grid.nx) if axis == 1 else np.tile(stretch_per_travel, grid.ny)
+            per_cell = (
+                np.repeat(stretch_per_travel, grid.nx)
+                if axis == 1
+                else np.tile(stretch_per_travel, grid.ny)
+            )
         basin.stretches.append((int(row["y"]), per_cell, np.outer(corner_weights, np.eye(2)[axis])))
         row["weights"] = draft.to_plane(np.concatenate([line_weights, stretch_per_travel]))
         faces_of_wall = np.arange(basin.mesh.left.size)[basin.mesh.patch(patch)]
@@ -274,7 +323,10 @@ def lower_walls(draft) -> None:
         row["rest"] = float(np.sum(length * basin.thrust_at_rest()[wall_cells]))
     for k, basin in enumerate(draft.meshed):
         faces_of_wall = np.flatnonzero(draft.wall_table["basin"] == k)
-        basin.row["walls"], basin.row["wall"] = faces_of_wall.size, faces_of_wall[0] if faces_of_wall.size else 0
+        basin.row["walls"], basin.row["wall"] = (
+            faces_of_wall.size,
+            faces_of_wall[0] if faces_of_wall.size else 0,
+        )
 
 
 def lower_lines(draft, basin, row) -> None:
@@ -289,7 +341,9 @@ def lower_lines(draft, basin, row) -> None:
         lower_corners(draft, basin, row, axis)
         return
     drawn = 1.0 / np.diff((mesh.grid.x, mesh.grid.y)[axis])
-    row["stretch"] = draft.to_plane(np.concatenate([np.ones(2 * drawn.size), drawn, np.ones(2 * mesh.grid.nx)]))
+    row["stretch"] = draft.to_plane(
+        np.concatenate([np.ones(2 * drawn.size), drawn, np.ones(2 * mesh.grid.nx)])
+    )
     row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + VECTOR_MARGIN))
 
 
@@ -302,8 +356,13 @@ def lower_corners(draft, basin, row, axis: int) -> None:
     row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(2 * basin.n))
     row["lines"] = draft.to_plane(np.zeros(x.size))
     scratch = np.zeros(moving_meshes.SCRATCH)
-    row["places"] = draft.to_plane(np.concatenate([x, y, mesh.points[:, axis], *mesh.centre.T, scratch]))
-    moves = sum(case.weights(basin.part, mesh, patch, mesh.points[:, axis]) for patch in basin.walls) > 0.0
+    row["places"] = draft.to_plane(
+        np.concatenate([x, y, mesh.points[:, axis], *mesh.centre.T, scratch])
+    )
+    moves = (
+        sum(case.weights(basin.part, mesh, patch, mesh.points[:, axis]) for patch in basin.walls)
+        > 0.0
+    )
     moving_blocks, pairs = lower_ends(mesh, moves)
     row["sides"] = draft.to_plane(np.zeros(4 * cell_sides.BLOCK * moving_blocks.size))
     row["ends"] = len(draft.integers)

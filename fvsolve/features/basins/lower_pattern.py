@@ -6,7 +6,8 @@ from scipy.sparse import coo_array, csr_array, eye_array, kron
 from fvsolve.core.kernels import dtypes as rec
 
 STENCIL_RADIUS = 3  # stencil radius of the fifth order
-THROUGH_FACES = (rec.LINKED, rec.INTERIOR)  # closures of patches through whose faces the flow of links passes
+# closures of patches through whose faces the flow of links passes
+THROUGH_FACES = (rec.LINKED, rec.INTERIOR)
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
@@ -29,7 +30,9 @@ def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
     own = kron(eye_array(count, dtype=bool), near).tocoo()
     by_flow = kron(coo_array(np.ones((count, len(basin.quantities)), dtype=bool)), near).tocoo()
     rows, first = np.concatenate([own.row, by_flow.row]), int(basin.row["carried"])
-    columns = np.concatenate([first + own.col.astype(np.int64), int(basin.row["y"]) + by_flow.col.astype(np.int64)])
+    columns = np.concatenate(
+        [first + own.col.astype(np.int64), int(basin.row["y"]) + by_flow.col.astype(np.int64)]
+    )
     return first + rows.astype(np.int64), columns
 
 
@@ -41,7 +44,11 @@ def scalar_neighbours(basin) -> csr_array:
     face.
     """
     near, scalars = neighbours(basin), basin.case.scalars
-    if not basin.is_grid and basin.reach == 1 and any(scalars[name].diffusivity > 0.0 for name in basin.scalars):
+    if (
+        not basin.is_grid
+        and basin.reach == 1
+        and any(scalars[name].diffusivity > 0.0 for name in basin.scalars)
+    ):
         near = near @ near
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
         near = near @ near if basin.row["scheme"] == rec.WENO5 else near
@@ -77,16 +84,23 @@ def all_states(basin) -> np.ndarray:
 
 def cells_at_faces(integers: np.ndarray, patch) -> np.ndarray:
     """Cells whose states the flow through the faces of a patch reads, besides its own; patch : its row of the table"""
-    behind, second, count = int(patch["ring"] + patch["faces"]), int(patch["second"]), int(patch["faces"])
+    behind = int(patch["ring"] + patch["faces"])
+    second = int(patch["second"])
+    count = int(patch["faces"])
     around = integers[second : second + int(patch["stencil"]) * count]
     return np.unique([*integers[behind : behind + count], *around]).astype(np.int64)
 
 
 def source_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
     """(rates, states) as indices in y: rates of depth and of the soil, and states of both on which they depend."""
-    firsts = [int(basin.row["y"]), *(int(basin.row["infiltrated"]) + k * basin.n for k in range(basin.soil_states))]
+    firsts = [
+        int(basin.row["y"]),
+        *(int(basin.row["infiltrated"]) + k * basin.n for k in range(basin.soil_states)),
+    ]
     states = np.array(firsts)[:, None] + np.arange(basin.n)
-    pairs = [(states[i], states[j]) for i in range(len(states)) for j in range(len(states)) if i + j > 0]
+    pairs = [
+        (states[i], states[j]) for i in range(len(states)) for j in range(len(states)) if i + j > 0
+    ]
     return np.concatenate([i for i, _ in pairs]), np.concatenate([j for _, j in pairs])
 
 
@@ -124,6 +138,8 @@ def neighbour_rings(basin) -> list[csr_array]:
     across = np.abs(mesh.normal[: mesh.inner, 0]) > 0.5
     for group in (across, ~across) if basin.is_grid else (slice(None),):
         ones = np.ones(left[group].size, dtype=bool)
-        forward = csr_array(coo_array((ones, (left[group], right[group])), shape=(basin.n, basin.n)))
+        forward = csr_array(
+            coo_array((ones, (left[group], right[group])), shape=(basin.n, basin.n))
+        )
         patterns.append(csr_array(forward + forward.T + eye_array(basin.n, dtype=bool), dtype=bool))
     return patterns

@@ -45,8 +45,12 @@ def lower_surface(draft, row, probe) -> None:
 
     case, basin = draft.case, draft.case.nodes[probe.name]
     arguments = basin, case.lumped[probe.name]
-    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
+    modes, shares = sloshing.surface_factors(
+        *arguments, *probe.point, case.properties.density, case.gravity
+    )
     row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
     row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [frames_of(draft).index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
+    draft.integers += [
+        frames_of(draft).index(sloshing.mode_body_name(probe.name, mode)) for mode in modes
+    ]
     draft.floats += shares

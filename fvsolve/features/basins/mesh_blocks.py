@@ -66,13 +66,22 @@ class BlockMesh(NamedTuple):
 @inline
 def open_mesh(floats, integers):
     """`BlockMesh` of the arrays of a mesh, see `cell_sides`."""
-    slots, n, f, b, ring, count = integers[0], integers[1], integers[2], integers[3], integers[4], blocks(integers)
+    slots = integers[0]
+    n = integers[1]
+    f = integers[2]
+    b = integers[3]
+    ring = integers[4]
+    count = blocks(integers)
     at, to = HEAD + INDICES * count * slots * BLOCK // 2, MEASURES * count * slots * BLOCK
     need, edges = integers[at : at + count], integers[at + count :][:b]
     number, faces = integers[at + count + b :][:b], integers[at + count + 2 * b :]
-    nx, ny, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
+    nx = floats[to : to + b]
+    ny = floats[to + b : to + 2 * b]
+    lengths = floats[to + 2 * b :][:f]
     places = integers[HEAD:].view(np.int32)
-    return BlockMesh(floats, integers, count, slots, n, ring, need, edges, number, faces, nx, ny, lengths, places)
+    return BlockMesh(
+        floats, integers, count, slots, n, ring, need, edges, number, faces, nx, ny, lengths, places
+    )
 
 
 def work_size(equation, integers):
@@ -109,18 +118,25 @@ def put_flow(where, flux, length, flow):
             flow[where[i]] = flux[i] * length[where[i]]
 
 
-def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, rates, band, moves, phi):
+def mesh_rates(
+    fluid, floats, integers, reflect, states, flow, through, work, rates, band, moves, phi
+):
     """Write the rates of a range of cells of a mesh; return the greatest rate that limits the time step [1/s].
 
     floats, integers : geometry and neighbours, see `cell_sides`; work : float64[work_size(EQUATION, integers)]
     band : first of these cells, at the start of a block, and one beyond the last, at the end of a block
     """
-    mesh, fields, near = open_mesh(floats, integers), EQUATION.FIELDS, integers[4] * BLOCK
+    mesh = open_mesh(floats, integers)
+    fields = EQUATION.FIELDS
+    near = integers[4] * BLOCK
     rows = EQUATION.ROWS_OF_CELLS
     cells, rest = work[: rows * near].reshape((rows, near)), work[rows * near :]
     sides, rest = rest[: 4 * fields * near].reshape((fields, 4 * near)), rest[4 * fields * near :]
     shown, w = rest[: EQUATION.SHOWN * mesh.edges.size], rest[EQUATION.SHOWN * mesh.edges.size :]
-    begin, stop, first_order, most = band[0] // BLOCK, blocks_of(band[1]), fluid.scheme == UPWIND, 0.0
+    begin = band[0] // BLOCK
+    stop = blocks_of(band[1])
+    first_order = fluid.scheme == UPWIND
+    most = 0.0
     sides_done = first_read(mesh.need, begin)
     cells_done = first_read(mesh.need, sides_done)
     wall = edges_before(mesh.edges, 0, 4 * sides_done * BLOCK)
@@ -135,14 +151,20 @@ def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, ra
                 cells_done += 1
             if not first_order:
                 first, wall = wall, edges_before(mesh.edges, wall, 4 * (sides_done + 1) * BLOCK)
-                EQUATION.put_sides(fluid, mesh, sides_done, first, wall, reflect, cells, sides, shown, w, moves)
+                EQUATION.put_sides(
+                    fluid, mesh, sides_done, first, wall, reflect, cells, sides, shown, w, moves
+                )
             sides_done += 1
         EQUATION.begin_block(fluid, mesh, j, states, w, phi)
         for k in range(mesh.slots):
             slot = j * mesh.slots + k
             where = mesh.places[slot * INDICES * BLOCK :]
             for q in range(fields):
-                cell_sides.gather(sides[q], where if first_order else where[cell_sides.SIDE * BLOCK :], w[q * BLOCK :])
+                cell_sides.gather(
+                    sides[q],
+                    where if first_order else where[cell_sides.SIDE * BLOCK :],
+                    w[q * BLOCK :],
+                )
             first, edge = edge, edges_before(mesh.edges, edge, (4 * j + k + 1) * BLOCK)
             EQUATION.add_side(fluid, mesh, j, k, first, edge, reflect, cells, sides, w, moves, phi)
             if flow.size > 0:
@@ -150,7 +172,11 @@ def mesh_rates(fluid, floats, integers, reflect, states, flow, through, work, ra
             if through.size > 0:
                 lengths = mesh.lengths[mesh.lengths.size - mesh.edges.size :]
                 cell_sides.put_inward(
-                    mesh.edges[first:edge], mesh.number[first:edge], w[EQUATION.MASS :], lengths, through
+                    mesh.edges[first:edge],
+                    mesh.number[first:edge],
+                    w[EQUATION.MASS :],
+                    lengths,
+                    through,
                 )
         a, z = j * BLOCK, min((j + 1) * BLOCK, mesh.n)
         EQUATION.put_rates(w, rates[0][a:z], rates[1][a:z], rates[2][a:z])

@@ -22,17 +22,30 @@ import numpy as np
 from fvsolve.core.kernels.dtypes import RATE
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import cell_sides as side
-from fvsolve.features.basins.cell_sides import BLOCK, DISTANCES, MEASURES, TINY, blocks, gradient_share, side_numbers
+from fvsolve.features.basins.cell_sides import (
+    BLOCK,
+    DISTANCES,
+    MEASURES,
+    TINY,
+    blocks,
+    gradient_share,
+    side_numbers,
+)
 from fvsolve.features.basins.moving_walls import size_patch
 from fvsolve.jit import njit
 
 START, STOP, BEYOND, ENDS = range(4)
 # Rows of BLOCK in the scratch of a block: sums over sides, 1 / area, centre; of the current side its ends, the centre
 # beyond, 1 where there is a cell, length; then the other sums of `cell_sides.gradient_share`.
-_XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LENGTH = (k * BLOCK for k in range(14))
-_SIDES_XX, _SIDES_XY, _SIDES_YY, _WEIGHTED_XX, _WEIGHTED_XY, _WEIGHTED_YY = (k * BLOCK for k in range(14, 20))
+_XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LENGTH = (
+    k * BLOCK for k in range(14)
+)
+_SIDES_XX, _SIDES_XY, _SIDES_YY, _WEIGHTED_XX, _WEIGHTED_XY, _WEIGHTED_YY = (
+    k * BLOCK for k in range(14, 20)
+)
 SCRATCH = 20 * BLOCK
-_NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in range(7))  # groups of `cell_sides`, in its order
+# groups of `cell_sides`, in its order
+_NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in range(7))
 
 
 @njit(forceinline=True)
@@ -44,10 +57,21 @@ def on_moving_mesh(basin):
 @njit(forceinline=True)
 def mesh_positions(plane, basin):
     """(x, y, undeformed coordinate of corners; x, y of centres of cells; scratch) of a mesh: the parts of `places`."""
-    at, p, n = basin["places"], basin["corners"], basin["n"]
-    x, y, drawn = plane[at : at + p], plane[at + p : at + 2 * p], plane[at + 2 * p : at + 3 * p]
+    at = basin["places"]
+    p = basin["corners"]
+    n = basin["n"]
+    x = plane[at : at + p]
+    y = plane[at + p : at + 2 * p]
+    drawn = plane[at + 2 * p : at + 3 * p]
     at += 3 * p
-    return x, y, drawn, plane[at : at + n], plane[at + n : at + 2 * n], plane[at + 2 * n : at + 2 * n + SCRATCH]
+    return (
+        x,
+        y,
+        drawn,
+        plane[at : at + n],
+        plane[at + n : at + 2 * n],
+        plane[at + 2 * n : at + 2 * n + SCRATCH],
+    )
 
 
 @njit(forceinline=True)
@@ -55,7 +79,11 @@ def ends_of(integers, basin):
     """(flags of blocks where corners move, corners of cells, ends of sides): parts of `ends`, see `moving_meshes`."""
     ends = integers[basin["ends"] :]
     count = ends[0]
-    return ends[1 : 1 + count], ends[1 + count :].view(np.int32), ends[1 + count + 2 * basin["n"] :].view(np.int32)
+    return (
+        ends[1 : 1 + count],
+        ends[1 + count :].view(np.int32),
+        ends[1 + count + 2 * basin["n"] :].view(np.int32),
+    )
 
 
 @njit
@@ -95,11 +123,23 @@ def put_centres(first, last, corners, x, y, cx, cy):
     """
     for i in range(first, last):
         own = corners[4 * i : 4 * i + 4]
-        a, b, c, d = own[0], own[1], own[2], own[3]
-        ax, ay, bx, by, dx, dy = x[c] - x[a], y[c] - y[a], x[b] - x[a], y[b] - y[a], x[d] - x[a], y[d] - y[a]
-        area_1, area_2 = bx * ay - by * ax, ax * dy - ay * dx  # twice the areas on both sides of a diagonal
+        a = own[0]
+        b = own[1]
+        c = own[2]
+        d = own[3]
+        ax = x[c] - x[a]
+        ay = y[c] - y[a]
+        bx = x[b] - x[a]
+        by = y[b] - y[a]
+        dx = x[d] - x[a]
+        dy = y[d] - y[a]
+        # twice the areas on both sides of a diagonal
+        area_1, area_2 = bx * ay - by * ax, ax * dy - ay * dx
         offset = (area_1 - area_2) / (6.0 * (area_1 + area_2))
-        x_1, x_2, y_1, y_2 = x[a] + x[c], x[b] + x[d], y[a] + y[c], y[b] + y[d]
+        x_1 = x[a] + x[c]
+        x_2 = x[b] + x[d]
+        y_1 = y[a] + y[c]
+        y_2 = y[b] + y[d]
         cx[i] = 0.25 * (x_1 + x_2) - (x_2 - x_1) / 12.0 - offset * (x[d] - x[b])
         cy[i] = 0.25 * (y_1 + y_2) - (y_2 - y_1) / 12.0 - offset * (y[d] - y[b])
 
@@ -110,7 +150,11 @@ def gather_cells(area, cx, cy, scratch):
     for i in range(BLOCK):
         scratch[i], scratch[_XY + i], scratch[_YY + i], scratch[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
         scratch[_SIDES_XX + i], scratch[_SIDES_XY + i], scratch[_SIDES_YY + i] = 0.0, 0.0, 0.0
-        scratch[_WEIGHTED_XX + i], scratch[_WEIGHTED_XY + i], scratch[_WEIGHTED_YY + i] = 0.0, 0.0, 0.0
+        scratch[_WEIGHTED_XX + i], scratch[_WEIGHTED_XY + i], scratch[_WEIGHTED_YY + i] = (
+            0.0,
+            0.0,
+            0.0,
+        )
     for i in range(area.size):
         scratch[_SHARE + i], scratch[_CX + i], scratch[_CY + i] = 1.0 / area[i], cx[i], cy[i]
 
@@ -122,9 +166,20 @@ def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
     start, stop : corners where the side begins and ends; beyond : cell beyond the side, -1 at the boundary
     """
     for i in range(BLOCK):
-        a, b, other = start[i], stop[i], max(beyond[i], 0)
-        scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i] = x[a], y[a], x[b], y[b]
-        scratch[_OX + i], scratch[_OY + i], scratch[_INSIDE + i] = cx[other], cy[other], 1.0 if beyond[i] >= 0 else 0.0
+        a = start[i]
+        b = stop[i]
+        other = max(beyond[i], 0)
+        scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i] = (
+            x[a],
+            y[a],
+            x[b],
+            y[b],
+        )
+        scratch[_OX + i], scratch[_OY + i], scratch[_INSIDE + i] = (
+            cx[other],
+            cy[other],
+            1.0 if beyond[i] >= 0 else 0.0,
+        )
 
 
 @njit
@@ -134,15 +189,19 @@ def put_side(scratch, geo):
     Weights of the least-squares gradient are final after `put_weights`.
     """
     for i in range(BLOCK):
-        xa, ya, xb, yb, cx, cy = (
-            scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i], scratch[_CX + i], scratch[_CY + i]
-        )  # fmt: skip
+        xa = scratch[_XA + i]
+        ya = scratch[_YA + i]
+        xb = scratch[_XB + i]
+        yb = scratch[_YB + i]
+        cx = scratch[_CX + i]
+        cy = scratch[_CY + i]
         dx, dy = xb - xa, yb - ya
         length = sqrt(dx * dx + dy * dy)
         exists = length > 0.0  # else a missing side of the cell
         per = 1.0 / (length + TINY)
         nx, ny = per * dy if exists else 1.0, 0.0 - per * dx
-        to_x, to_y = 0.5 * (xa + xb) - cx if exists else 0.0, 0.5 * (ya + yb) - cy if exists else 0.0
+        to_x = 0.5 * (xa + xb) - cx if exists else 0.0
+        to_y = 0.5 * (ya + yb) - cy if exists else 0.0
         mirror_distance = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
         inside = scratch[_INSIDE + i] > 0.0
         ax = scratch[_OX + i] - cx if inside else mirror_distance * nx
@@ -176,7 +235,10 @@ def put_distance(scratch, geo, far):
         ax = scratch[_OX + i] - scratch[_CX + i] if inside else mirror_distance * nx
         ay = scratch[_OY + i] - scratch[_CY + i] if inside else mirror_distance * ny
         gap = 1.0 / (ax * nx + ay * ny) if exists else 0.0
-        far[side.PER_AREA * BLOCK + i], far[side.PER_DISTANCE * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
+        far[side.PER_AREA * BLOCK + i], far[side.PER_DISTANCE * BLOCK + i] = (
+            scratch[_SHARE + i] if exists else 0.0,
+            gap,
+        )
         far[side.OBLIQUE_X * BLOCK + i] = nx - ax * gap if exists else 0.0
         far[side.OBLIQUE_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
 
@@ -189,10 +251,13 @@ def invert(scratch, steepest):
     for `steepest`.
     """
     for i in range(BLOCK):
-        xx, xy, yy = scratch[i], scratch[_XY + i], scratch[_YY + i]
+        xx = scratch[i]
+        xy = scratch[_XY + i]
+        yy = scratch[_YY + i]
         sides = scratch[_SIDES_XX + i], scratch[_SIDES_XY + i], scratch[_SIDES_YY + i]
         weighted = scratch[_WEIGHTED_XX + i], scratch[_WEIGHTED_XY + i], scratch[_WEIGHTED_YY + i]
-        share = gradient_share(sides, (xx, xy, yy), weighted, steepest) if xx > 0.0 else 1.0  # 1 in padding
+        # 1 in padding
+        share = gradient_share(sides, (xx, xy, yy), weighted, steepest) if xx > 0.0 else 1.0
         scale = share / max(xx * yy - xy * xy, TINY)
         scratch[i], scratch[_XY + i], scratch[_YY + i] = scale * yy, scale * xy, scale * xx
 
@@ -201,8 +266,13 @@ def invert(scratch, steepest):
 def put_weights(scratch, geo):
     """Write the weights of the difference across one side in the gradient, for each cell of a block, to `geo`."""
     for i in range(BLOCK):
-        wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
-        geo[_WX + i], geo[_WY + i] = scratch[i] * wx - cross * wy, scratch[_YY + i] * wy - cross * wx
+        wx = geo[_WX + i]
+        wy = geo[_WY + i]
+        cross = scratch[_XY + i]
+        geo[_WX + i], geo[_WY + i] = (
+            scratch[i] * wx - cross * wy,
+            scratch[_YY + i] * wy - cross * wx,
+        )
 
 
 @njit
@@ -215,7 +285,10 @@ def update_sides(tables, basin):
     x, y, _, cx, cy, scratch = mesh_positions(tables.plane, basin)
     area = tables.plane[basin["area"] :]
     moving_blocks, corners, ends = ends_of(tables.integers, basin)
-    slots, n, f, b = integers[0], integers[1], integers[2], integers[3]
+    slots = integers[0]
+    n = integers[1]
+    f = integers[2]
+    b = integers[3]
     m = moving_blocks.size * slots * BLOCK
     _, edges, number, face = side_numbers(integers)
     lengths, distances = floats[MEASURES * m + 2 * b :], floats[MEASURES * m + 2 * b + f :]
@@ -239,7 +312,9 @@ def update_sides(tables, basin):
         for slot in range(j * slots, (j + 1) * slots):
             put_weights(scratch, floats[slot * MEASURES * BLOCK :])
     for q in range(b):
-        j, k, i = edges[q] // BLOCK // 4, edges[q] // BLOCK % 4, edges[q] % BLOCK
+        j = edges[q] // BLOCK // 4
+        k = edges[q] // BLOCK % 4
+        i = edges[q] % BLOCK
         geo = floats[(j * slots + k) * MEASURES * BLOCK + i :]
         floats[MEASURES * m + q], floats[MEASURES * m + b + q] = geo[_NX], geo[_NY]
         lengths[f - b + number[q]] = geo[_REACH] * area[j * BLOCK + i]
@@ -271,7 +346,9 @@ def put_speeds(tables, basin):
 
     This rate is the fraction of a cell that a side sweeps per time.
     """
-    plane, slots, most = tables.plane, tables.integers[basin["links"]], 0.0
+    plane = tables.plane
+    slots = tables.integers[basin["links"]]
+    most = 0.0
     v, across = plane[basin["lines"] :], _NY if basin["turn"] == 1 else _NX
     moving_blocks, _, ends = ends_of(tables.integers, basin)
     for slot in range(moving_blocks.size * slots):
@@ -304,7 +381,9 @@ class MeshMotion(NamedTuple):
 @njit(forceinline=True)
 def mesh_motion(tables, basin):
     """`MeshMotion` of a basin with moving walls, whose mesh is not a grid."""
-    sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
+    sides = basin["sides"]
+    thrust = basin["thrust"]
+    rows = basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
     plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]
     return MeshMotion(plane[sides : sides + count], thrust_array, plane[rows : rows + basin["n"]])

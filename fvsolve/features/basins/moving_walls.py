@@ -25,7 +25,8 @@ from fvsolve.features.basins.basin_output import basin_first_row
 from fvsolve.features.basins.cell_sides import BLOCK, MEASURES, blocks, row_across, stretch_of_cell
 from fvsolve.jit import njit
 
-FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.MovingWall`
+# quantities of probes, in the order of `parts.basin.MovingWall`
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2
 LEAST_WIDTH = 1e-3  # least width of a cell over its undeformed width; below it the run stops
 VECTOR_MARGIN = 8  # additional speeds of lines that vector loops read beyond the last line
 
@@ -58,14 +59,22 @@ def update_geometry(t, y, seen, out, handle):
             copy(y[done : basin["y"]], tables.seen[done:])
             # kernels of rates of water on grids read the states (amounts in cells), not values per area
             reads_contents = basin["deep"] == 1 and basin["nx"] > 0
-            if seen.size == 0 and reads_contents and basin["carried"] < 0 and basin["friction"] == NO_DRAG:
+            if (
+                seen.size == 0
+                and reads_contents
+                and basin["carried"] < 0
+                and basin["friction"] == NO_DRAG
+            ):
                 deviations_at_patches(tables, b, y)
             else:
                 deviations_of_rows(tables, basin, y)
             for p in range(tables.patches.size if basin["nx"] > 0 else 0):
                 if tables.patches[p]["basin"] == b:
                     size_patch(tables, basin, tables.patches[p])
-            done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
+            done = (
+                basin["y"]
+                + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
+            )
     copy(y[done:], tables.seen[done:])
 
 
@@ -82,7 +91,9 @@ def stretch_cells(tables, basin, y):
 
     Their reciprocals and, for a grid, the table of 1 / widths are updated too.
     """
-    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
+    plane = tables.plane
+    walls = tables.walls
+    at = basin["stretch"]
     count, lines = stretching_counts(basin)
     wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
     stretching.fill(1.0, wide)
@@ -94,13 +105,19 @@ def stretch_cells(tables, basin, y):
         narrow[i] = 1.0 / wide[i]
     if basin["nx"] > 0:
         spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
-        stretching.multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])  # 1 / widths as drawn
+        # 1 / widths as drawn
+        stretching.multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])
 
 
 @njit
 def factors_of(tables, basin, j):
     """(ratio of present to undeformed area, its reciprocal): arrays for row j of a grid, or for all cells of a mesh."""
-    plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], stretching_counts(basin)
+    plane, nx, at, (count, _) = (
+        tables.plane,
+        basin["nx"],
+        basin["stretch"],
+        stretching_counts(basin),
+    )
     if nx == 0 or basin["turn"] == 0:
         return plane[at : at + count], plane[at + count : at + 2 * count]
     row = at + 3 * count
@@ -112,18 +129,29 @@ def factors_of(tables, basin, j):
 @njit
 def deviations_of_rows(tables, basin, y):
     """Write areas and deviations U - U0 of all cells of a basin, from the states (A U - A0 U0) / A0."""
-    plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
+    plane = tables.plane
+    seen = tables.seen
+    n = basin["n"]
+    first = basin["y"]
     rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
     scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
     for j in range(rows):
         a, z, (wide, narrow) = j * size, (j + 1) * size, factors_of(tables, basin, j)
-        stretching.multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
+        stretching.multiply(
+            plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z]
+        )
         if basin["deep"] == 1:
             stretching.depth_deviations(
-                plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z]
+                plane[basin["plan"] + a :],
+                wide,
+                narrow,
+                y[first + a :],
+                seen[first + a : first + z],
             )
         else:
-            stretching.density_deviations(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
+            stretching.density_deviations(
+                basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z]
+            )
         for q in range(1, 3 + scalar_count):
             at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
             stretching.multiply(y[at + a :], narrow, seen[at + a : at + z])
@@ -132,7 +160,10 @@ def deviations_of_rows(tables, basin, y):
 @njit
 def deviations_at_patches(tables, b, y):
     """Write areas and deviations from rest, as `deviations_of_rows`, for the cells of water at patches and walls."""
-    plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
+    plane = tables.plane
+    seen = tables.seen
+    basin = tables.basins[b]
+    patches = tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
         for m in range(patches[p]["count"] if patches[p]["basin"] == b else 0):
@@ -140,7 +171,10 @@ def deviations_at_patches(tables, b, y):
             wide = stretch_of_cell(plane, basin, i)
             plane[basin["area"] + i] = plane[basin["drawn"] + i] * wide
             seen[first + i] = (y[first + i] - plane[basin["plan"] + i] * (wide - 1.0)) / wide
-            seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] / wide, y[first + 2 * n + i] / wide
+            seen[first + n + i], seen[first + 2 * n + i] = (
+                y[first + n + i] / wide,
+                y[first + 2 * n + i] / wide,
+            )
 
 
 @njit
@@ -150,16 +184,23 @@ def size_patch(tables, basin, patch):
     Length is over the undeformed area of the cell, because the rates of the states refer to that area. On a mesh, the
     lengths of faces are those that `moving_meshes` has computed.
     """
-    plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
+    plane = tables.plane
+    integers = tables.integers
+    area = 0.0
+    length = 0.0
     for m in range(patch["count"]):
         area += plane[basin["area"] + integers[patch["first"] + m]]
-    at, count, lengths = patch["normals"], patch["faces"], first_length(tables, basin)
+    at = patch["normals"]
+    count = patch["faces"]
+    lengths = first_length(tables, basin)
     for m in range(count):
         i = integers[patch["ring"] + count + m]
         drawn = plane[basin["drawn"] + i]
         if basin["nx"] > 0:
             is_normal = abs(plane[at + (1 if basin["turn"] == 1 else 0) * count + m]) < 0.5
-            per_area = plane[at + 3 * count + m] * (stretch_of_cell(plane, basin, i) if is_normal else 1.0)
+            per_area = plane[at + 3 * count + m] * (
+                stretch_of_cell(plane, basin, i) if is_normal else 1.0
+            )
             own = per_area * drawn
         else:
             own = plane[lengths + integers[patch["ring"] + m]]
@@ -175,7 +216,13 @@ def first_length(tables, basin):
     if basin["nx"] > 0:
         return 0
     links = tables.integers[basin["links"] :]
-    return basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
+    return (
+        basin["mesh"]
+        + MEASURES * blocks(links) * links[0] * BLOCK
+        + 2 * links[3]
+        + links[2]
+        - links[3]
+    )
 
 
 @njit
@@ -183,7 +230,11 @@ def speed_of(t, tables, wall, y):
     """Speed of a wall [m/s], positive along its axis x or y: that of what moves it, or of its schedule."""
     if wall["rate"] >= 0:
         return wall["toward"] * (wall["speed"] + y[wall["rate"]])
-    return wall["toward"] * schedule_slopes(tables, wall["schedule"], t)[0] if wall["schedule"] >= 0 else 0.0
+    return (
+        wall["toward"] * schedule_slopes(tables, wall["schedule"], t)[0]
+        if wall["schedule"] >= 0
+        else 0.0
+    )
 
 
 @njit
@@ -250,7 +301,12 @@ class GridMotion(NamedTuple):
 @njit(forceinline=True)
 def grid_motion(tables, basin):
     """`GridMotion` of a basin with moving walls, whose mesh is a grid."""
-    plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
+    plane, at, rows, (count, lines) = (
+        tables.plane,
+        basin["lines"],
+        basin["stretch"],
+        stretching_counts(basin),
+    )
     speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]
     thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
     wide, narrow = plane[rows : rows + count], plane[rows + count : rows + 2 * count]
@@ -295,14 +351,21 @@ def add_wall_forces(t, y, dydt, out, handle):
     The waves that walls radiate raise out[RATE], which limits the step. On bodies, the forces at rest are added too.
     """
     tables = open_tables(handle)
-    layout, walls, st, seen = tables.layout[0], tables.walls, tables.settings[0], tables.seen
+    layout = tables.layout[0]
+    walls = tables.walls
+    st = tables.settings[0]
+    seen = tables.seen
     for k in range(walls.size):
-        wall, total, waves = walls[k], 0.0, 0.0
+        wall = walls[k]
+        total = 0.0
+        waves = 0.0
         basin = tables.basins[wall["basin"]]
         for m in range(wall["count"]):
             face, length = tables.integers[wall["faces"] + m], tables.plane[wall["lengths"] + m]
             total += length * tables.work[basin["thrust"] + face]
-            waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], seen)
+            waves += length * impedance(
+                tables, basin, tables.integers[wall["faces"] + wall["count"] + m], seen
+            )
         total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
         out[layout["wall"] + k] = total
         if wall["body"] >= 0:
@@ -328,7 +391,10 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
         basin = tables.basins[b]
         if basin["walls"] == 0 or basin["carried"] < 0:
             continue
-        n, (rows, size) = basin["n"], (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"])
+        n, (rows, size) = (
+            basin["n"],
+            (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"]),
+        )
         for j in range(rows):
             wide = factors_of(tables, basin, j)[0]
             for q in range(tables.scalars.size):
@@ -373,7 +439,8 @@ def wall_power(t, y, dydt, out, handle, power):
     """
     tables = open_tables(handle)
     for k in range(tables.walls.size):
-        work, dissipated = supplied_power(t, tables, k, y, out), dissipated_power(tables, tables.walls[k])
+        work = supplied_power(t, tables, k, y, out)
+        dissipated = dissipated_power(tables, tables.walls[k])
         first = wall_power_row(tables, power) + WALL_ROWS * k
         power[first], power[first + 1] = work, dissipated
         power[basin_first_row(tables, power, tables.walls[k]["basin"])] += work - dissipated
@@ -398,5 +465,7 @@ def area_growth_rate(t, tables, basin, y, i):
     total, (_, lines) = 0.0, stretching_counts(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         wall = tables.walls[k]
-        total += tables.plane[wall["weights"] + lines + row_across(basin, i)] * speed_of(t, tables, wall, y)
+        total += tables.plane[wall["weights"] + lines + row_across(basin, i)] * speed_of(
+            t, tables, wall, y
+        )
     return total

@@ -43,12 +43,15 @@ class BasinPattern(FeaturePattern):
         for i, row in self.patches.items():
             basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
             if row["open"]:
-                cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
+                cells = pattern.cells_read(
+                    pattern.neighbours(basin), self.integers[behind : behind + row["faces"]]
+                )
                 yield pairs_of(unique_states(self.of.size + i), pattern.cell_states(basin, cells))
             joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
             if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
                 read = unique_states(
-                    self.behind(i), pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row))
+                    self.behind(i),
+                    pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row)),
                 )
                 yield pairs_of(self.behind(i), read)
 
@@ -67,9 +70,13 @@ class BasinPattern(FeaturePattern):
             return None
         row = self.patches[i]
         if row["closure"] in pattern.THROUGH_FACES:
-            read = pattern.cell_states(self.basins[row["basin"]], pattern.cells_at_faces(self.integers, row))
+            read = pattern.cell_states(
+                self.basins[row["basin"]], pattern.cells_at_faces(self.integers, row)
+            )
             return unique_states(self.behind(i), read)
-        return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == row["basin"]]))
+        return unique_states(
+            self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == row["basin"]])
+        )
 
     def fed(self, i: int) -> np.ndarray:
         return self.behind(i) if i in self.patches else unique_states()
@@ -113,9 +120,14 @@ class BasinPattern(FeaturePattern):
         for basin in self.basins:
             if basin.row["through"] >= 0:
                 nodes = [i for i, row in self.patches.items() if self.basins[row["basin"]] is basin]
-                behind = [self.integers[row["first"] :][: row["count"]] for row in map(self.patches.get, nodes)]
+                behind = [
+                    self.integers[row["first"] :][: row["count"]]
+                    for row in map(self.patches.get, nodes)
+                ]
                 cells = pattern.cells_read(pattern.scalar_neighbours(basin), np.concatenate(behind))
-                read = unique_states(pattern.amount_states(basin, q, cells), pattern.cell_states(basin, cells))
+                read = unique_states(
+                    pattern.amount_states(basin, q, cells), pattern.cell_states(basin, cells)
+                )
                 yield pairs_of(ledger + np.array(nodes), read)
 
     def decay_pairs(self, q: int, scalar) -> Iterator[Pairs]:
@@ -125,7 +137,10 @@ class BasinPattern(FeaturePattern):
         for basin in self.basins:
             cells = np.arange(basin.n)
             own = rows[basin.row["lost"] + cells] if rows.size > 1 else np.repeat(rows, cells.size)
-            for states in (pattern.amount_states(basin, q, 0), *([basin.row["y"]] if basin.quantities else [])):
+            for states in (
+                pattern.amount_states(basin, q, 0),
+                *([basin.row["y"]] if basin.quantities else []),
+            ):
                 yield own, states + cells
 
     def reacting_places(self) -> Iterator[tuple[np.ndarray, list, Callable]]:
@@ -133,4 +148,8 @@ class BasinPattern(FeaturePattern):
             cells = np.arange(basin.n)
             depths = [basin.row["y"] + cells] if basin.quantities else []
             if basin.scalars:
-                yield basin.row["lost"] + cells, depths, lambda q, b=basin, k=cells: pattern.amount_states(b, q, k)
+                yield (
+                    basin.row["lost"] + cells,
+                    depths,
+                    lambda q, b=basin, k=cells: pattern.amount_states(b, q, k),
+                )

@@ -20,9 +20,11 @@ TURNS = 30  # Newton iterations of the balance
 DIFFERENCE = 1e-6  # change of an output for differences, relative to its range
 MOST_STATES = 32  # a sensor of more states has no rate
 RANK = 1e-9  # singular values below this share of the greatest are zero
-ROUNDING = 1e-8  # change of an output below which it is rounding if it no longer falls, relative to its range
+# change of an output below which it is rounding if it no longer falls, relative to its range
+ROUNDING = 1e-8
 BESIDE = 1e-7  # distance of the residuals of the last step, relative to the range
-STOPPED = 1e-6  # residual of an integrating block at its limit that stops it, over its change with the outputs
+# residual of an integrating block at its limit that stops it, over its change with the outputs
+STOPPED = 1e-6
 BALANCED = 4e-16  # change of an output in the last iteration, relative to its range: rounding
 
 
@@ -36,10 +38,19 @@ class Balance:
     """
 
     def __init__(self, case, packed, make) -> None:
-        self.case, self.packed, self.make, own = case, packed, make, with_slot(packed.features, SLOT)
+        self.case, self.packed, self.make, own = (
+            case,
+            packed,
+            make,
+            with_slot(packed.features, SLOT),
+        )
         self.own = own
         self.blocks = {name: case.controls[name] for name in packed.schedules.blocks}
-        self.unstated = [k for k, block in enumerate(self.blocks.values()) if block.control.initial_output is None]
+        self.unstated = [
+            k
+            for k, block in enumerate(self.blocks.values())
+            if block.control.initial_output is None
+        ]
         self.free = self.sought()
         low, high = own.table["least"], own.table["greatest"]
         small = [small_change(block.dimensions[1]) for block in self.blocks.values()]
@@ -54,17 +65,24 @@ class Balance:
         A block that integrates counts as affecting it, and so do all blocks before it: its output is found by the rate
         of its input, which blocks with `initial` pass on. The levels of tanks at the start do not depend on blocks.
         """
-        blocks, numbers = list(self.blocks.values()), {name: k for k, name in enumerate(self.blocks)}
+        blocks = list(self.blocks.values())
+        numbers = {name: k for k, name in enumerate(self.blocks)}
         static = [control_rows_of(type(block.control)).is_static(block.control) for block in blocks]
-        rows = dict(zip([probe.text for probe in self.own.sensors], self.own.sensor_table, strict=True))
+        rows = dict(
+            zip([probe.text for probe in self.own.sensors], self.own.sensor_table, strict=True)
+        )
         tables = self.packed.tables
-        ahead = {int(tables.pieces[first, 2]) for first, count in tables.schedules.tolist() if count == 0}
+        ahead = {
+            int(tables.pieces[first, 2]) for first, count in tables.schedules.tolist() if count == 0
+        }
         static = [own and not block.followed for own, block in zip(static, blocks, strict=True)]
         ahead = (ahead | {k for k in self.unstated if not static[k]}) & {*self.unstated}
         acting: set[int] = set()
         while ahead:
             acting |= ahead
-            ahead = {numbers[name] for k in ahead for name in blocks[k].blocks_read} & {*self.unstated} - acting
+            ahead = {numbers[name] for k in ahead for name in blocks[k].blocks_read} & {
+                *self.unstated
+            } - acting
         before = {k for k in self.unstated if blocks[k].control.integrates}
         while before:
             acting |= before
@@ -72,17 +90,26 @@ class Balance:
         acting &= {*self.unstated}
         known = {*range(len(blocks))} - {*self.unstated}
         for k in self.unstated * static.count(True):
-            own = (item in numbers and numbers[item] in known if isinstance(item, str) else
-                   rows[item.text]["kind"] == rec.LEVEL for item in blocks[k].inputs)  # fmt: skip
+            own = (
+                item in numbers and numbers[item] in known
+                if isinstance(item, str)
+                else rows[item.text]["kind"] == rec.LEVEL
+                for item in blocks[k].inputs
+            )
             if k not in known and static[k] and all(own):
                 known.add(k)
         return sorted(acting - known)
 
     def guess(self) -> np.ndarray:
         """First outputs: as stated, or in the middle of the limits, or 0; 1 for integrals without a unit."""
-        usual = [float(block.control.integrates and block.dimensions[1] == "number") for block in self.blocks.values()]
-        middle = [0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(value, a), b)
-                  for a, b, value in zip(self.low, self.high, usual, strict=True)]  # fmt: skip
+        usual = [
+            float(block.control.integrates and block.dimensions[1] == "number")
+            for block in self.blocks.values()
+        ]
+        middle = [
+            0.5 * (a + b) if math.isfinite(a) and math.isfinite(b) else min(max(value, a), b)
+            for a, b, value in zip(self.low, self.high, usual, strict=True)
+        ]
         stated = [block.control.initial_output for block in self.blocks.values()]
         return np.array([m if s is None else s for m, s in zip(middle, stated, strict=True)])
 
@@ -100,7 +127,9 @@ class Balance:
         table["start"] = table["held"] = outputs
         return draft
 
-    def starts(self, outputs: np.ndarray, by_rates: bool = False) -> tuple[list[BlockStart], np.ndarray]:
+    def starts(
+        self, outputs: np.ndarray, by_rates: bool = False
+    ) -> tuple[list[BlockStart], np.ndarray]:
         """(values of each block, rates of change of its first input) at the start with these outputs.
 
         by_rates : False for rates of zero
@@ -111,18 +140,26 @@ class Balance:
         starts = []
         for block, row, output in zip(self.blocks.values(), blocks_of(model), outputs, strict=True):
             codes.append(model.tables.integers[row["inputs"] :][: row["input_count"]].tolist())
-            inputs = tuple(float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes[-1])
-            setpoint = value_at(model.tables, row["setpoint"], t, t) if row["setpoint"] >= 0 else 0.0
+            inputs = tuple(
+                float(values[code] if code >= 0 else outputs[-1 - code]) for code in codes[-1]
+            )
+            setpoint = (
+                value_at(model.tables, row["setpoint"], t, t) if row["setpoint"] >= 0 else 0.0
+            )
             starts.append(BlockStart(self.case, block, t, inputs, float(setpoint), float(output)))
         rates: dict[int, float] = {}
 
         def input_rates(k: int) -> list[float]:
-            return [float(slopes[code]) if code >= 0 else output_rate(-1 - code) for code in codes[k]]
+            return [
+                float(slopes[code]) if code >= 0 else output_rate(-1 - code) for code in codes[k]
+            ]
 
         def output_rate(k: int) -> float:
             if k not in rates:
                 control, rates[k] = starts[k].block.control, 0.0  # of a cycle of blocks
-                rates[k] = control_rows_of(type(control)).output_rate(control, starts[k], input_rates(k))
+                rates[k] = control_rows_of(type(control)).output_rate(
+                    control, starts[k], input_rates(k)
+                )
             return rates[k]
 
         first = np.array([input_rates(k)[0] if codes[k] else 0.0 for k in range(len(starts))])
@@ -136,8 +173,12 @@ class Balance:
         """
         starts, slopes = self.starts(outputs, by_rates)
         controls = [block.control for block in self.blocks.values()]
-        own = [control_rows_of(type(controls[k])).residual(controls[k], starts[k]) for k in self.free]
-        return np.array(own + ([slopes[k] for k in self.free if controls[k].integrates] if by_rates else []))
+        own = [
+            control_rows_of(type(controls[k])).residual(controls[k], starts[k]) for k in self.free
+        ]
+        return np.array(
+            own + ([slopes[k] for k in self.free if controls[k].integrates] if by_rates else [])
+        )
 
     def residual(self, start: BlockStart) -> float:
         """Residual of a block by its own law."""
@@ -177,18 +218,25 @@ class Balance:
                     starts[k] = starts[k]._replace(output=float(outputs[k]))
             if np.array_equal(earlier, outputs):
                 break
-        starts = [self.with_inputs(start, outputs, numbers) for start in starts]  # also of blocks with `initial`
+        # also of blocks with `initial`
+        starts = [self.with_inputs(start, outputs, numbers) for start in starts]
         pieces, schedules = self.packed.tables.pieces, self.packed.tables.schedules.tolist()
         driving = [int(pieces[first, 2]) for first, count in schedules if count == 0]
         return self.starts(outputs)[0] if np.any(before[driving] != outputs[driving]) else starts
 
-    def with_inputs(self, start: BlockStart, outputs: np.ndarray, numbers: dict[str, int]) -> BlockStart:
+    def with_inputs(
+        self, start: BlockStart, outputs: np.ndarray, numbers: dict[str, int]
+    ) -> BlockStart:
         """Values of a block with the outputs of others as inputs; numbers : name of a block -> its number"""
-        inputs = (outputs[numbers[item]] if isinstance(item, str) else known
-                  for item, known in zip(start.block.inputs, start.inputs, strict=True))  # fmt: skip
+        inputs = (
+            outputs[numbers[item]] if isinstance(item, str) else known
+            for item, known in zip(start.block.inputs, start.inputs, strict=True)
+        )
         return start._replace(inputs=tuple(map(float, inputs)))
 
-    def polish(self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool) -> None:
+    def polish(
+        self, outputs: np.ndarray, matrix: np.ndarray, acts: np.ndarray, by_rates: bool
+    ) -> None:
         """Take a last step from residuals on both sides: beside its root a rate of a tank is set to zero as rounding.
 
         matrix : rows of the slopes of the residuals that outputs change, times the ranges; acts : True for these
@@ -200,7 +248,11 @@ class Balance:
             if np.any(moved < self.low) or np.any(moved > self.high):
                 return
             around += 0.5 * self.residuals(moved, by_rates)[acts]
-        step = np.linalg.lstsq(matrix, -around, RANK)[0] if np.isfinite(around).all() else np.zeros(len(self.free))
+        step = (
+            np.linalg.lstsq(matrix, -around, RANK)[0]
+            if np.isfinite(around).all()
+            else np.zeros(len(self.free))
+        )
         if np.all(np.abs(step) < ROUNDING):
             outputs[self.free] += step * self.range[self.free]
 
@@ -222,17 +274,23 @@ class Balance:
                 return self.free
             if residual[~acts].any():  # no output changes it
                 return self.blocks_of_rows((residual != 0.0) & ~acts)
-            step, _, rank, _ = np.linalg.lstsq(matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK)
+            step, _, rank, _ = np.linalg.lstsq(
+                matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK
+            )
             before = outputs.copy()
             change = step * self.range[self.free]
-            outputs[self.free] = np.clip(outputs[self.free] + change, self.low[self.free], self.high[self.free])
+            outputs[self.free] = np.clip(
+                outputs[self.free] + change, self.low[self.free], self.high[self.free]
+            )
             moved = float(np.max(np.abs(outputs - before) / self.range))
             rounding, size_before = 0.5 * size_before < moved < ROUNDING, moved
             if moved <= BALANCED or rounding:
                 size_before = math.inf
                 if rank == len(self.free):
                     self.polish(outputs, matrix[acts], acts, by_rates)
-                    return self.stopped(outputs, np.divide(residual, size, where=acts, out=np.zeros(size.size)))
+                    return self.stopped(
+                        outputs, np.divide(residual, size, where=acts, out=np.zeros(size.size))
+                    )
                 if by_rates:
                     return self.free
                 by_rates = True
@@ -246,19 +304,32 @@ class Balance:
 
     def passed_on(self, starts: list[BlockStart]) -> np.ndarray:
         """Outputs in which each block that does not integrate has the value that its inputs give."""
-        outputs, numbers = np.array([start.output for start in starts]), {name: k for k, name in enumerate(self.blocks)}
+        outputs = np.array([start.output for start in starts])
+        numbers = {name: k for k, name in enumerate(self.blocks)}
         for k in self.unstated:
             start, block = starts[k], starts[k].block
             if not block.control.integrates:
-                inputs = (outputs[numbers[item]] if isinstance(item, str) else known
-                          for item, known in zip(block.inputs, start.inputs, strict=True))  # fmt: skip
-                value = self.residual(start._replace(inputs=tuple(map(float, inputs)))) + start.output
-                outputs[k] = min(max(value, self.low[k]), self.high[k]) if math.isfinite(value) else outputs[k]
+                inputs = (
+                    outputs[numbers[item]] if isinstance(item, str) else known
+                    for item, known in zip(block.inputs, start.inputs, strict=True)
+                )
+                value = (
+                    self.residual(start._replace(inputs=tuple(map(float, inputs)))) + start.output
+                )
+                outputs[k] = (
+                    min(max(value, self.low[k]), self.high[k])
+                    if math.isfinite(value)
+                    else outputs[k]
+                )
         return outputs
 
-    def slope(self, outputs: np.ndarray, k: int, residual: np.ndarray, by_rates: bool) -> np.ndarray:
+    def slope(
+        self, outputs: np.ndarray, k: int, residual: np.ndarray, by_rates: bool
+    ) -> np.ndarray:
         """Derivative of all residuals by the output of block k, times its range."""
-        change = -DIFFERENCE if outputs[k] + DIFFERENCE * self.range[k] > self.high[k] else DIFFERENCE
+        change = (
+            -DIFFERENCE if outputs[k] + DIFFERENCE * self.range[k] > self.high[k] else DIFFERENCE
+        )
         moved = outputs.copy()
         moved[k] += change * self.range[k]
         return (self.residuals(moved, by_rates) - residual) / change
@@ -281,7 +352,10 @@ class Balance:
         groups = [([k], state) for k, state in states.items()] or [(left, "")] * bool(left)
         for group, state in groups:
             text = f"no output of {listing([names[k] for k in group])} balances the start{state}"
-            self.packed.fault(f"controls.{names[group[0]]}", f"{text}; give the key `initial`, the output at the start")
+            self.packed.fault(
+                f"controls.{names[group[0]]}",
+                f"{text}; give the key `initial`, the output at the start",
+            )
 
     def unbalanced_state(self, start: BlockStart) -> str:
         """Text of the input and setpoint of an integrating block that differ; "" for another block."""
@@ -289,7 +363,9 @@ class Balance:
         if not block.control.integrates or self.residual(start) == 0.0:
             return ""
         unit, setpoint = block.dimensions[0], block.control.setpoint_schedule
-        found, set_value = (self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint))
+        found, set_value = (
+            self.case.amount(x, unit).removesuffix(" -") for x in (start.inputs[0], start.setpoint)
+        )
         if setpoint is not None and found == set_value:
             return ""
         return f": the input is {found}, but {'not 0' if setpoint is None else f'the setpoint {set_value}'}"
@@ -297,12 +373,16 @@ class Balance:
     def note_limited(self, starts: list[BlockStart]) -> None:
         """Add a notice of each block without `limits` whose inputs give an output beyond those of the driven keys."""
         for k in self.unstated:
-            control, start, name = starts[k].block.control, starts[k], list(self.blocks)[k]
+            control = starts[k].block.control
+            start = starts[k]
+            name = list(self.blocks)[k]
             if isinstance(control_rows_of(type(control)), StaticRows) and control.limits is None:
                 given = self.residual(start) + start.output
                 if not self.low[k] <= given <= self.high[k]:
                     unit = start.block.dimensions[1]
-                    given, output = (self.case.amount(x, unit).removesuffix(" -") for x in (given, start.output))
+                    given, output = (
+                        self.case.amount(x, unit).removesuffix(" -") for x in (given, start.output)
+                    )
                     text = f"its output at the start, {given}, is beyond its limits, those of the driven keys"
                     text = f"controls.{name}: {text}; it is limited to {output}"
                     self.packed.warnings.append(Notice("start", f"controls.{name}", text))
@@ -316,7 +396,10 @@ class Balance:
         for k in self.infinite(starts):
             name, start = list(self.blocks)[k], starts[k]
             control = start.block.control
-            known = {"t": start.time, **dict(zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True))}
+            known = {
+                "t": start.time,
+                **dict(zip(getattr(control, "inputs", ("input",)), start.inputs, strict=True)),
+            }
             formula = getattr(control, "formula", None)
             text = "the output" if formula is None else show(formula)
             text = f"{text} is not a finite number at the start, with {listing_of(known)}; expected finite values"
@@ -354,8 +437,11 @@ def sensor_values(model, t: float, with_rates: bool = True) -> tuple[np.ndarray,
                 high, low = y.copy(), y.copy()
                 high[j] += DIFFERENCE * model.scale[j]
                 low[j] -= DIFFERENCE * model.scale[j]
-                ends = [read_sensors(model, data, t, moved, data.evaluate(t, moved, t)[1])[k]
-                        for moved in (high, low) if rates[j] != 0.0]  # fmt: skip
+                ends = [
+                    read_sensors(model, data, t, moved, data.evaluate(t, moved, t)[1])[k]
+                    for moved in (high, low)
+                    if rates[j] != 0.0
+                ]
                 slopes[k] += (ends[0] - ends[1]) / (high[j] - low[j]) * rates[j] if ends else 0.0
         return value, slopes
 
@@ -375,7 +461,11 @@ def before_limits(own, control, start: BlockStart, row) -> BlockStart:
 
     own : conversion of its type; row : row of the block
     """
-    if control.initial_output is not None or control.integrates or start.output not in (row["least"], row["greatest"]):
+    if (
+        control.initial_output is not None
+        or control.integrates
+        or start.output not in (row["least"], row["greatest"])
+    ):
         return start
     beyond = own.residual(control, start)
     rounding = ROUNDING * (abs(start.output) + abs(row["greatest"] - row["least"]))

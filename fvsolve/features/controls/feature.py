@@ -17,7 +17,14 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.features.controls import histories, lower
 from fvsolve.features.controls.kernels import input_histories, tables
-from fvsolve.features.controls.kernels.tables import BLOCK_SETTINGS, BLOCK_VALUE, CONTROL, DRIVEN, HOOKS, SLOT
+from fvsolve.features.controls.kernels.tables import (
+    BLOCK_SETTINGS,
+    BLOCK_VALUE,
+    CONTROL,
+    DRIVEN,
+    HOOKS,
+    SLOT,
+)
 from fvsolve.features.controls.rows import small_change
 from fvsolve.parts.network_elements import network_of
 from fvsolve.parts.schedule import BLOCK_PREFIX
@@ -35,7 +42,9 @@ FIRST = RhsTerms(
 )
 FOR_EVENTS = RhsTerms(events="blocks: outputs_for_events", package=PACKAGE)
 EVENTS = RhsTerms(events="blocks: control_events", package=PACKAGE)
-LAST = RhsTerms(observe="blocks: observe_controls", record="blocks: record_controls", package=PACKAGE)
+LAST = RhsTerms(
+    observe="blocks: observe_controls", record="blocks: record_controls", package=PACKAGE
+)
 
 
 class Controls(Feature, slot=1, wakes="section controls"):
@@ -64,7 +73,9 @@ class Controls(Feature, slot=1, wakes="section controls"):
     # build ----------
 
     def begin(self, draft) -> None:
-        draft.schedules.blocks = {name: k for k, name in enumerate(decision_order(draft.case.controls))}
+        draft.schedules.blocks = {
+            name: k for k, name in enumerate(decision_order(draft.case.controls))
+        }
 
     def lower_last(self, draft) -> None:
         lower.lower_controls(draft, self)
@@ -106,7 +117,10 @@ class Controls(Feature, slot=1, wakes="section controls"):
     def probe(self, draft, probe, row) -> bool:
         if probe.part != "controls":
             return False
-        row["kind"], row["index"] = BLOCK_VALUE, draft.schedules.blocks[probe.name.removeprefix(BLOCK_PREFIX)]
+        row["kind"], row["index"] = (
+            BLOCK_VALUE,
+            draft.schedules.blocks[probe.name.removeprefix(BLOCK_PREFIX)],
+        )
         row["side"] = QUANTITIES.index(probe.quantity)
         return True
 
@@ -175,11 +189,19 @@ class Controls(Feature, slot=1, wakes="section controls"):
             first, output = model.case.controls[name].dimensions
             least, greatest = float(row["least"]), float(row["greatest"])
             unit, small = DIMENSIONS[output].si, small_change(output)
-            span = f", {least:g} to {greatest:g}" if math.isfinite(least) and math.isfinite(greatest) else ""
+            span = (
+                f", {least:g} to {greatest:g}"
+                if math.isfinite(least) and math.isfinite(greatest)
+                else ""
+            )
             sort = InputKind(unit, f"a number [{unit}]{span}", least, greatest, small)
             inputs[f"{BLOCK_PREFIX}{name}.output"] = Input(sort, -1, held=(SLOT, k))
             if row["setpoint"] >= 0:
-                sort = InputKind(DIMENSIONS[first].si, f"a number [{DIMENSIONS[first].si}]", small=small_change(first))
+                sort = InputKind(
+                    DIMENSIONS[first].si,
+                    f"a number [{DIMENSIONS[first].si}]",
+                    small=small_change(first),
+                )
                 inputs[f"{BLOCK_PREFIX}{name}.setpoint"] = Input(sort, int(row["setpoint"]))
         return inputs
 
@@ -208,7 +230,10 @@ class ControlRun(FeatureRun):
         super().__init__(feature, run_data)
         self.discrete = np.array(feature.discrete, dtype=float)
         self.histories = np.zeros(histories.histories_size(feature.table))
-        self.readings, self.sensing = np.zeros(len(feature.sensor_table)), np.zeros(0, dtype=np.int64)
+        self.readings, self.sensing = (
+            np.zeros(len(feature.sensor_table)),
+            np.zeros(0, dtype=np.int64),
+        )
         if self.readings.size:
             from fvsolve.core.kernels.table_handle import empty_handle
 
@@ -217,15 +242,26 @@ class ControlRun(FeatureRun):
 
     def tables(self, view: str = "") -> tables.BlockTables:
         own = self.feature
-        blocks = own.table[:0] if view == "sensing" else own.table  # sensors do not read probes of blocks
+        # sensors do not read probes of blocks
+        blocks = own.table[:0] if view == "sensing" else own.table
         return tables.BlockTables(
-            blocks, own.sensor_table, own.driven_rows, own.settings, own.block_hooks(),
-            self.discrete, self.histories,
-            self.readings, self.sensing,
-        )  # fmt: skip
+            blocks,
+            own.sensor_table,
+            own.driven_rows,
+            own.settings,
+            own.block_hooks(),
+            self.discrete,
+            self.histories,
+            self.readings,
+            self.sensing,
+        )
 
     def views(self):
-        return {"sensing": (self.sensing, {"probes": self.feature.sensor_table})} if self.readings.size else {}
+        return (
+            {"sensing": (self.sensing, {"probes": self.feature.sensor_table})}
+            if self.readings.size
+            else {}
+        )
 
     def arrays(self):
         return {"discrete": self.discrete, "histories": self.histories}
@@ -282,7 +318,10 @@ def blocks_of(model) -> np.ndarray:
 def with_blocks(model, table: np.ndarray):
     """Copy of a model with other blocks."""
     own = with_slot(model.features, SLOT)
-    return replace(model, features=[own.with_table(table) if other is own else other for other in model.features])
+    return replace(
+        model,
+        features=[own.with_table(table) if other is own else other for other in model.features],
+    )
 
 
 def numbers_of(run_data) -> np.ndarray:

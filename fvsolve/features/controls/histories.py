@@ -7,7 +7,8 @@ from fvsolve.features.controls.kernels import input_histories as at
 FIRST_CAPACITY = 1024  # entries of a block
 ENTRIES_OF_STEP = 2  # most entries at the end of a step: one, and one after a break there
 LEAST_STEPS = 256  # steps
-DELAYS_NEEDED = 2.0  # a history spans this many delays: the last step, at most a delay long, may be computed again
+# a history spans this many delays: the last step, at most a delay long, may be computed again
+DELAYS_NEEDED = 2.0
 MARGIN = at.MOST_POINTS  # and so many entries before that
 
 
@@ -65,7 +66,9 @@ def with_doubled_space(histories: np.ndarray, delays: np.ndarray) -> np.ndarray:
     capacity = 2 * int(histories[at.CAPACITY])
     result = np.zeros(at.HEADER + delays.size * (at.HEAD + at.ENTRY * capacity))
     result[: at.HEADER], result[at.CAPACITY] = histories[: at.HEADER], capacity
-    heads, new_heads = (array[at.HEADER :].reshape(delays.size, -1) for array in (histories, result))
+    heads, new_heads = (
+        array[at.HEADER :].reshape(delays.size, -1) for array in (histories, result)
+    )
     for head, new in zip(heads, new_heads, strict=True):
         numbers, entries = stored_entries(histories, head)
         new[: at.HEAD] = head[: at.HEAD]

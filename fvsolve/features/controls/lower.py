@@ -15,7 +15,13 @@ import numpy as np
 from fvsolve.case.controls import Block
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.probe_tables import fill_probes
-from fvsolve.features.controls.kernels.tables import CONTROL, DRIVEN, DRIVEN_DEVICE, DRIVEN_NODE, DRIVEN_VALVE
+from fvsolve.features.controls.kernels.tables import (
+    CONTROL,
+    DRIVEN,
+    DRIVEN_DEVICE,
+    DRIVEN_NODE,
+    DRIVEN_VALVE,
+)
 from fvsolve.features.controls.rows import control_rows_of, small_change
 from fvsolve.parts import law_elements as codes
 from fvsolve.parts.network_elements import network_of
@@ -23,15 +29,22 @@ from fvsolve.parts.network_elements import network_of
 STATE_KINDS = (rec.LEVEL, rec.POSITION, rec.VELOCITY, rec.PISTON_POSITION, rec.PISTON_VELOCITY)
 STORED = (rec.FIXED, rec.TANK, rec.CHAMBER, rec.MOVING, rec.VESSEL)
 LIMIT_EVENTS = (
-    "reaches its lower limit", "leaves its lower limit", "reaches its upper limit", "leaves its upper limit",
-)  # fmt: skip
+    "reaches its lower limit",
+    "leaves its lower limit",
+    "reaches its upper limit",
+    "leaves its upper limit",
+)
 
 
 def lower_controls(draft, own) -> None:
     """Fill the tables of blocks, of sensors and of driven rows; add the states of blocks. own : the feature"""
     blocks = draft.schedules.blocks
-    probes = {item.text: item for block in draft.case.controls.values() for item in block.inputs
-              if not isinstance(item, str)}  # fmt: skip
+    probes = {
+        item.text: item
+        for block in draft.case.controls.values()
+        for item in block.inputs
+        if not isinstance(item, str)
+    }
     own.sensors = list(probes.values())
     own.sensor_table = fill_probes(draft, own.sensors)
     own.table = np.zeros(len(blocks), CONTROL)
@@ -56,22 +69,32 @@ def fill_block(draft, own, name: str, block: Block, sensors: list[str], row) -> 
     names = [f"controls.{name}.filtered{k or ''}" for k in range(filters)]
     if control.period is None:
         names += [f"controls.{name}.{state}" for state in rows.states(control)]
-    scales = [small[0]] * filters + (rows.scales(control, tuple(small)) if control.period is None else [])
+    scales = [small[0]] * filters + (
+        rows.scales(control, tuple(small)) if control.period is None else []
+    )
     row["y"] = draft.states(names, scales) if names else -1
     row["filters"], row["filter_rate"] = filters, 1.0 / control.filter if filters else 0.0
     row["hooks"], row["data"] = own.law_row(rows), len(draft.floats)
     draft.floats += rows.numbers(draft, name, block)
     row["at_once"] = control.feeds_through
     row["inputs"], row["input_count"] = len(draft.integers), len(block.inputs)
-    draft.integers += [-1 - draft.schedules.blocks[item] if isinstance(item, str) else sensors.index(item.text)
-                       for item in block.inputs]  # fmt: skip
+    draft.integers += [
+        -1 - draft.schedules.blocks[item] if isinstance(item, str) else sensors.index(item.text)
+        for item in block.inputs
+    ]
     row["starts"] = len(draft.floats)
     draft.floats += [0.0] * len(block.inputs)
     setpoint = control.setpoint_schedule
     row["setpoint"] = -1 if setpoint is None else draft.schedules.add(setpoint)
     row["least"], row["greatest"], row["held"] = *block.limits, np.nan
-    row["period"], row["offset"], row["delay"] = control.period or 0.0, control.offset, rows.delay(control)
-    limited = not control.switches and control.period is None and any(map(math.isfinite, block.limits))
+    row["period"], row["offset"], row["delay"] = (
+        control.period or 0.0,
+        control.offset,
+        rows.delay(control),
+    )
+    limited = (
+        not control.switches and control.period is None and any(map(math.isfinite, block.limits))
+    )
     row["flag"] = draft.flags(f"controls.{name}", LIMIT_EVENTS) if limited else -1
     flag = rows.timed_flag(np.array(draft.floats[row["data"] :]))
     row["memory"] = len(own.discrete) if flag >= 0 or control.period else -1
@@ -84,10 +107,14 @@ def fill_block(draft, own, name: str, block: Block, sensors: list[str], row) -> 
 
 def lower_delays(draft, own) -> None:
     """Number the histories of blocks with a delay, and list the blocks on which their inputs depend."""
-    table, blocks, numbers = own.table, draft.case.controls, draft.schedules.blocks
+    table = own.table
+    blocks = draft.case.controls
+    numbers = draft.schedules.blocks
     table["history"] = np.where(table["delay"] > 0.0, np.cumsum(table["delay"] > 0.0) - 1, -1)
     names, rows = list(numbers), draft.schedules.rows
-    drives_scene = {names[int(rows[first][2])] for first, pieces in draft.schedules.records if pieces == 0}
+    drives_scene = {
+        names[int(rows[first][2])] for first, pieces in draft.schedules.records if pieces == 0
+    }
     for name, row in zip(names, table, strict=True):
         if row["delay"] > 0.0:
             now = {item for item in blocks[name].inputs if isinstance(item, str)}
@@ -102,27 +129,37 @@ def lower_delays(draft, own) -> None:
                     found, ahead = found | more, [*ahead, *more]
             row["sources"], row["source_count"] = len(draft.integers), len(now)
             row["later_count"] = len(found) - len(now)
-            draft.integers += [numbers[item] for group in (now, found - now) for item in sorted(group)]
+            draft.integers += [
+                numbers[item] for group in (now, found - now) for item in sorted(group)
+            ]
 
 
 def control_rate(draft, own) -> float:
     """Greatest constant rate of filters and states of blocks [1/s]."""
     blocks = draft.case.controls.values()
-    rates = [control_rows_of(type(block.control)).rate(block.control) for block in blocks if not block.control.period]
+    rates = [
+        control_rows_of(type(block.control)).rate(block.control)
+        for block in blocks
+        if not block.control.period
+    ]
     return max([0.0, *rates, *own.table["filter_rate"]])
 
 
 def driven_rows(draft) -> Iterator[tuple[int, int, int]]:
     """Yield the rows of tables that blocks drive before the nodes are solved: (kind, row, number of the block)."""
-    followers = {index: int(draft.schedules.rows[first][2])
-                 for index, (first, pieces) in enumerate(draft.schedules.records) if pieces == 0}  # fmt: skip
+    followers = {
+        index: int(draft.schedules.rows[first][2])
+        for index, (first, pieces) in enumerate(draft.schedules.records)
+        if pieces == 0
+    }
     linear = draft.case.law.linear
     for k, row in enumerate(draft.valve_table):
         if row["schedule"] in followers and row["device"] < 0:
             yield DRIVEN_VALVE, k, followers[row["schedule"]]
     for k, row in enumerate(draft.device_table):
         _, part, device = draft.devices[k]
-        shaft, own = device.turns_with(part), device.schedules_at_once(row, draft.valve_table, draft.floats)
+        shaft = device.turns_with(part)
+        own = device.schedules_at_once(row, draft.valve_table, draft.floats)
         turned = [] if shaft is None else network_of(draft).schedules_of_node(shaft)
         for block in {followers[index] for index in (*own, *turned) if index in followers}:
             yield DRIVEN_DEVICE, k, block
@@ -138,7 +175,10 @@ def early_blocks(draft, driven: list[tuple[int, int, int]]) -> set[str]:
     """Names of the blocks that decide before the nodes are solved, because they drive the network or such a block."""
     names = list(draft.schedules.blocks)
     early = {names[block] for _, _, block in driven}
-    while more := {other for name in early for other in draft.case.controls[name].blocks_needed} - early:
+    while (
+        more := {other for name in early for other in draft.case.controls[name].blocks_needed}
+        - early
+    ):
         early |= more
     return early
 
@@ -177,10 +217,14 @@ def check_order(draft, own, early: set[str]) -> None:
             if not isinstance(probe, str) and not is_known_early(draft, rows[probe.text], probe):
                 text = f"{probe.text} may follow at once from what the control drives, a loop without a state"
                 place = f"inputs.{names[k]}" if names else "input"
-                draft.fault(f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`")
+                draft.fault(
+                    f"controls.{name}.{place}", f"{text}; give [controls.{name}] a `filter`"
+                )
 
 
-def check_network_order(draft, name: str, block: Block, rows: dict, numbers: dict[str, int]) -> None:
+def check_network_order(
+    draft, name: str, block: Block, rows: dict, numbers: dict[str, int]
+) -> None:
     """Add a fault if a block passes on at once what a block drives in a network of rotation, electricity and heat.
 
     Values of scalars, and heat of the fluid, are known only after these blocks.

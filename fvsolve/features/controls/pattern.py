@@ -21,8 +21,9 @@ class BlockCouplings(FeaturePattern):
         self.sensors, self.floats, self.size = feature.sensor_table, tables.floats, couplings.size
         self.follows = {
             index: int(tables.pieces[row["first"], 2])
-            for index, row in enumerate(tables.schedules) if row["pieces"] == 0
-        }  # fmt: skip
+            for index, row in enumerate(tables.schedules)
+            if row["pieces"] == 0
+        }
         counts = np.diff([*(row["y"] for row in self.controls if row["y"] >= 0), self.size])
         ends = iter(counts)
         self.counts = [int(next(ends)) if row["y"] >= 0 else 0 for row in self.controls]
@@ -48,7 +49,9 @@ class BlockCouplings(FeaturePattern):
 
     def schedule(self, *indices: int) -> np.ndarray:
         """States on which schedules depend that follow blocks; empty for other schedules."""
-        return unique_states(*(self.output(self.follows[index]) for index in indices if index in self.follows))
+        return unique_states(
+            *(self.output(self.follows[index]) for index in indices if index in self.follows)
+        )
 
     def read(self, code: int) -> np.ndarray:
         """States on which an input depends."""
@@ -56,12 +59,16 @@ class BlockCouplings(FeaturePattern):
 
     def sensor(self, row) -> np.ndarray:
         """States on which the value of a sensor depends."""
-        model, kind, i = self.model, row["kind"], int(row["index"])
+        model = self.model
+        kind = row["kind"]
+        i = int(row["index"])
         for own in model.features:
             if (states := own.probe(row)) is not None:
                 return states
         if kind == rec.LEVEL or (kind == rec.PRESSURE and not model.inner[i]):
-            return unique_states(model.pressure_states(i), self.schedule(model.nodes[i]["schedule"]))
+            return unique_states(
+                model.pressure_states(i), self.schedule(model.nodes[i]["schedule"])
+            )
         if kind == rec.PRESSURE:
             return model.sets[i]
         for own in model.features:
@@ -88,9 +95,14 @@ class BlockCouplings(FeaturePattern):
     def pairs(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield couplings (rates, states) of the states of blocks, and of rates that blocks drive directly."""
         for k, row in enumerate(self.controls):
-            read = [self.own(k), self.schedule(row["setpoint"]), *(self.read(code) for code in self.inputs(k))]
+            read = [
+                self.own(k),
+                self.schedule(row["setpoint"]),
+                *(self.read(code) for code in self.inputs(k)),
+            ]
             yield pairs_of(self.own(k), unique_states(*read))
-        tables, network = self.tables, {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
+        tables = self.tables
+        network = {*self.tables.valves["schedule"], *self.tables.nodes["schedule"]}
         network |= {*tables.valves["command"]}
         network |= {*tables.devices["schedule"], *self.controls["setpoint"]}
         network |= {index for own in self.model.features for index in own.schedules()}

@@ -10,7 +10,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 # size of a small change of a quantity [SI], by dimension; 1 for others
-SMALL = {"pressure": 1e5, "gauge_pressure": 1e5, "pressure_drop": 1e5, "flow": 1e-3, "number": 0.1, "force": 1e3}
+SMALL = {
+    "pressure": 1e5,
+    "gauge_pressure": 1e5,
+    "pressure_drop": 1e5,
+    "flow": 1e-3,
+    "number": 0.1,
+    "force": 1e3,
+}
 
 
 DIFFERENCE = 1e-6  # change of an input for differences, relative to a small change
@@ -84,7 +91,9 @@ class ControlRows:
     def begin(self, control: Any, start: BlockStart, numbers: np.ndarray) -> None:
         """Set the numbers that depend on the start; numbers : view of those of the block."""
 
-    def flags_at_start(self, control: Any, start: BlockStart, numbers: np.ndarray) -> dict[int, bool]:
+    def flags_at_start(
+        self, control: Any, start: BlockStart, numbers: np.ndarray
+    ) -> dict[int, bool]:
         """Event flags at the start that do not follow from the state: index -> True if it is set."""
         return {}
 

@@ -38,7 +38,9 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
         if line == "finite-volume" or need:
             methods[name] = LineMethod("finite-volume", need or f'pipe_model = "{line}"')
         elif name in unfit:
-            methods[name] = LineMethod("finite-volume", "its error as a delay line may exceed numerics.delay_tolerance")
+            methods[name] = LineMethod(
+                "finite-volume", "its error as a delay line may exceed numerics.delay_tolerance"
+            )
         else:
             lines.append(name)
     if not lines:
@@ -51,7 +53,9 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
     longest = 1.0 / rate  # under error control, see `solve.run_loop.longest_step`
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
-    steppers = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
+    steppers = (
+        (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
+    )
     # no value is read that is not yet known
     longest *= max(1.0, *(time for method in steppers for time in method_named(method).times))
     for name in lines:
@@ -66,7 +70,9 @@ def slowest_pipe(case, names: Collection[str]) -> str:
     """Name of the pipe with the longest travel time of a wave; with most cells if several have the longest."""
     travel = {name: case.links[name].length / case.wave_speed(name) for name in names}
     longest = (1.0 - 1e-9) * max(travel.values())  # travel times that differ by rounding are equal
-    return max(names, key=lambda name: (travel[name] > longest, case.links[name].cells, travel[name]))
+    return max(
+        names, key=lambda name: (travel[name] > longest, case.links[name].cells, travel[name])
+    )
 
 
 def reason_for_cells(case, name: str, link) -> str:

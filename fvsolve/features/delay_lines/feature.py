@@ -53,7 +53,8 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
 
     @property
     def further_cells(self) -> int:
-        return int((self.delays["stretches"] - self.delays["places"]).sum())  # of a line only stretches are stepped
+        # of a line only stretches are stepped
+        return int((self.delays["stretches"] - self.delays["places"]).sum())
 
     # build ----------
 
@@ -63,7 +64,9 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
             return False
         row["rate_factor"] = chosen.rate * link.length / link.cells / row["speed"]
         row["cells"] = 0
-        row["y"] = draft.states([f"{name}.mass"], 1e5 * row["admittance"] * link.length / row["speed"])
+        row["y"] = draft.states(
+            [f"{name}.mass"], 1e5 * row["admittance"] * link.length / row["speed"]
+        )
         return True
 
     def lower(self, draft) -> None:
@@ -71,7 +74,10 @@ class DelayLines(Feature, slot=0, wakes="pipe_model delay-line, pipe_model auto"
         self.settings[0]["jumps"] = 0.25 * draft.case.numerics.delay_tolerance
         if len(self.delays):
             method = method_named(automatic.first_method(draft.case.numerics.method))
-            self.settings[0]["weights"], self.settings[0]["stages"] = len(draft.floats), method.stages
+            self.settings[0]["weights"], self.settings[0]["stages"] = (
+                len(draft.floats),
+                method.stages,
+            )
             draft.floats += [*map(float, method.b), *method.times]
 
     def grouped(self, draft, group) -> None:
@@ -180,7 +186,8 @@ class LineRun(FeatureRun):
         if not len(self.delays):
             return np.inf
         count = self.past[wave_history.COUNT]
-        if self.full_at - count < history.LEAST_STEPS:  # a bound for any steps: checked again only near it
+        # a bound for any steps: checked again only near it
+        if self.full_at - count < history.LEAST_STEPS:
             while (left := history.steps_left(self.past, self.delays)) < history.LEAST_STEPS:
                 self.run_data.set_array("past", history.with_doubled_rings(self.past, self.delays))
             self.full_at = count + left
@@ -191,7 +198,9 @@ class LineRun(FeatureRun):
         if not past.size:
             return
         past[wave_history.SEGMENT_END] = min(end, wave_history.INFINITE)
-        if past[wave_history.COUNT] > 0.0 and past[wave_history.NEXT_ARRIVAL] <= t + wave_history.time_tolerance(past):
+        if past[wave_history.COUNT] > 0.0 and past[
+            wave_history.NEXT_ARRIVAL
+        ] <= t + wave_history.time_tolerance(past):
             model = self.run_data.model
             out, values = model.new_out(), np.zeros(len(model.tables.probes))
             out[rec.STATUS] = rec.ARRIVED
@@ -213,7 +222,9 @@ class LineRun(FeatureRun):
 
     def notices(self) -> list:
         run = self.run_data
-        return history.jump_overflow_notices(self.past) + lower.friction_notices(run.model, self.delays, run.extremes)
+        return history.jump_overflow_notices(self.past) + lower.friction_notices(
+            run.model, self.delays, run.extremes
+        )
 
 
 def lines_of(model) -> np.ndarray:

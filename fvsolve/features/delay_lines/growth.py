@@ -18,9 +18,14 @@ from fvsolve.core.steppers.tableau import Method
 from fvsolve.errors import Notice
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.features.delay_lines.kernels.tables import SLOT
-from fvsolve.features.delay_lines.kernels.wave_history import lagrange_four, lagrange_six, lagrange_three
+from fvsolve.features.delay_lines.kernels.wave_history import (
+    lagrange_four,
+    lagrange_six,
+    lagrange_three,
+)
 
-REFLECTION_BOUND = 4.0  # times a: upper bound of what a method adds to a wave in a single reflection
+# times a: upper bound of what a method adds to a wave in a single reflection
+REFLECTION_BOUND = 4.0
 RK4_BOUND = 1.5  # value of a up to which rk4 does not amplify reflected waves
 ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # phases theta per step
 
@@ -44,10 +49,14 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
             round_trip = 2.0 * line["stretches"] * line["hold"]
             if REFLECTION_BOUND * a * span / round_trip < 1.0:
                 continue
-            damping = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
-            once = np.max(np.abs(reflection_factor(method, a, steps)) * np.abs(interpolation_factor(steps))) * np.exp(
-                -damping
+            damping = (
+                line["tau"]
+                * line["stretches"]
+                * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
             )
+            once = np.max(
+                np.abs(reflection_factor(method, a, steps)) * np.abs(interpolation_factor(steps))
+            ) * np.exp(-damping)
             candidates.append((growth_factor(float(once) - 1.0, span / round_trip), name, a))
     return max(candidates, default=(0.0, "", 0.0))
 
@@ -60,12 +69,15 @@ def line_growth_notices(model, method: Method, h: float, span: float) -> list[No
     grows, name, a = wave_growth(model, method, h, span)
     if grows < LEAST_GROWTH:
         return []
-    wrong, other = grows >= LEAST_GROWTH**2, '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
-    text = (f"{name}: waves between this part and the delay lines grow by a factor of {grows:.3g} in the run (an "
-            f"estimate), with {method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times "
-            "the time constant with which the lines fill the part; "
-            f"{'the numbers are not to be trusted' if wrong else 'the results may be wrong'}; "
-            f"give method = {other}, or shorter steps")  # fmt: skip
+    wrong = grows >= LEAST_GROWTH**2
+    other = '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
+    text = (
+        f"{name}: waves between this part and the delay lines grow by a factor of {grows:.3g} in the run (an "
+        f"estimate), with {method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times "
+        "the time constant with which the lines fill the part; "
+        f"{'the numbers are not to be trusted' if wrong else 'the results may be wrong'}; "
+        f"give method = {other}, or shorter steps"
+    )
     return [Notice("step-limit", name, text, "method", a, None, not wrong)]
 
 
@@ -74,7 +86,9 @@ def storing_nodes(model, h: float):
 
     h : step [s]; k : stiffness of the node [Pa/kg]; Y : admittance of its lines [kg/s per Pa]
     """
-    nodes, out, ends = model.tables.nodes, None, with_slot(model.features, SLOT).node_ends
+    nodes = model.tables.nodes
+    out = None
+    ends = with_slot(model.features, SLOT).node_ends
     for i, (name, node) in enumerate(zip(model.case.places, nodes, strict=True)):
         if ends[i] == ends[i + 1] or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
             continue
@@ -99,7 +113,9 @@ def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
     """
     solved = np.linalg.solve((np.eye(method.stages) + a * method.a).T, method.b)
     seen = np.array([interpolation_factor(steps - c) for c in method.c])
-    return 2.0 * a * (solved @ seen) / (np.exp(1j * ANGLES) - (1.0 - a * solved.sum())) - interpolation_factor(steps)
+    return 2.0 * a * (solved @ seen) / (
+        np.exp(1j * ANGLES) - (1.0 - a * solved.sum())
+    ) - interpolation_factor(steps)
 
 
 def interpolation_factor(steps: float) -> np.ndarray:
@@ -109,7 +125,13 @@ def interpolation_factor(steps: float) -> np.ndarray:
     """
     steps_up = int(np.ceil(steps - 1e-9))
     x = max(0.0, steps_up - steps)
-    weights = lagrange_six(x) if steps_up >= 3 else lagrange_four(x) if steps_up >= 2 else lagrange_three(x)
+    weights = (
+        lagrange_six(x)
+        if steps_up >= 3
+        else lagrange_four(x)
+        if steps_up >= 2
+        else lagrange_three(x)
+    )
     if x < 1e-9:
         weights = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     places = np.arange(-2, 4) - steps_up

@@ -8,9 +8,13 @@ from fvsolve.errors import Notice
 from fvsolve.features.delay_lines.kernels import wave_history as at
 
 # stored jumps: in all lines together, least and most of each wave
-TOTAL_JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024
+TOTAL_JUMPS = 2**16
+LEAST_JUMPS = 32
+MOST_JUMPS = 1024
 # spare entries beyond a delay: in all lines together, least and most of each
-TOTAL_SPARE, LEAST_SPARE, MOST_SPARE = 2**14, 32, 256
+TOTAL_SPARE = 2**14
+LEAST_SPARE = 32
+MOST_SPARE = 256
 HISTORY_DELAYS = 1.1  # a history spans this many delays
 MARGIN_ENTRIES = 8  # and so many entries before that
 LEAST_STEPS = 16  # steps
@@ -63,9 +67,23 @@ def begin_history(past: np.ndarray, delays: np.ndarray) -> None:
     if not len(delays):
         return
     count = int(delays["stretches"].sum())
-    sizes = [at.CAPACITY, at.JUMP_CAPACITY, at.STRETCHES, at.RING_FACTOR, at.ARRIVALS_TIME, at.CORRECTED_TIME]
+    sizes = [
+        at.CAPACITY,
+        at.JUMP_CAPACITY,
+        at.STRETCHES,
+        at.RING_FACTOR,
+        at.ARRIVALS_TIME,
+        at.CORRECTED_TIME,
+    ]
     wider = 1 if past.size == history_size(delays) else ring_factor(past, delays)
-    past[sizes] = wider * int(delays["ring_size"].max()), jump_capacity(count), count, wider, math.nan, -math.inf
+    past[sizes] = (
+        wider * int(delays["ring_size"].max()),
+        jump_capacity(count),
+        count,
+        wider,
+        math.nan,
+        -math.inf,
+    )
     past[at.NEXT_ARRIVAL], past[at.RING_ENTRIES] = at.INFINITE, ring_entries(delays)
     past[at.SEGMENT_END], past[at.REFLECTION_RATE] = at.INFINITE, 1.0 / float(delays["tau"].min())
 
@@ -88,7 +106,9 @@ def stored_history(memory: dict[str, np.ndarray]) -> np.ndarray:
 
 def stored_entries(past: np.ndarray) -> np.ndarray:
     """Numbers of all entries whose times are still stored, without those of the initial steady state."""
-    return np.arange(max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
+    return np.arange(
+        max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT])
+    )
 
 
 def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
@@ -98,7 +118,9 @@ def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -
     line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
     for head in np.flatnonzero(heads[:, at.JUMP_COUNT]):
         line, first = delays[line_of[head // 2]], places[2] + at.JUMP_SIZE * queue * head
-        order = (int(heads[head, at.FIRST_JUMP]) + np.arange(int(heads[head, at.JUMP_COUNT]))) % queue
+        order = (
+            int(heads[head, at.FIRST_JUMP]) + np.arange(int(heads[head, at.JUMP_COUNT]))
+        ) % queue
         sent = past[first + order]
         arrivals += [sent + line["tau"], sent + 0.5 * line["tau"]]
     times, tolerance = np.sort(np.concatenate([[], *arrivals])), at.time_tolerance(past)
@@ -127,7 +149,9 @@ def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
     result[[at.CAPACITY, at.RING_FACTOR]] *= 2.0
     stored = stored_entries(past)
     old, new = at.HEADER_SIZE, at.HEADER_SIZE
-    result[new + (stored & (int(result[at.CAPACITY]) - 1))] = past[old + (stored & (int(past[at.CAPACITY]) - 1))]
+    result[new + (stored & (int(result[at.CAPACITY]) - 1))] = past[
+        old + (stored & (int(past[at.CAPACITY]) - 1))
+    ]
     here, there = at.offsets_of(past), at.offsets_of(result)
     result[there[0] : there[3]] = past[here[0] : here[3]]  # all except rings and bounds
     for row in delays:

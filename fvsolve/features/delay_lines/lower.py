@@ -19,8 +19,10 @@ from fvsolve.features.delay_lines.history import set_rings
 from fvsolve.features.delay_lines.kernels.line_rates import drag_and_slope
 from fvsolve.features.delay_lines.kernels.tables import DELAY
 
-FRICTION_PRESSURE = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
-UNBALANCED_SHARE = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance
+# pressure [Pa] whose flow is added to that of the start to evaluate friction
+FRICTION_PRESSURE = 0.02 * 1e5
+# relative to the wave of 1 bar: pressure drop that friction does not balance
+UNBALANCED_SHARE = 1e-9
 KINK_OVERSHOOT = 0.1  # relative to the change in a step: overshoot of six entries after a kink
 MAX_ATTENUATION = 0.5  # greatest attenuation of a wave by friction in a line shorter than a step
 
@@ -77,7 +79,9 @@ def jump_tables(draft, feature) -> tuple[dict[str, np.ndarray], np.ndarray]:
     short = feature.delays["now"] > 0.0
     if not short.any():
         return {}, feature.delays
-    own, tables, line = copy.copy(draft), draft.tables, copy.copy(feature)
+    own = copy.copy(draft)
+    tables = draft.tables
+    line = copy.copy(feature)
     own.node_table, own.valve_table = draft.node_table.copy(), draft.valve_table.copy()
     own.coupling_table, line.delays = draft.coupling_table[:0], feature.delays.copy()
     own.features = [line if other is feature else other for other in draft.features]
@@ -90,9 +94,13 @@ def jump_tables(draft, feature) -> tuple[dict[str, np.ndarray], np.ndarray]:
     line.delays["now"] = line.delays["couple"] = 0.0
     classify_nodes(own)
     replaced = {
-        "nodes": own.node_table, "valves": own.valve_table, "couplings": own.coupling_table,
-        "clusters": own.cluster_table, "integers": np.array(own.integers), "floats": np.array(own.floats),
-    }  # fmt: skip
+        "nodes": own.node_table,
+        "valves": own.valve_table,
+        "couplings": own.coupling_table,
+        "clusters": own.cluster_table,
+        "integers": np.array(own.integers),
+        "floats": np.array(own.floats),
+    }
     return replaced, line.delays
 
 
@@ -108,7 +116,10 @@ def friction_notices(model, delays, extremes: np.ndarray) -> list[Notice]:
     delays : its delay lines; extremes : float64[4, probes] as in `RunData`
     """
     greatest: dict[str, float] = {}
-    areas = {pipe.name: float(row["area"]) for pipe, row in zip(model.pipes, model.tables.pipes, strict=True)}
+    areas = {
+        pipe.name: float(row["area"])
+        for pipe, row in zip(model.pipes, model.tables.pipes, strict=True)
+    }
     for k, probe in enumerate([*model.probes, *model.watched]):
         if probe.part == "links" and probe.name in areas and probe.quantity in ("flow", "velocity"):
             per = 1.0 if probe.quantity == "flow" else areas[probe.name]
@@ -119,12 +130,15 @@ def friction_notices(model, delays, extremes: np.ndarray) -> list[Notice]:
         pipe, name = model.tables.pipes[row["pipe"]], model.pipes[row["pipe"]].name
         flow, count = greatest.get(name, 0.0), int(row["stretches"])
         attenuation = friction_attenuation(pipe, float(row["tau"]) * count, flow)
-        bound, velocity = 0.25 * attenuation / count, flow / float(pipe["area"]) / model.case.properties.density
+        bound = 0.25 * attenuation / count
+        velocity = flow / float(pipe["area"]) / model.case.properties.density
         if bound > tolerance and flow > planned_flow(model.case, pipe):
             shown = model.case.amount(velocity, "velocity", 3)
-            text = (f"{name}: its flow grew to {shown}, and the friction of so fast a flow may cause an error in its "
-                    f"waves of {bound:.2g} times a change; set numerics.delay_velocity to {shown}, with steps that "
-                    "are short beside all changes of schedules")  # fmt: skip
+            text = (
+                f"{name}: its flow grew to {shown}, and the friction of so fast a flow may cause an error in its "
+                f"waves of {bound:.2g} times a change; set numerics.delay_velocity to {shown}, with steps that "
+                "are short beside all changes of schedules"
+            )
             notices.append(Notice("lines", f"links.{name}", text, "pipe_model", bound, tolerance))
     return notices
 
@@ -142,7 +156,9 @@ def divide_lines(draft, own) -> list[str]:
     tolerance, or friction does not balance their pressure drop at the start. Adds a fault where a pipe is stated to be
     a delay line but cannot be one, and a notice of schedules that are too fast for its steps.
     """
-    case, at, unfit = draft.case, 0, []
+    case = draft.case
+    at = 0
+    unfit = []
     facts = draft.steady["lines"]
     for name, chosen in own.chosen.items():
         facts[name] = {"line": chosen.pipe_model, "line_bound": None, "line_why": chosen.reason}
@@ -157,19 +173,27 @@ def divide_lines(draft, own) -> list[str]:
         if row["now"] > 0.0:
             count = 1
         row["stretches"], row["stretch"], row["tau"] = count, at, travel / count
-        row["transmission"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
+        row["transmission"] = 1.0 / (
+            1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1]
+        )
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
         at += count
         smoothed = interpolation_bound(float(row["tau"]), chosen.longest, scale, ramp)
         bound = 0.25 * attenuation / count + smoothed
         facts[name]["line_bound"] = bound
         force = float(drag_and_slope(pipe, float(pipe["flow"]))[0])
-        if abs(float(pipe["drag"]) - force) > UNBALANCED_SHARE * float(pipe["admittance"]) * 1e5 / travel:
+        if (
+            abs(float(pipe["drag"]) - force)
+            > UNBALANCED_SHARE * float(pipe["admittance"]) * 1e5 / travel
+        ):
             bound = math.inf
             unfit.append(name)
             if (case.links[name].pipe_model or case.numerics.pipe_model) == "delay-line":
-                draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: at the start friction does not '
-                            'balance the drop of pressure along the pipe; expected "finite-volume"')  # fmt: skip
+                draft.fault(
+                    f"links.{name}.pipe_model",
+                    '"delay-line" is not possible: at the start friction does not '
+                    'balance the drop of pressure along the pipe; expected "finite-volume"',
+                )
             continue
         if row["now"] > 0.0 and attenuation > MAX_ATTENUATION:
             bound = math.inf
@@ -178,12 +202,19 @@ def divide_lines(draft, own) -> list[str]:
         if stated == "auto" and bound > case.numerics.delay_tolerance:
             unfit.append(name)
         elif smoothed > case.numerics.delay_tolerance and bound < math.inf:
-            draft.warnings.append(fast_schedule_notice(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
+            draft.warnings.append(
+                fast_schedule_notice(
+                    case, name, chosen.longest, min(scale, ramp or scale), smoothed
+                )
+            )
         elif bound == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
-            draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
-                        f"fraction of {attenuation:.3g} in this pipe, whose travel time is less than a step of "
-                        f'{longest}; expected shorter steps, or "finite-volume"')  # fmt: skip
+            draft.fault(
+                f"links.{name}.pipe_model",
+                '"delay-line" is not possible: friction attenuates a wave by a '
+                f"fraction of {attenuation:.3g} in this pipe, whose travel time is less than a step of "
+                f'{longest}; expected shorter steps, or "finite-volume"',
+            )
     set_rings(own.delays, longest_step(own))
     return unfit
 
@@ -195,7 +226,9 @@ def fast_schedule_notice(case, name: str, step: float, scale: float, bound: floa
         f"{case.step_amount(step, 3)} may cause an error in the waves of this pipe of {bound:.2g} times the change; "
         f'expected shorter steps, or pipe_model = "finite-volume"'
     )
-    return Notice("lines", f"links.{name}", text, "pipe_model", bound, case.numerics.delay_tolerance)
+    return Notice(
+        "lines", f"links.{name}", text, "pipe_model", bound, case.numerics.delay_tolerance
+    )
 
 
 def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> float:
@@ -210,7 +243,9 @@ def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> f
     bend = math.pi * step / scale if scale > 0.0 else 0.0
     if tau < step:
         kinks = tau * (step - tau) / (step * ramp) if ramp > 0.0 else 0.0
-        return max(kinks, 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0)
+        return max(
+            kinks, 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0
+        )
     if abs(tau / step - round(tau / step)) < 1e-9:
         return 0.0
     if tau >= 3.0 * step:
@@ -223,7 +258,9 @@ def time_scales(draft) -> tuple[float, float]:
 
     A duration is 0 if no schedule has such a change. Jumps do not count, because they are followed exactly.
     """
-    shortest, ramp, schedules = math.inf, math.inf, draft.schedules
+    shortest = math.inf
+    ramp = math.inf
+    schedules = draft.schedules
     for first, count in schedules.records:
         rows = schedules.rows[first : first + count]
         for k, row in enumerate(rows):
@@ -248,14 +285,22 @@ def mark_event_ends(delays, draft, group) -> None:
     Their group contains a device with events, or an end of a restriction with a flow law of its own.
     group : label of the group of each node; valves or couplings join the junctions of a group
     """
-    inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
+    inner = draft.node_table["kind"] == rec.JUNCTION
+    valves = draft.valve_table
+    acting = set()
     for v in valves:
         if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
             acting |= {int(v["from_node"]), int(v["to_node"])}
-    acting |= {int(row[column]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
-               for column in ("node", "second") if device.events}  # fmt: skip
+    acting |= {
+        int(row[column])
+        for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
+        for column in ("node", "second")
+        if device.events
+    }
     roots = {group[i] for i in acting if i >= 0 and inner[i]}
     for row in delays:
         pipe = draft.pipe_table[row["pipe"]]
         ends = [int(pipe[end]) for end in ("from_node", "to_node")]
-        row["acts"] = sum(side for side, i in zip((1, 2), ends, strict=True) if inner[i] and group[i] in roots)
+        row["acts"] = sum(
+            side for side, i in zip((1, 2), ends, strict=True) if inner[i] and group[i] in roots
+        )

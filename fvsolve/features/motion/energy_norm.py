@@ -23,11 +23,23 @@ def spring_rows(model, y: np.ndarray, elongations: Elongations):
     braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
     for k, ((name, *_), row) in enumerate(zip(braces, motion_of(model).brace_table, strict=True)):
         if row["stiffness"] > 0.0:
-            yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
-    for k, ((name, *_), row) in enumerate(zip(stops, motion_of(model).stop_table, strict=True), len(braces)):
+            yield (
+                name,
+                elongations.by(
+                    k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"]))
+                ),
+            )
+    for k, ((name, *_), row) in enumerate(
+        zip(stops, motion_of(model).stop_table, strict=True), len(braces)
+    ):
         x = elongations.travel(k)
         if row["below"] + x < 0.0 or x > row["above"]:
-            yield name, elongations.by(k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"])))
+            yield (
+                name,
+                elongations.by(
+                    k, row["from_mass"], row["to_mass"], float(np.sqrt(0.5 * row["stiffness"]))
+                ),
+            )
 
 
 def chamber_rows(model, y: np.ndarray, elongations: Elongations):
@@ -42,13 +54,17 @@ def chamber_rows(model, y: np.ndarray, elongations: Elongations):
     for k, row in enumerate(pistons, first):
         x = elongations.travel(k)
         for name, sign in (("a", 1.0), ("b", -1.0)):
-            node, area, sweep = nodes[row[name]], sign * float(row[f"area_{name}"]), float(row[f"sweep_{name}"])
+            node = nodes[row[name]]
+            area = sign * float(row[f"area_{name}"])
+            sweep = float(row[f"sweep_{name}"])
             at, volume = int(node["y"]), float(node["volume"] + area * x)
             excess = float(y[at]) - (sweep * x if row["line"] >= 0 else 0.0)
             excess_ratio = excess / volume  # excess density, relative to that of the start
             root = float(np.sqrt(per_mass[node["row"]] / (2.0 * (sweep / area + excess_ratio))))
             per_travel = excess_ratio * area + (sweep if row["line"] >= 0 else 0.0)
-            moved = elongations.by(k, row["case"], row["rod"], -root * per_travel) if per_travel else {}
+            moved = (
+                elongations.by(k, row["case"], row["rod"], -root * per_travel) if per_travel else {}
+            )
             yield at, {at: root} | moved
 
 
@@ -75,8 +91,12 @@ class Elongations:
         """
         places = motion_of(self.model).mass_table["y"]
         if i != j:
-            return {int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0}
-        return {at: factor * float(row[2 * k]) for at, row in self.slopes.items() if row[2 * k] != 0.0}
+            return {
+                int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0
+            }
+        return {
+            at: factor * float(row[2 * k]) for at, row in self.slopes.items() if row[2 * k] != 0.0
+        }
 
     @cached_property
     def slopes(self) -> dict[int, np.ndarray]:
@@ -85,7 +105,9 @@ class Elongations:
         The values are those of the elongation and its rate for each of the k force elements.
         """
         tables, slopes = motion_of(self.model), {}
-        last = self.first + 2 * (len(tables.brace_table) + len(tables.stop_table) + len(tables.piston_table))
+        last = self.first + 2 * (
+            len(tables.brace_table) + len(tables.stop_table) + len(tables.piston_table)
+        )
         for body in tables.body_table:
             count = int(body["freedoms"]) + (body["freedoms"] >= 3)
             for at in range(int(body["y"]), int(body["y"]) + count):
@@ -103,12 +125,18 @@ def kinetic_rows(model, y: np.ndarray):
     The energy is v' M v / 2 = |F v|^2 / 2: velocities v, mass matrix M = F' F with the factor F from the kernels.
     """
     motion = motion_of(model)
-    bodies, freedoms, n = motion.body_table, motion.freedom_table, len(motion.freedom_table)
+    bodies = motion.body_table
+    freedoms = motion.freedom_table
+    n = len(motion.freedom_table)
     if not n:
         return
     factor = mass_factor(model, y)[8 * n :]
     rate = [int(body["rate"]) + k for body in bodies for k in range(body["freedoms"])]
-    names = [name for name, body in zip(motion.body_names, bodies, strict=True) for _ in range(body["freedoms"])]
+    names = [
+        name
+        for name, body in zip(motion.body_names, bodies, strict=True)
+        for _ in range(body["freedoms"])
+    ]
     for name, row in zip(names, freedoms, strict=True):
         path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
         entries = np.sqrt(0.5) * factor[row["row"] : row["row"] + row["depth"] + 1]

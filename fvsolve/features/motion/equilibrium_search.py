@@ -132,7 +132,9 @@ class Configuration(StaticForces):
         for push, ends in zip(pushes, pushed_masses(self.draft), strict=True):
             net += abs(push) * np.isin(self.free, ends)
         for row in self.motion.piston_table:
-            parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
+            parts = [
+                self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"
+            ]
             net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
         net += np.abs(self.by_features[self.free])
         for row in self.draft.wall_table:
@@ -179,9 +181,12 @@ class Configuration(StaticForces):
 
         Each chamber has the stiffness A^2 K / V: piston area A [m2], bulk modulus K [Pa], volume V [m3].
         """
-        matrix, nodes, first = np.zeros((self.size, self.size)), self.draft.node_table, int(self.layout["stiffness"])
+        matrix = np.zeros((self.size, self.size))
+        nodes = self.draft.node_table
+        first = int(self.layout["stiffness"])
         self.move_to(np.zeros_like(y))
-        per_mass = self.out[first : first + self.draft.moving].copy()  # with chambers at their starting mass
+        # with chambers at their starting mass
+        per_mass = self.out[first : first + self.draft.moving].copy()
         for k, sides in self.motion.shut.items():
             row = self.motion.piston_table[k]
             self.move_to(y)
@@ -190,7 +195,11 @@ class Configuration(StaticForces):
             for side, sign in (("a", 1.0), ("b", -1.0)):
                 node, area = nodes[row[side]], row[f"area_{side}"]
                 bulk = per_mass[node["row"]] * node["mass"]
-                stiffness += area**2 * bulk / (node["volume"] + sign * area * travel) if side in sides else 0.0
+                stiffness += (
+                    area**2 * bulk / (node["volume"] + sign * area * travel)
+                    if side in sides
+                    else 0.0
+                )
             matrix += stiffness * np.outer(lever, lever)
         return matrix
 
@@ -203,7 +212,9 @@ class Configuration(StaticForces):
             at = int(self.layout["pin"])
             rows = enumerate(self.motion.pin_table)
             pin_gaps = [self.out[at + 3 * k + r] for k, row in rows for r in range(row["rows"])]
-        return np.array([*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)])
+        return np.array(
+            [*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)]
+        )
 
     def mass(self, y: np.ndarray) -> np.ndarray:
         """Mass matrix of the unknowns : float64[size, size] [kg], [kg m2]."""
@@ -212,7 +223,9 @@ class Configuration(StaticForces):
             self.force(y)
         for j, row in enumerate(self.motion.freedom_table):
             path = self.draft.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
-            matrix[j, path] = matrix[path, j] = self.written.scratch[8 * n + row["row"] :][: row["depth"] + 1]
+            matrix[j, path] = matrix[path, j] = self.written.scratch[8 * n + row["row"] :][
+                : row["depth"] + 1
+            ]
         matrix[range(n, self.size), range(n, self.size)] = 1.0 / self.masses["lightness"][self.free]
         return matrix
 
@@ -267,8 +280,10 @@ class Configuration(StaticForces):
         """Rotation matrix of every body in the current configuration : name -> float64[3, 3]."""
         from fvsolve.core.kernels.moving_frames import ATTITUDE
 
-        return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
-                for i, name in enumerate(self.motion.body_names)}  # fmt: skip
+        return {
+            name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
+            for i, name in enumerate(self.motion.body_names)
+        }
 
 
 def rotated(e: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -276,7 +291,9 @@ def rotated(e: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     angle = float(np.linalg.norm(rotation))
     half = 0.5 * angle
     eta, eps = np.cos(half), (np.sin(half) / angle if angle > 0.0 else 0.5) * rotation
-    return np.concatenate([[e[0] * eta - e[1:] @ eps], e[0] * eps + eta * e[1:] + np.cross(e[1:], eps)])
+    return np.concatenate(
+        [[e[0] * eta - e[1:] @ eps], e[0] * eps + eta * e[1:] + np.cross(e[1:], eps)]
+    )
 
 
 MOVE_TOLERANCE = 1e-15  # smaller changes of a length or an angle count as none, relative
@@ -288,7 +305,9 @@ def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
     for name, row in zip(at.motion.body_names, at.bodies, strict=True):
         body, first = draft.case.nodes.get(name), int(row["y"])
         count = {records.BALL: 4, records.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
-        moves = np.abs(y[first : first + count]) > MOVE_TOLERANCE * (1.0 + np.abs(row["start"][:count]))
+        moves = np.abs(y[first : first + count]) > MOVE_TOLERANCE * (
+            1.0 + np.abs(row["start"][:count])
+        )
         if body is not None and np.any(moves):
             change = joint_keys(body.joint, row, row["start"][:count] + y[first : first + count])
             nodes[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
@@ -312,7 +331,9 @@ def joint_keys(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
 
 def attitude_from(rotation: np.ndarray) -> Attitude:
     """Attitude keys with the Euler parameters of a rotation matrix."""
-    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(rotation).tolist())})
+    return Attitude().model_copy(
+        update={"euler_parameters": tuple(attitude.euler_parameters(rotation).tolist())}
+    )
 
 
 def position_notices(case) -> Iterator[Notice]:
@@ -323,7 +344,9 @@ def position_notices(case) -> Iterator[Notice]:
             stated, found = before.initial_position, node.initial_position
             yield coordinate_notice(case, name, "initial_position", stated, found, "position")
         elif node.joint.kind in ("revolute", "prismatic"):
-            key, dimension = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
+            key, dimension = (
+                ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
+            )
             stated, found = (joint_coordinate(part.joint, 0.0) for part in (before, node))
             yield coordinate_notice(case, name, f"joint.{key}", stated, found, dimension)
         else:
@@ -340,15 +363,21 @@ def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Noti
     turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
     roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
     text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
-    yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0)
+    yield Notice(
+        "start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0
+    )
     if free:
         own, far = case.unit_of("position"), float(np.linalg.norm(pose.place - before.place))
         x, y, z = units.convert(pose.place, "position", own)
         text = f"[{x:.6g}, {y:.6g}, {z:.6g}] {own}, {case.amount(far, 'position')} from the stated position"
-        yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
+        yield Notice(
+            "start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0
+        )
 
 
-def coordinate_notice(case, name: str, key: str, before: float, now: float, dimension: str) -> Notice:
+def coordinate_notice(
+    case, name: str, key: str, before: float, now: float, dimension: str
+) -> Notice:
     """Notice of a coordinate whose equilibrium value `now` differs from its stated value `before`."""
     result, stated = (case.amount(value, dimension, 6) for value in (now, before))
     text = f"{name}: forces balance at {key.removeprefix('joint.')} {result}, stated {stated}"
@@ -371,8 +400,11 @@ def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -
     angular, unbalanced = at.angular(), np.abs(force) > EQUILIBRIUM_SHARE * scale
     for name in dict.fromkeys(owner_name(at, int(i)) for i in np.flatnonzero(unbalanced)):
         own = np.array([owner_name(at, i) == name for i in range(at.size)])
-        residuals = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
-                for part, unit in ((~angular, "N"), (angular, "N m")) if np.any(unbalanced & own & part)]  # fmt: skip
+        residuals = [
+            f"{np.linalg.norm(force[own & part]):.4g} {unit}"
+            for part, unit in ((~angular, "N"), (angular, "N m"))
+            if np.any(unbalanced & own & part)
+        ]
         text = f'"equilibrium" finds no position where the forces on {name} balance: {" and ".join(residuals)} remain'
         remedy = "add a spring, a cylinder or a driven joint as support, state a position nearer to equilibrium"
         at.draft.fault(f"nodes.{name}", f'{text}; {remedy}, or use initial = "steady"')
@@ -387,7 +419,10 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
     names = [*(part.name for part in at.draft.meshed), *at.draft.case.places]
     name = names[int(at.out[rec.WHERE])]
     text = f"{name} is turned over in the equilibrium found, and its contents would run out"
-    at.draft.fault(f"nodes.{name}", f'{text}; hold the body upright, state another position, or use initial = "steady"')
+    at.draft.fault(
+        f"nodes.{name}",
+        f'{text}; hold the body upright, state another position, or use initial = "steady"',
+    )
 
 
 MAX_STEPS, MAX_HALVINGS = 100, 30
@@ -395,7 +430,8 @@ MAX_TURN = 0.3  # largest rotation in a step [rad]
 MAX_STRETCH = 0.5  # largest displacement in a step, as a share of the shortest line
 ZERO_STIFFNESS = 1e-9  # share of the greatest eigenvalue below which the stiffness counts as zero
 LEAST_STIFFNESS = 1e-6  # same share: least magnitude used in a step, and threshold of instability
-STATED_TOLERANCE = 1e-4  # unbalanced share of forces up to which a stated position counts as an intended equilibrium
+# unbalanced share of forces up to which a stated position counts as an intended equilibrium
+STATED_TOLERANCE = 1e-4
 GAP_TOLERANCE = 1e-14  # gap of constraints that counts as closed [m]
 MAX_REVERSAL = 0.5  # a step may reverse the force along it up to this share
 
@@ -417,7 +453,9 @@ class StaticState:
     @property
     def share(self) -> float:
         """Greatest unbalanced force, relative to the sum of the magnitudes of its parts."""
-        return float(np.max(np.abs(self.force) / np.where(self.scale > 0.0, self.scale, 1.0), initial=0.0))
+        return float(
+            np.max(np.abs(self.force) / np.where(self.scale > 0.0, self.scale, 1.0), initial=0.0)
+        )
 
     @property
     def open(self) -> float:
@@ -429,7 +467,10 @@ class StaticState:
 
         Values below the limits of rounding count as these limits.
         """
-        own, others = ((max(place.share, ROUNDING_SHARE), max(place.open, GAP_TOLERANCE)) for place in (self, other))
+        own, others = (
+            (max(place.share, ROUNDING_SHARE), max(place.open, GAP_TOLERANCE))
+            for place in (self, other)
+        )
         return own[0] < 0.5 * others[0] or own[1] < 0.5 * others[1]
 
 
@@ -449,8 +490,11 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
         report_unbalanced(at, result.force, result.scale)
     draft.check()
     case = replace(case, equilibrium_nodes=moved_nodes(at, result.y))
-    nodes, surroundings = case.nodes | case.equilibrium_nodes, (case.ambient_pressure, case.gravity, None, None)
-    for keys, text in checks.part_faults(nodes, case.links, *surroundings, at.t, case.meshes, case.lumped):
+    nodes = case.nodes | case.equilibrium_nodes
+    surroundings = (case.ambient_pressure, case.gravity, None, None)
+    for keys, text in checks.part_faults(
+        nodes, case.links, *surroundings, at.t, case.meshes, case.lumped
+    ):
         draft.fault(".".join(map(str, keys)), f"where forces balance {text}")
     draft.check()
     return case, [*position_notices(case), *instability_notices(at, result)]
@@ -461,12 +505,16 @@ def evaluate_configuration(at: Configuration, y: np.ndarray) -> StaticState:
 
     Constraint forces minimise the unbalanced forces, in the norm of the inverse mass matrix.
     """
-    rows, gaps, sizes = at.rows(y), at.gaps(y), np.zeros(at.count)
+    rows = at.rows(y)
+    gaps = at.gaps(y)
+    sizes = np.zeros(at.count)
     at.hold(sizes)
     force = at.force(y)
     if at.count:
         inverse_root = np.linalg.inv(np.linalg.cholesky(at.mass(y)))
-        sizes = -np.linalg.lstsq(inverse_root @ rows.T, inverse_root @ force, rcond=RANK_TOLERANCE)[0]
+        sizes = -np.linalg.lstsq(inverse_root @ rows.T, inverse_root @ force, rcond=RANK_TOLERANCE)[
+            0
+        ]
         at.hold(sizes)
         force = at.force(y)
     return StaticState(y, force, at.scale(), rows, gaps)
@@ -500,7 +548,9 @@ def step(at: Configuration, here: StaticState, intended: bool) -> tuple[np.ndarr
     values, modes = np.linalg.eigh(0.5 * (own + own.T))
     great = np.max(np.abs(values), initial=0.0)
     flat, pulls = np.abs(values) <= ZERO_STIFFNESS * great, modes.T @ pull
-    pulls[flat & (np.abs(pulls) <= EQUILIBRIUM_SHARE * np.linalg.norm(inverse_root @ here.scale))] = 0.0
+    pulls[
+        flat & (np.abs(pulls) <= EQUILIBRIUM_SHARE * np.linalg.norm(inverse_root @ here.scale))
+    ] = 0.0
     if intended or not (np.any(values[~flat] < 0.0) or np.any(pulls[flat])):
         way = np.linalg.pinv(own, rcond=ZERO_STIFFNESS) @ pull
     else:
@@ -508,7 +558,9 @@ def step(at: Configuration, here: StaticState, intended: bool) -> tuple[np.ndarr
     return inverse_root.T @ (close + free @ way), inverse_root.T @ free @ way
 
 
-def free_directions(at: Configuration, here: StaticState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def free_directions(
+    at: Configuration, here: StaticState
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions of a step : (L^-1, basis of the directions that constraints leave free, step that closes gaps).
 
     L : factor of the mass matrix M = L L'. The basis and the closing step are in the coordinates L' dq.
@@ -519,17 +571,25 @@ def free_directions(at: Configuration, here: StaticState) -> tuple[np.ndarray, n
     rows = here.rows @ inverse_root.T
     _, sizes, directions = np.linalg.svd(rows)
     rank = int(np.sum(sizes > RANK_TOLERANCE * sizes[0]))
-    return inverse_root, directions[rank:].T, -np.linalg.pinv(rows, rcond=RANK_TOLERANCE) @ here.gaps
+    return (
+        inverse_root,
+        directions[rank:].T,
+        -np.linalg.pinv(rows, rcond=RANK_TOLERANCE) @ here.gaps,
+    )
 
 
-def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: np.ndarray) -> np.ndarray:
+def limited_step(
+    at: Configuration, here: StaticState, move: np.ndarray, free: np.ndarray
+) -> np.ndarray:
     """State vector after a step, shortened to limit rotations, displacements and a reversal of the force along it.
 
     move : step of all unknowns; free : its part in the directions that constraints leave free
     """
     angular = at.angular()
-    excess = [np.max(np.abs(move[angular]), initial=0.0) / MAX_TURN,
-           np.max(np.abs(move[~angular]), initial=0.0) / (MAX_STRETCH * at.shortest())]  # fmt: skip
+    excess = [
+        np.max(np.abs(move[angular]), initial=0.0) / MAX_TURN,
+        np.max(np.abs(move[~angular]), initial=0.0) / (MAX_STRETCH * at.shortest()),
+    ]
     share, before = 1.0 / max(1.0, *excess), here.force @ free
     for _ in range(MAX_HALVINGS if before > 0.0 else 0):
         if at.force(at.after_step(here.y, share * move)) @ free >= -MAX_REVERSAL * before:
@@ -541,12 +601,21 @@ def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: n
 def instability_notices(at: Configuration, result: StaticState) -> list[Notice]:
     """List with a notice if the equilibrium is unstable; else empty. Closed chambers count as springs."""
     inverse_root, free, _ = free_directions(at, result)
-    own = free.T @ inverse_root @ (at.stiffness(result.y) + at.fluid_stiffness(result.y)) @ inverse_root.T @ free
+    own = (
+        free.T
+        @ inverse_root
+        @ (at.stiffness(result.y) + at.fluid_stiffness(result.y))
+        @ inverse_root.T
+        @ free
+    )
     values, modes = np.linalg.eigh(0.5 * (own + own.T))
     if not len(values) or values[0] >= -LEAST_STIFFNESS * np.max(np.abs(values)):
         return []
-    name, rate = owner_name(at, int(np.argmax(np.abs(free @ modes[:, 0])))), float(np.sqrt(-values[0]))
+    name = owner_name(at, int(np.argmax(np.abs(free @ modes[:, 0]))))
+    rate = float(np.sqrt(-values[0]))
     duration = at.draft.case.amount(1.0 / rate, "time", 3)
-    text = (f"{name}: its forces balance, but the equilibrium is unstable: a small displacement grows by a factor e in "
-            f"{duration}; state another position, or add a support such as a spring")  # fmt: skip
+    text = (
+        f"{name}: its forces balance, but the equilibrium is unstable: a small displacement grows by a factor e in "
+        f"{duration}; state another position, or add a support such as a spring"
+    )
     return [Notice("start", f"nodes.{name}", text, "stability", rate, 0.0)]

@@ -29,9 +29,15 @@ MASSES = RhsTerms(
 )
 FORCES_FOR_EVENTS = RhsTerms(events="mass_dynamics: forces_for_events", package=PACKAGE)
 ENERGY = {  # of masses, by True for the density law `linear`
-    True: RhsTerms(power="mass_energy: add_power_linear", stored="mass_energy: add_stored_linear", package=PACKAGE),
+    True: RhsTerms(
+        power="mass_energy: add_power_linear",
+        stored="mass_energy: add_stored_linear",
+        package=PACKAGE,
+    ),
     False: RhsTerms(
-        power="mass_energy: add_power_barotropic", stored="mass_energy: add_stored_barotropic", package=PACKAGE
+        power="mass_energy: add_power_barotropic",
+        stored="mass_energy: add_stored_barotropic",
+        package=PACKAGE,
     ),
 }
 BODIES = RhsTerms(
@@ -70,7 +76,8 @@ FLUID = RhsTerms(
 )
 MOVING_FLUID = {  # by True for the density law `linear`
     True: FLUID._replace(
-        known_pressures="inertial_forces: moving_tank_pressures", rates="inertial_forces: add_cell_drives"
+        known_pressures="inertial_forces: moving_tank_pressures",
+        rates="inertial_forces: add_cell_drives",
     ),
     False: FLUID._replace(
         known_pressures="inertial_forces: moving_tank_pressures_barotropic",
@@ -134,7 +141,9 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
 
     # build ----------
 
-    def join(self, draft, row, ports_of_row, places, toward=None, about=None) -> tuple[float, float]:
+    def join(
+        self, draft, row, ports_of_row, places, toward=None, about=None
+    ) -> tuple[float, float]:
         return ports.join_ports(draft, row, ports_of_row, places, toward, about)
 
     def coordinate(self, name: str) -> Coordinate | None:
@@ -142,7 +151,9 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             i = self.mass_index[name]
             row, at = self.mass_table[i], int(self.mass_table[i]["y"])
             start = (float(row[key]) for key in ("position", "velocity", "force"))
-            return Coordinate(i, -1, at, at + 1 if at >= 0 else -1, -1, *start, 0.0, float(row["lightness"]))
+            return Coordinate(
+                i, -1, at, at + 1 if at >= 0 else -1, -1, *start, 0.0, float(row["lightness"])
+            )
         if name in self.body_names:
             i = self.body_names.index(name)
             row = self.body_table[i]
@@ -170,7 +181,9 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             row["index"] = self.mass_index[probe.name]
             return True
         is_body = probe.name in case.poses
-        if not is_body and probe.name in (case.nodes.keys() | case.places.keys() | case.network_places):
+        if not is_body and probe.name in (
+            case.nodes.keys() | case.places.keys() | case.network_places
+        ):
             return False
         from fvsolve.features.motion.kernels.body_values import BODY_QUANTITIES, POINT_QUANTITIES
 
@@ -184,12 +197,18 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         return True
 
     def reserve(self, draft) -> None:
-        pushes, masses, bodies = len(self.push_names), len(self.mass_table), len(self.body_table)
+        pushes = len(self.push_names)
+        masses = len(self.mass_table)
+        bodies = len(self.body_table)
         for name, size in (
-            ("net_force", masses), ("push", pushes), ("forcing", len(self.moving_segment_table)),
-            ("travel", 2 * pushes), ("along", 3 * len(self.line_table)), ("pin", 3 * len(self.pin_table)),
+            ("net_force", masses),
+            ("push", pushes),
+            ("forcing", len(self.moving_segment_table)),
+            ("travel", 2 * pushes),
+            ("along", 3 * len(self.line_table)),
+            ("pin", 3 * len(self.pin_table)),
             ("body", rec.BODY_OUT * bodies),
-        ):  # fmt: skip
+        ):
             draft.sizes.out(name, size)
         constraints, freedoms = int(sum(self.pin_table["rows"])), len(self.freedom_table)
         spatial = 8 * freedoms + self.factor_size + 16 * bodies
@@ -221,7 +240,11 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
     def begin_forces(self, draft, start) -> list[str]:
         from fvsolve.features.motion.static_forces import start_bodies
 
-        return lower.start_masses(draft, start) + start_bodies(draft, start) + lower.driven_at_start(draft, start)
+        return (
+            lower.start_masses(draft, start)
+            + start_bodies(draft, start)
+            + lower.driven_at_start(draft, start)
+        )
 
     def close(self, draft) -> None:
         for name in TABLES:
@@ -254,7 +277,9 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         found += [MASSES] if len(self.mass_table) else []
         # after the masses, whose functions compute the forces of all elements
         found += [LINES] if len(self.line_table) else []
-        events = [FORCES_FOR_EVENTS] if len(self.mass_table) and network_of(model) is not None else []
+        events = (
+            [FORCES_FOR_EVENTS] if len(self.mass_table) and network_of(model) is not None else []
+        )
         return [("links", terms) for terms in found] + [("closed", terms) for terms in events]
 
     def run(self, run_data) -> MotionRun:
@@ -344,7 +369,10 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
             name: {key: row[key].item() for key in ("position", "velocity", "force")}
             for name, row in zip(names, self.mass_table, strict=False)
         }
-        return {"masses": masses, "bodies": {name: lower.pose_facts(pose) for name, pose in self.case.poses.items()}}
+        return {
+            "masses": masses,
+            "bodies": {name: lower.pose_facts(pose) for name, pose in self.case.poses.items()},
+        }
 
     def drawn(self, model):
         from fvsolve.features.motion.drawing import BodyLines
@@ -364,8 +392,13 @@ class MotionRun(FeatureRun):
 
     def for_energy(self) -> None:
         case = self.run_data.model.case
-        if faults := [f"{'.'.join(place)}: {text}" for place, text in bodies.missing_reactions(case.nodes, case.links)]:
-            raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
+        if faults := [
+            f"{'.'.join(place)}: {text}"
+            for place, text in bodies.missing_reactions(case.nodes, case.links)
+        ]:
+            raise FvsolveError(
+                f"the energy of this network on a body is not supported; {'; '.join(faults)}"
+            )
         self.segments["loads_body"] = records.JOINT_LOAD_READ
 
     def end_notices(self, y: np.ndarray) -> list:
@@ -379,7 +412,8 @@ class MotionRun(FeatureRun):
             length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
             if abs(length - 1.0) > DRIFT:
                 text = (
-                    f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by this "
+                    f"{name}: its Euler parameters have drifted from length 1 to "
+                    f"{length:.9g} and are divided by this "
                 )
                 text += "length; the error of its attitude is about as large as this drift; "
                 text += 'method = "gauss-4" conserves the length'

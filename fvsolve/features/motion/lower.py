@@ -29,12 +29,19 @@ def lower_masses(draft) -> None:
     """Fill the tables of masses, braces (springs, dampers, forces), stops and pistons."""
     motion = motion_of(draft)
     case = draft.case
-    motion.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
+    motion.mass_names = [
+        name for name, node in case.nodes.items() if node.domain == "translational"
+    ]
     motion.mass_index = {name: i for i, name in enumerate(motion.mass_names)}
-    pushes = [link for table in ("brace", "stop", "piston") for _, link, _ in draft.links.get(table, ())]
+    pushes = [
+        link for table in ("brace", "stop", "piston") for _, link, _ in draft.links.get(table, ())
+    ]
     ports = [link.ports for link in pushes]
-    ends = [(own["case"], own["rod"]) if "rod" in own else (own.get("from"), own["to"]) for own in ports]
-    outside = any(place not in motion.mass_index for both in ends for place in both)  # points, or None
+    ends = [
+        (own["case"], own["rod"]) if "rod" in own else (own.get("from"), own["to"]) for own in ports
+    ]
+    # points, or None
+    outside = any(place not in motion.mass_index for both in ends for place in both)
     motion.mass_table = np.zeros(len(motion.mass_names) + outside, records.MASS)
     motion.mass_index |= {None: len(motion.mass_names)}
     for name, row in zip(motion.mass_names, motion.mass_table, strict=False):
@@ -69,7 +76,11 @@ def add_states(draft) -> None:
     masses["y"] = -1
     for i, name in enumerate(motion.mass_names):
         if masses[i]["lightness"] > 0.0:
-            speed = travel[i] * math.sqrt(stiffness[i] * masses[i]["lightness"]) if stiffness[i] > 0.0 else SMALL_SPEED
+            speed = (
+                travel[i] * math.sqrt(stiffness[i] * masses[i]["lightness"])
+                if stiffness[i] > 0.0
+                else SMALL_SPEED
+            )
             masses[i]["y"] = draft.states([f"{name}.position"], travel[i])
             draft.states([f"{name}.velocity"], max(speed, abs(masses[i]["velocity"])))
 
@@ -77,8 +88,11 @@ def add_states(draft) -> None:
 def pushed_masses(draft) -> np.ndarray:
     """Indices of the masses that each force element joins : int64[elements, 2], braces, stops, then pistons."""
     motion = motion_of(draft)
-    ends = ((motion.brace_table, "from_mass", "to_mass"), (motion.stop_table, "from_mass", "to_mass"),
-            (motion.piston_table, "case", "rod"))  # fmt: skip
+    ends = (
+        (motion.brace_table, "from_mass", "to_mass"),
+        (motion.stop_table, "from_mass", "to_mass"),
+        (motion.piston_table, "case", "rod"),
+    )
     return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
 
 
@@ -101,7 +115,9 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
 def start_masses(draft, start) -> list[str]:
     """Set forces of elements and the unbalanced force on each mass at the start; return texts of motions."""
     motion = motion_of(draft)
-    nodes, masses, ambient = draft.node_table, motion.mass_table, draft.case.ambient_pressure
+    nodes = draft.node_table
+    masses = motion.mass_table
+    ambient = draft.case.ambient_pressure
     size = np.zeros(len(masses))
     for row in motion.brace_table:
         if row["schedule"] >= 0:
@@ -111,10 +127,13 @@ def start_masses(draft, start) -> list[str]:
         row["sweep_a"] = a["mass"] / a["volume"] * row["area_a"]
         row["sweep_b"] = -b["mass"] / b["volume"] * row["area_b"]
         row["leak"] = start.leak_flow(row, float(a["pressure"]), float(b["pressure"]))
-        pushed, back = row["area_a"] * (a["pressure"] - ambient), row["area_b"] * (b["pressure"] - ambient)
+        pushed = row["area_a"] * (a["pressure"] - ambient)
+        back = row["area_b"] * (b["pressure"] - ambient)
         row["force"] = pushed - back - row["damping"] * row["speed"]
         size[[row["case"], row["rod"]]] += abs(pushed) + abs(back)
-    pushes = np.concatenate([table["force"] for table in (motion.brace_table, motion.stop_table, motion.piston_table)])
+    pushes = np.concatenate(
+        [table["force"] for table in (motion.brace_table, motion.stop_table, motion.piston_table)]
+    )
     total = forces_on_masses(draft, pushes)
     for push, ends in zip(pushes, pushed_masses(draft), strict=True):
         size[ends] += abs(push)
@@ -126,7 +145,8 @@ def start_masses(draft, start) -> list[str]:
     for name, row in zip(motion.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
             moving.append(f"mass {name} moves at {draft.case.amount(row['velocity'], 'velocity')}")
-        in_network = name in draft.case.network_places  # its acceleration is in the texts of the network
+        # its acceleration is in the texts of the network
+        in_network = name in draft.case.network_places
         if row["force"] != 0.0 and row["lightness"] > 0.0 and not in_network:
             acceleration = draft.case.amount(row["force"] * row["lightness"], "acceleration")
             moving.append(f"mass {name} accelerates at {acceleration}")
@@ -153,7 +173,10 @@ def supporting_pressures(draft, start) -> dict[int, float]:
     for k, row in enumerate([*motion.brace_table, *motion.stop_table]):
         scheduled = "schedule" in row.dtype.names and row["schedule"] >= 0
         pushes[k] = start.schedule_value(row["schedule"]) if scheduled else row["force"]
-    gauge = {side: [start.pressure(int(row[side])) - ambient for row in motion.piston_table] for side in "ab"}
+    gauge = {
+        side: [start.pressure(int(row[side])) - ambient for row in motion.piston_table]
+        for side in "ab"
+    }
     for k, row in enumerate(motion.piston_table):
         if k not in pistons:
             pushes[first + k] = row["area_a"] * gauge["a"][k] - row["area_b"] * gauge["b"][k]
@@ -165,7 +188,9 @@ def supporting_pressures(draft, start) -> dict[int, float]:
     forces = np.zeros(len(pistons))
     for _ in range(ITERATIONS):  # the second is exact to rounding
         pushes[[first + k for k in pistons]] = forces
-        forces = forces - np.linalg.lstsq(influence, balance.under(pushes), rcond=None)[0][: forces.size]
+        forces = (
+            forces - np.linalg.lstsq(influence, balance.under(pushes), rcond=None)[0][: forces.size]
+        )
     pressures = {}
     for (k, closed), force in zip(pistons.items(), forces, strict=True):
         row = motion.piston_table[k]
@@ -230,10 +255,14 @@ STATES = {  # for each kind: coordinates, then velocities, each with its size of
     "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
     "prismatic": ({"travel": SMALL_TRAVEL}, {"travel_rate": SMALL_SPEED}),
     "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
-    "free": (dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL) | dict.fromkeys(ANGLES, SMALL_ANGLE),
-             dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED) | dict.fromkeys(SPINS, SMALL_SPIN)),
+    "free": (
+        dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL)
+        | dict.fromkeys(ANGLES, SMALL_ANGLE),
+        dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED)
+        | dict.fromkeys(SPINS, SMALL_SPIN),
+    ),
     "fixed": ({}, {}),
-}  # fmt: skip
+}
 
 
 def lower_bodies(draft) -> None:
@@ -247,7 +276,9 @@ def lower_bodies(draft) -> None:
     for i, (name, row) in enumerate(zip(motion.body_names, table, strict=True)):
         body = nodes[name]
         parent_name = bodies.carrier_of(body)[0]
-        row["parent"] = motion.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
+        row["parent"] = (
+            motion.body_names.index(parent_name) if is_kind(nodes.get(parent_name), "body") else -1
+        )
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
         row["freedom"] = len(paths)
@@ -270,7 +301,10 @@ def fill_body(draft, name: str, body: Any, row) -> None:
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.inertia_matrix().ravel(), joint.unit_axis
-    row["at"], row["attitude"] = bodies.joint_position(draft.case.nodes, body), joint.attitude.rotation.ravel()
+    row["at"], row["attitude"] = (
+        bodies.joint_position(draft.case.nodes, body),
+        joint.attitude.rotation.ravel(),
+    )
     row["damping"], row["stiffness"] = joint.damping or 0.0, joint.stiffness or 0.0
     pose = draft.case.poses[name]
     row["height"] = pose.at(body.centre_of_mass)[2]
@@ -302,7 +336,8 @@ def drive_joint(draft, name: str, schedule, row) -> None:
     """
     row["schedule"] = draft.schedules.add(schedule)
     key = "travel" if row["joint"] == records.PRISMATIC else "angle"
-    start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
+    # kinks before the start have no effect
+    start, end = draft.case.numerics.start, draft.case.numerics.end
     if schedule.kind == "formula" and schedule.program.kinks:
         text = f"{show(schedule.program.text)} drives the joint, and has kinks, which need an infinite force"
         text = f"{text}; expected a formula without abs, min, max, where and comparisons"
@@ -314,7 +349,8 @@ def drive_joint(draft, name: str, schedule, row) -> None:
         text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
         remedy = 'expected kind = "smooth" with zero slope at both ends, or a harmonic'
         draft.fault(f"nodes.{name}.joint.{key}", f"{text}; {remedy}")
-    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # jumps of acceleration
+    # jumps of acceleration
+    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():
         draft.schedules.breaks.setdefault(float(time), False)
 
 
@@ -336,11 +372,23 @@ def lower_lines(draft) -> None:
     motion.bushing_names, motion.bushing_table = draft.fill("bushing", records.BUSHING)
     for name, row in zip(motion.bushing_names, motion.bushing_table, strict=True):
         link = draft.case.links[name]
-        row["energy"] = 0.5 * row["stiffness"] * distance_and_rate(draft, (link.from_, link.to), PLAIN_LINE)[0] ** 2
+        row["energy"] = (
+            0.5
+            * row["stiffness"]
+            * distance_and_rate(draft, (link.from_, link.to), PLAIN_LINE)[0] ** 2
+        )
         if draft.case.equilibrium_nodes:
-            row["energy"] += 2.0 * row["turn_stiffness"] * relative_turn(draft, (link.from_, link.to))
-    motion.line_table = np.array(motion.lines, records.LINE) if motion.lines else np.zeros(0, records.LINE)
-    rows = [row for table in (motion.brace_table, motion.stop_table, motion.piston_table) for row in table]
+            row["energy"] += (
+                2.0 * row["turn_stiffness"] * relative_turn(draft, (link.from_, link.to))
+            )
+    motion.line_table = (
+        np.array(motion.lines, records.LINE) if motion.lines else np.zeros(0, records.LINE)
+    )
+    rows = [
+        row
+        for table in (motion.brace_table, motion.stop_table, motion.piston_table)
+        for row in table
+    ]
     for k, row in enumerate(rows):
         if row["line"] >= 0:
             motion.line_table[row["line"]]["push"] = k
@@ -366,8 +414,10 @@ def lower_moving_segments(draft) -> None:
     motion = motion_of(draft)
     rows: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
-    for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),
-                      *zip(draft.column_names, draft.column_table, strict=True)]:  # fmt: skip
+    for name, row in [
+        *zip(draft.pipe_names, draft.pipe_table, strict=True),
+        *zip(draft.column_names, draft.column_table, strict=True),
+    ]:
         link = links[name]
         first, last = places[link.from_], places[link.to]
         if getattr(first, "on", None) is None:
@@ -377,11 +427,17 @@ def lower_moving_segments(draft) -> None:
         if "cells" in row.dtype.names:
             shares = np.linspace(0.0, 1.0, int(row["cells"]) + 1)[:, None]
             points = ends[0] + shares * (ends[1] - ends[0])
-            rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
+            rows += [
+                moving_segment_row(draft, first.on, points[k : k + 2])
+                for k in range(len(points) - 1)
+            ]
         else:
             points = np.array([ends[0], *link.route, ends[1]])
             row["forcings"] = len(points) - 1
-            rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
+            rows += [
+                moving_segment_row(draft, first.on, points[k : k + 2])
+                for k in range(len(points) - 1)
+            ]
     for node, row in zip(places.values(), draft.node_table, strict=True):
         if getattr(node, "on", None) is None or row["kind"] == rec.PATCH:
             continue
@@ -409,7 +465,13 @@ def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
     heavy = records.MOVED_BY_FORCES if any(free_joints(on, draft.case.nodes)) else 0
     heavy = records.JOINT_LOAD_READ if reads_joint_forces(draft) else heavy
-    return motion.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
+    return (
+        motion.body_names.index(on),
+        *points,
+        np.cross(*points),
+        -draft.case.gravity * rise,
+        heavy,
+    )
 
 
 def driven_at_start(draft, start) -> list[str]:
@@ -422,19 +484,26 @@ def driven_at_start(draft, start) -> list[str]:
     first, rho = int(at.layout["forcing"]), draft.fluid.density
     drives = at.out[first : first + len(motion.moving_segment_table)]
     texts = []
-    for kind, names, table in (("pipe", draft.pipe_names, draft.pipe_table),
-                               ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
+    for kind, names, table in (
+        ("pipe", draft.pipe_names, draft.pipe_table),
+        ("rigid column", draft.column_names, draft.column_table),
+    ):
         for name, row in zip(names, table, strict=True):
             if row["forcing"] >= 0:
                 count = int(row["cells" if "cells" in row.dtype.names else "forcings"])
                 push = float(drives[row["forcing"] : row["forcing"] + count].sum())
                 if abs(push) > ROUNDING:
-                    texts.append(f"{kind} {name}: the motion of its body drives its flow with "
-                                 f"{draft.case.amount(rho * push, 'pressure', span=True)}")  # fmt: skip
+                    texts.append(
+                        f"{kind} {name}: the motion of its body drives its flow with "
+                        f"{draft.case.amount(rho * push, 'pressure', span=True)}"
+                    )
     return texts
 
 
-LINK_PROBES = {"pin": (rec.PIN_VALUE, ("gap", "force")), "bushing": (rec.BUSHING_VALUE, ("gap", "force", "torque"))}
+LINK_PROBES = {
+    "pin": (rec.PIN_VALUE, ("gap", "force")),
+    "bushing": (rec.BUSHING_VALUE, ("gap", "force", "torque")),
+}
 
 
 def lower_link_probe(draft, row, probe) -> bool:
@@ -444,7 +513,9 @@ def lower_link_probe(draft, row, probe) -> bool:
     if table in LINK_PROBES:
         row["kind"], quantities = LINK_PROBES[table]
         row["side"] = quantities.index(probe.quantity)
-        row["index"] = (motion.pin_names if table == "pin" else motion.bushing_names).index(probe.name)
+        row["index"] = (motion.pin_names if table == "pin" else motion.bushing_names).index(
+            probe.name
+        )
     elif table == "piston" and probe.quantity != "force":
         row["index"] = motion.piston_names.index(probe.name)
         row["kind"] = rec.PISTON_POSITION if probe.quantity == "position" else rec.PISTON_VELOCITY
@@ -464,4 +535,8 @@ def pose_facts(pose) -> dict[str, float]:
     from fvsolve.attitude import roll_pitch_yaw
 
     angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
-    return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
+    return (
+        place
+        | angles
+        | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
+    )

@@ -23,16 +23,25 @@ class MotionPattern(FeaturePattern):
         self.model = couplings
         self.masses, self.pistons = feature.mass_table["y"], feature.piston_table
         self.braces = [*feature.brace_table, *feature.stop_table]
-        self.bodies, self.lines, self.points = feature.body_table, feature.line_table, feature.point_table
+        self.bodies, self.lines, self.points = (
+            feature.body_table,
+            feature.line_table,
+            feature.point_table,
+        )
         self.moving_segments, self.bushings = feature.moving_segment_table, feature.bushing_table
-        joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in feature.pin_table]
+        joined = [
+            [self.points[pin[end]]["body"] for end in ("from_point", "to_point")]
+            for pin in feature.pin_table
+        ]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
         self.ties = union(len(self.bodies), joined)
 
     # what others ask ----------
 
     def pressure(self, i: int) -> np.ndarray:
-        return unique_states(*(self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"])))
+        return unique_states(
+            *(self.places(row, 0) for row in self.pistons if i in (row["a"], row["b"]))
+        )
 
     def inflows(self) -> Iterator[tuple[int, np.ndarray]]:
         for row in self.pistons:
@@ -42,7 +51,11 @@ class MotionPattern(FeaturePattern):
                 yield i, unique_states(swept, *leak)
 
     def source(self, row) -> np.ndarray | None:
-        return unique_states(*self.pushing_states(int(row["index"]))) if row["kind"] == codes.FORCE_INPUT else None
+        return (
+            unique_states(*self.pushing_states(int(row["index"])))
+            if row["kind"] == codes.FORCE_INPUT
+            else None
+        )
 
     def probe(self, row) -> np.ndarray | None:
         kind, i = int(row["kind"]), int(row["index"])
@@ -80,7 +93,11 @@ class MotionPattern(FeaturePattern):
             read += [self.model.schedule(row["schedule"])] if "schedule" in row.dtype.names else []
             if "rod" in row.dtype.names:
                 read += [self.model.own(row["a"]), self.model.own(row["b"])]
-            pushed = self.places(row, 1) if row["line"] < 0 else self.tree_velocities(self.ends_of_line(row))
+            pushed = (
+                self.places(row, 1)
+                if row["line"] < 0
+                else self.tree_velocities(self.ends_of_line(row))
+            )
             yield pairs_of(pushed, unique_states(*read))
 
     def pushing_states(self, mass: int) -> Iterator[np.ndarray]:
@@ -103,13 +120,20 @@ class MotionPattern(FeaturePattern):
         for body, states in (pair for own in self.model.features for pair in own.on_bodies()):
             trees.setdefault(self.tree_root(self.bodies[body]["root"]), []).append(states)
         for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
-            trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
+            trees.setdefault(
+                self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []
+            ).append(cells)
         for root, cells in trees.items():
             own = [self.tree_states(root, order) for order in (0, 1)]
             if own[0].size == 0:
                 continue
             both = unique_states(*cells, own[1])
-            pushing = [self.model.own(row[side]) for row in self.pistons if row["line"] >= 0 for side in ("a", "b")]
+            pushing = [
+                self.model.own(row[side])
+                for row in self.pistons
+                if row["line"] >= 0
+                for side in ("a", "b")
+            ]
             yield pairs_of(both, unique_states(*cells, *own, *pushing))
 
     def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
@@ -119,7 +143,11 @@ class MotionPattern(FeaturePattern):
                 yield node["forcing"], unique_states(self.model.own(i), self.model.sets[i])
         for row in (*self.model.pipes, *self.model.columns):
             if row["forcing"] >= 0:
-                own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
+                own = (
+                    row["y"] + np.arange(2 * row["cells"])
+                    if "cells" in row.dtype.names
+                    else row["y"]
+                )
                 at_ends = (self.model.sets[row[end]] for end in ("from_node", "to_node"))
                 yield row["forcing"], unique_states(own, *at_ends)
 
@@ -128,9 +156,14 @@ class MotionPattern(FeaturePattern):
     def places(self, row, order: int) -> np.ndarray:
         """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
         if row["line"] >= 0:
-            return unique_states(*(self.chain_states(i, order) for i in self.bodies_at(self.ends_of_line(row))))
+            return unique_states(
+                *(self.chain_states(i, order) for i in self.bodies_at(self.ends_of_line(row)))
+            )
         ends = ("case", "rod") if "rod" in row.dtype.names else ("from_mass", "to_mass")
-        return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
+        return np.array(
+            [self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0],
+            dtype=np.int64,
+        )
 
     def ends_of_line(self, row) -> tuple[int, int]:
         """Rows of the two points of a force element's line of action; -1 for the world instead of a first point."""
@@ -159,7 +192,11 @@ class MotionPattern(FeaturePattern):
         count = int(body["freedoms"])
         if not count:
             return unique_states()
-        return body["rate"] + np.arange(count) if order else body["y"] + np.arange(count + (count >= 3))
+        return (
+            body["rate"] + np.arange(count)
+            if order
+            else body["y"] + np.arange(count + (count >= 3))
+        )
 
     def tree_states(self, root: int, order: int) -> np.ndarray:
         """States of the coordinates (`order` 0) or velocities (1) of a tree of bodies and trees that pins tie to it."""

@@ -8,7 +8,9 @@ from fvsolve.features.motion.kernels.tables import motion_of
 PLAIN_LINE = (-1, -1, -1, records.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
 
 
-def join_ports(draft, row, ports: tuple, places: tuple, toward=None, about=None) -> tuple[float, float]:
+def join_ports(
+    draft, row, ports: tuple, places: tuple, toward=None, about=None
+) -> tuple[float, float]:
     """Write to the row of a force element, or of a joint, what it joins: masses or points, see `Feature.join`.
 
     For points it adds a line of action, to which `lower_lines` later writes the number of the force element. The force
@@ -21,7 +23,9 @@ def join_ports(draft, row, ports: tuple, places: tuple, toward=None, about=None)
     motion = motion_of(draft)
     row["line"] = -1
     if any(place is not None and place not in motion.mass_index for place in places):  # points
-        acts, direction = (records.ALONG, (0.0, 0.0, 0.0)) if about is None else (records.ABOUT, about)
+        acts, direction = (
+            (records.ALONG, (0.0, 0.0, 0.0)) if about is None else (records.ABOUT, about)
+        )
         acts, direction = (acts, direction) if toward is None else (records.TOWARD, toward)
         row["line"] = len(motion.lines)
         first, second = (-1 if place is None else point_row(draft, place) for place in places)

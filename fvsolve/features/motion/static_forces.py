@@ -9,8 +9,10 @@ from fvsolve.features.motion.kernels import tables as records
 from fvsolve.features.motion.kernels.tables import SLOT, motion_of
 
 FOLDER = "fvsolve.features.motion.kernels"
-MOTION, LINES = f"{FOLDER}.body_kinematics: kinematics", f"{FOLDER}.bushings_and_pins: add_element_forces"
-WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
+MOTION = f"{FOLDER}.body_kinematics: kinematics"
+LINES = f"{FOLDER}.bushings_and_pins: add_element_forces"
+WEIGH = f"{FOLDER}.mass_matrix: start_mass_matrix"
+ACCELERATE = f"{FOLDER}.mass_matrix: solve_accelerations"
 BUSHINGS = f"{FOLDER}.bushings_and_pins: add_bushing_loads"
 PINNED, GAPS, HOLD = (
     f"{FOLDER}.bushings_and_pins: {name}"
@@ -23,7 +25,9 @@ NETWORKS = (DRIVES, *DRIVEN, LOADS)
 NONE = np.zeros(0)
 
 
-def call_pieces(all_tables, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
+def call_pieces(
+    all_tables, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE
+) -> None:
     """Call the named kernel functions in turn, in the way of the right-hand side; they write to `out` and run arrays.
 
     all_tables : tables of a model, arrays of a run, tables of motion; pieces : names "MODULE: FUNCTION"
@@ -33,7 +37,9 @@ def call_pieces(all_tables, pieces: tuple[str, ...], t: float, y: np.ndarray, ou
 
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
-        addresses[calls.RHS, k] = calls.function_address(load_function(*piece.rsplit(".", 1)), calls.RATES)
+        addresses[calls.RHS, k] = calls.function_address(
+            load_function(*piece.rsplit(".", 1)), calls.RATES
+        )
     run = calls.compile_as(calls.rhs_in_turn, calls.RATES)
     tables, written, own = all_tables
     kept: list = []  # arrays behind the handle
@@ -59,7 +65,9 @@ def mass_factor(model, y: np.ndarray) -> np.ndarray:
     written, t = arrays_without_seen(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     motion = motion_of(model)
-    call_pieces((model.tables, written, motion.tables()), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
+    call_pieces(
+        (model.tables, written, motion.tables()), (MOTION, ACCELERATE), t, y.copy(), model.new_out()
+    )
     freedoms = motion.freedom_table
     diagonal = 8 * len(freedoms) + freedoms["row"] + freedoms["depth"]
     written.scratch[diagonal] = 1.0 / written.scratch[diagonal]
@@ -92,7 +100,14 @@ class StaticForces:
     def run(self, *pieces: str) -> None:
         """Call the named kernel functions of bodies and joints."""
         rates = np.zeros(self.draft.size) if LOADS in pieces else NONE
-        call_pieces((self.tables, self.written, self.motion.tables()), pieces, self.t, self.y, self.out, rates)
+        call_pieces(
+            (self.tables, self.written, self.motion.tables()),
+            pieces,
+            self.t,
+            self.y,
+            self.out,
+            rates,
+        )
 
     def rates(self) -> np.ndarray:
         """Velocities of all freedoms at the start : float64[freedoms] [m/s], [rad/s]."""
@@ -117,7 +132,9 @@ class StaticForces:
         from fvsolve.core.kernels.moving_frames import FORCE
 
         first, count = int(self.layout["body"]), len(self.motion.body_table)
-        return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
+        return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[
+            :, FORCE : FORCE + 6
+        ]
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
         """Generalised forces on all freedoms from weights, fluid, bushings and given pushes of force elements [N].
@@ -138,29 +155,46 @@ class StaticForces:
         """
         first = int(self.layout["push"])
         self.run(MOTION)
-        loads = [(i, row["centre"], np.linalg.norm(load[:3]), 0.0)
-                for i, (row, load) in enumerate(zip(self.motion.body_table, self.loads(), strict=True))]  # fmt: skip
+        loads = [
+            (i, row["centre"], np.linalg.norm(load[:3]), 0.0)
+            for i, (row, load) in enumerate(zip(self.motion.body_table, self.loads(), strict=True))
+        ]
         self.out[first : first + pushes.size] = pushes
         self.run(LINES)
         before = self.loads().copy()
         self.run(*self.pushes[2:])
         added = enumerate(self.loads() - before)
-        loads += [(i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1)) for i, load in added]
+        loads += [
+            (i, np.zeros(3), *np.linalg.norm(load.reshape(2, 3), axis=1)) for i, load in added
+        ]
         for row in self.motion.line_table:
             size, is_torque = abs(pushes[row["push"]]), row["acts"] == records.ABOUT
             loads += self.at_ends(row, 0.0 if is_torque else size, size if is_torque else 0.0)
         for row in self.motion.bushing_table:
-            first_place, second_place = (self.position_of(row[end]) for end in ("from_point", "to_point"))
-            loads += self.at_ends(row, float(row["stiffness"] * np.linalg.norm(second_place - first_place)), 0.0)
+            first_place, second_place = (
+                self.position_of(row[end]) for end in ("from_point", "to_point")
+            )
+            loads += self.at_ends(
+                row, float(row["stiffness"] * np.linalg.norm(second_place - first_place)), 0.0
+            )
         for row in self.motion.pin_table:
             loads += self.at_ends(row, float(np.linalg.norm(row["force"][: row["rows"]])), 0.0)
         self.forces()  # leaves S in scratch
-        return sum((self.reach(*arguments) for arguments in loads), np.zeros(len(self.motion.freedom_table)))
+        return sum(
+            (self.reach(*arguments) for arguments in loads),
+            np.zeros(len(self.motion.freedom_table)),
+        )
 
     def at_ends(self, row, force: float, torque: float) -> list[tuple]:
         """Loads on the two points of a line of action, as arguments of `reach`."""
-        ends = [self.motion.point_table[row[end]] for end in ("from_point", "to_point") if row[end] >= 0]
-        return [(int(point["body"]), point["place"], force, torque) for point in ends if point["body"] >= 0]
+        ends = [
+            self.motion.point_table[row[end]] for end in ("from_point", "to_point") if row[end] >= 0
+        ]
+        return [
+            (int(point["body"]), point["place"], force, torque)
+            for point in ends
+            if point["body"] >= 0
+        ]
 
     def row_of(self, i: int) -> np.ndarray:
         """Values of body i in `out` (`kernels.moving_frames`)."""
@@ -170,11 +204,15 @@ class StaticForces:
         """Position of a point in the current configuration [m]."""
         from fvsolve.core.kernels.moving_frames import ATTITUDE, POSITION
 
-        i, place = int(self.motion.point_table[point]["body"]), self.motion.point_table[point]["place"]
+        i = int(self.motion.point_table[point]["body"])
+        place = self.motion.point_table[point]["place"]
         if i < 0:
             return place
         body_row = self.row_of(i)
-        return body_row[POSITION : POSITION + 3] + body_row[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        return (
+            body_row[POSITION : POSITION + 3]
+            + body_row[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        )
 
     def reach(self, i: int, place: np.ndarray, force: float, torque: float) -> np.ndarray:
         """Largest possible effect of a force [N] and torque [N m] on each freedom, in any direction.
@@ -185,13 +223,18 @@ class StaticForces:
 
         bodies, effects = self.motion.body_table, np.zeros(len(self.motion.freedom_table))
         columns = self.written.scratch[: 6 * len(effects)].reshape(-1, 6)
-        at = self.row_of(i)[ARM : ARM + 3] + self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        at = (
+            self.row_of(i)[ARM : ARM + 3]
+            + self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        )
         while i >= 0:
             row, joint = bodies[i], self.row_of(i)[ARM : ARM + 3]
             for j in range(row["freedom"], row["freedom"] + row["freedoms"]):
                 angular = np.linalg.norm(columns[j, :3])
                 linear = np.linalg.norm(columns[j, 3:]) if angular == 0.0 else 0.0
-                effects[j] = force * (linear + angular * np.linalg.norm(at - joint)) + torque * angular
+                effects[j] = (
+                    force * (linear + angular * np.linalg.norm(at - joint)) + torque * angular
+                )
             i = int(row["parent"])
         return effects
 
@@ -204,7 +247,8 @@ class StaticForces:
         return self.forces()
 
 
-RANK_TOLERANCE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
+# a row of pins is redundant if its independent part is below this share of the largest row
+RANK_TOLERANCE = 1e-8
 PIN_RATE_TOLERANCE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
 
 
@@ -218,7 +262,9 @@ def refuse_massless(draft, at: StaticForces) -> None:
     n = len(motion.freedom_table)
     for name, row in reversed(list(zip(motion.body_names, motion.body_table, strict=True))):
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
-        least = RANK_TOLERANCE**2 * (own if row["joint"] in (records.REVOLUTE, records.BALL) else 0.0)
+        least = RANK_TOLERANCE**2 * (
+            own if row["joint"] in (records.REVOLUTE, records.BALL) else 0.0
+        )
         for freedom in motion.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
             left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
             if np.isnan(left) and len(motion.moving_segment_table):
@@ -226,7 +272,9 @@ def refuse_massless(draft, at: StaticForces) -> None:
                 remedy = "expected wider tanks, a heavier body, or a driven joint"
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
             if not left > least:
-                text = "the inertia of the body is 0 in a direction in which its joint allows motion"
+                text = (
+                    "the inertia of the body is 0 in a direction in which its joint allows motion"
+                )
                 remedy = "expected an inertia above 0 about the axis of the joint"
                 return draft.fault(f"nodes.{name}.inertia", f"{text}; {remedy}")
 
@@ -286,17 +334,26 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     for k, row in enumerate(motion.pin_table):
         row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
     rows = pin_rows(draft, at)
-    names = [name for name, row in zip(motion.pin_names, motion.pin_table, strict=True) for _ in range(row["rows"])]
+    names = [
+        name
+        for name, row in zip(motion.pin_names, motion.pin_table, strict=True)
+        for _ in range(row["rows"])
+    ]
     for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "this pin is redundant: in some direction joints or other pins already hold its two points together"
-        draft.fault(f"links.{name}", f"{text}; give the key `axis` for a loop in a plane, else remove one pin")
+        draft.fault(
+            f"links.{name}",
+            f"{text}; give the key `axis` for a loop in a plane, else remove one pin",
+        )
     slips: dict[str, float] = {}
     for name, slip in zip(names, rows @ at.rates(), strict=True):
         slips[name] = float(np.hypot(slips.get(name, 0.0), slip))
     for name, slip in slips.items():
         if slip > PIN_RATE_TOLERANCE:
             text = f"separate the two points of this pin at {draft.case.amount(slip, 'velocity')}"
-            draft.fault(f"links.{name}", f"velocities at the start {text}; expected equal velocities")
+            draft.fault(
+                f"links.{name}", f"velocities at the start {text}; expected equal velocities"
+            )
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(motion.pin_table)].reshape(-1, 3)
     for row, force in zip(motion.pin_table, forces, strict=True):
@@ -330,14 +387,21 @@ def motion_at_start(draft, accelerations: np.ndarray) -> list[str]:
     motion = motion_of(draft)
     texts, amount = [], draft.case.amount
     for name, row in zip(motion.body_names, motion.body_table, strict=True):
-        pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
+        pose = draft.case.poses[name]
+        own = accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
         # water in sloshing modes is not among the nodes: only its accelerations are listed
         stated = name in draft.case.nodes
         if stated and (size := np.linalg.norm(pose.spin)) > 0.0:
             texts.append(f"body {name} turns at {amount(size, 'angular_velocity')}")
         if stated and (size := np.linalg.norm(pose.velocity)) > 0.0:
             texts.append(f"body {name} moves at {amount(size, 'velocity')}")
-        slides = 0 if row["joint"] in (records.REVOLUTE, records.BALL) else 3 if row["joint"] == records.FREE else 1
+        slides = (
+            0
+            if row["joint"] in (records.REVOLUTE, records.BALL)
+            else 3
+            if row["joint"] == records.FREE
+            else 1
+        )
         for part, unit in ((own[:slides], "m/s2"), (own[slides:], "rad/s2")):
             if np.any(part):
                 texts.append(f"body {name} accelerates at {np.linalg.norm(part):.4g} {unit}")

@@ -98,8 +98,12 @@ class Elimination:
     ) -> None:
         self.elements, self.columns, self.leaks, self.constant = elements, columns, leaks, constant
         self.stores = {columns[item.name]: item for item in elements if item.is_store}
-        self.integrating = {columns[item.name]: item for item in elements if item.is_source and item.state_of}
-        self.items = {number: item for item in elements if (number := columns.get(item.name)) is not None}
+        self.integrating = {
+            columns[item.name]: item for item in elements if item.is_source and item.state_of
+        }
+        self.items = {
+            number: item for item in elements if (number := columns.get(item.name)) is not None
+        }
         self.known: dict[str, int] = {}  # node -> column of its potential
         for kind in (POTENTIAL, CAPACITY):
             for item in elements:
@@ -115,7 +119,8 @@ class Elimination:
                 self.unknowns.setdefault(("flow", item.name), len(self.unknowns))
         self.equations = list(self.make_equations())
         self.relations: list[Terms] = []  # sums of stores and sources that are zero
-        self.contradictions: list[Terms] = []  # sums of sources that would have to be zero, or of stores tied to them
+        # sums of sources that would have to be zero, or of stores tied to them
+        self.contradictions: list[Terms] = []
         self.faults: list[NetworkFault] = []
         self.solution: dict[int, Terms] = {}
         while self.solve():
@@ -132,7 +137,11 @@ class Elimination:
     def parts_of(self, unknown: int) -> list[str]:
         """Places of the parts that an unknown concerns."""
         kind, name = list(self.unknowns)[unknown]
-        return [item.part for item in self.elements if (item.name == name if kind == "flow" else name in item.ends)]
+        return [
+            item.part
+            for item in self.elements
+            if (item.name == name if kind == "flow" else name in item.ends)
+        ]
 
     # equations ------------------------------------------------------------------------------------------------
 
@@ -188,8 +197,11 @@ class Elimination:
 
     def solve(self) -> bool:
         """Solve all blocks of equations; True if relations were found, whose derivatives must be solved too."""
-        found = [(equation.right, equation.parts) for equation in self.equations
-                 if not equation.left and any(equation.right.values())]  # fmt: skip
+        found = [
+            (equation.right, equation.parts)
+            for equation in self.equations
+            if not equation.left and any(equation.right.values())
+        ]
         self.equations = [equation for equation in self.equations if equation.left]
         new = [self.tie(*relation) for relation in found]
         if not any(new):
@@ -203,9 +215,15 @@ class Elimination:
     def blocks(self) -> Iterator[tuple[list[Equation], list[int]]]:
         """Yield independent blocks: their equations, and the numbers of their unknowns."""
         count = len(self.unknowns)
-        pairs = [(count + k, number) for k, equation in enumerate(self.equations) for number in equation.left]
+        pairs = [
+            (count + k, number)
+            for k, equation in enumerate(self.equations)
+            for number in equation.left
+        ]
         for ends in self.leaks:
-            numbers = [self.unknowns[key] for node in ends if (key := ("potential", node)) in self.unknowns]
+            numbers = [
+                self.unknowns[key] for node in ends if (key := ("potential", node)) in self.unknowns
+            ]
             pairs += zip(numbers, numbers[1:], strict=False)
         labels = union(count + len(self.equations), pairs)
         groups: dict[int, tuple[list[Equation], list[int]]] = {}
@@ -221,10 +239,14 @@ class Elimination:
         solution, free = block.solve()
         if free.shape[1]:
             solution = self.with_free_part(solution, free, block)
-        return {u: cleaned(dict(zip(block.columns, row, strict=True)))
-                for u, row in zip(block.unknowns, solution.tolist(), strict=True)}  # fmt: skip
+        return {
+            u: cleaned(dict(zip(block.columns, row, strict=True)))
+            for u, row in zip(block.unknowns, solution.tolist(), strict=True)
+        }
 
-    def with_free_part(self, solution: np.ndarray, free: np.ndarray, block: EquationBlock) -> np.ndarray:
+    def with_free_part(
+        self, solution: np.ndarray, free: np.ndarray, block: EquationBlock
+    ) -> np.ndarray:
         """Choose the solution among several: of potentials by equal small leaks, of locks by the least flows.
 
         Locks in parallel share a flow in proportion to their values.
@@ -243,12 +265,19 @@ class Elimination:
         further = {c for law in laws for c in law.right} - {*block.columns}
         block.columns += sorted(further)
         solution = np.hstack([solution, np.zeros((len(solution), len(further)))])
-        rows = np.array([[law.left.get(u, 0.0) for u in unknowns] for law in laws]).reshape(-1, len(unknowns))
+        rows = np.array([[law.left.get(u, 0.0) for u in unknowns] for law in laws]).reshape(
+            -1, len(unknowns)
+        )
         given = np.array([[law.right.get(c, 0.0) for c in block.columns] for law in laws])
         choice = rows @ free
         if np.linalg.matrix_rank(choice, 1e-9) < free.shape[1]:
             loose = np.abs(free).max(axis=1) > 1e-6 * np.abs(free).max()
-            parts = [part for u, is_loose in zip(unknowns, loose, strict=True) if is_loose for part in self.parts_of(u)]
+            parts = [
+                part
+                for u, is_loose in zip(unknowns, loose, strict=True)
+                if is_loose
+                for part in self.parts_of(u)
+            ]
             self.add_fault(NetworkFault(list(dict.fromkeys(parts))))
         rest = rows @ solution - given.reshape(len(laws), len(block.columns))
         return solution - free @ (np.linalg.pinv(choice) @ rest)
@@ -261,17 +290,27 @@ class Elimination:
         if not reduced(relation, [*self.relations, *self.contradictions]):
             return False
         relation = reduced(relation, self.relations)
-        if self.leaks and len(relation) == 1 and (item := self.integrating.get(next(iter(relation)))):
-            self.relations.append(relation)  # no current of a coil in an open circuit, whose flux does not change
+        if (
+            self.leaks
+            and len(relation) == 1
+            and (item := self.integrating.get(next(iter(relation))))
+        ):
+            # no current of a coil in an open circuit, whose flux does not change
+            self.relations.append(relation)
             self.equations.append(Equation())
             self.put_drop(self.equations[-1], item.ends)
             return True
-        sources = [column for column in relation if column not in self.stores and column not in self.constant]
+        sources = [
+            column
+            for column in relation
+            if column not in self.stores and column not in self.constant
+        ]
         sources += [] if relation.keys() & self.stores.keys() else list(relation)
         if sources:
             self.contradictions.append(relation)
             items = [self.items[column] for column in relation]
-            tied, parts = [item for item in items if item.is_store], dict.fromkeys(item.part for item in items)
+            tied = [item for item in items if item.is_store]
+            parts = dict.fromkeys(item.part for item in items)
             self.add_fault(NetworkFault(list(parts), tied, [self.items[c] for c in sources], laws))
             return False
         self.relations.append(relation)
@@ -329,7 +368,8 @@ class EquationBlock:
     def __init__(self, equations: list[Equation], unknowns: list[int]) -> None:
         self.unknowns, self.equations = unknowns, equations
         self.columns = sorted({column for equation in equations for column in equation.right})
-        place, side = {u: k for k, u in enumerate(unknowns)}, {c: k for k, c in enumerate(self.columns)}
+        place = {u: k for k, u in enumerate(unknowns)}
+        side = {c: k for k, c in enumerate(self.columns)}
         self.matrix = np.zeros((len(equations), len(unknowns)))
         self.given = np.zeros((len(equations), len(self.columns)))
         for k, equation in enumerate(equations):
@@ -342,7 +382,9 @@ class EquationBlock:
             return
         self.by_row = inverse_sizes(self.matrix, 1)[:, None]
         self.by_column = inverse_sizes(self.matrix * self.by_row, 0)[:, None]
-        self.left, self.singular, self.right = np.linalg.svd(self.matrix * self.by_row * self.by_column.T)
+        self.left, self.singular, self.right = np.linalg.svd(
+            self.matrix * self.by_row * self.by_column.T
+        )
         self.rank = int(np.sum(self.singular > RANK * self.singular.max(initial=0.0)))
 
     def relations(self) -> list[tuple[Terms, list[str]]]:
@@ -358,8 +400,16 @@ class EquationBlock:
             terms = vector @ scaled
             largest = np.abs(terms).max(initial=0.0)
             if largest > SMALL * size:
-                laws = [equation.parts for equation, v in zip(self.equations, vector, strict=True) if abs(v) > SMALL]
-                relation = {c: float(v) for c, v in zip(self.columns, terms, strict=True) if abs(v) > SMALL * largest}
+                laws = [
+                    equation.parts
+                    for equation, v in zip(self.equations, vector, strict=True)
+                    if abs(v) > SMALL
+                ]
+                relation = {
+                    c: float(v)
+                    for c, v in zip(self.columns, terms, strict=True)
+                    if abs(v) > SMALL * largest
+                }
                 found.append((relation, list(dict.fromkeys(sum(laws, [])))))
         return found
 
@@ -377,7 +427,8 @@ class EquationBlock:
         for _ in range(REFINEMENTS):
             solution = solution + inverse((self.given - exact @ solution).astype(float))
         sizes = np.abs(solution / self.by_column)
-        solution[sizes < NOTHING * sizes.max(axis=0, initial=0.0)] = 0.0  # such as a flow that has no way
+        # such as a flow that has no way
+        solution[sizes < NOTHING * sizes.max(axis=0, initial=0.0)] = 0.0
         free = self.right[rank:].T.copy()
         free[np.abs(free) < NOTHING] = 0.0
         return solution, self.by_column * free
@@ -400,7 +451,11 @@ def reduced(relation: Terms, others: Sequence[Terms]) -> Terms:
     largest = np.abs(own).max(initial=0.0)
     if largest < SMALL:
         return {}
-    return {column: float(v / largest) for column, v in zip(columns, own, strict=True) if abs(v) > SMALL * largest}
+    return {
+        column: float(v / largest)
+        for column, v in zip(columns, own, strict=True)
+        if abs(v) > SMALL * largest
+    }
 
 
 def dependent_stores(
@@ -418,8 +473,12 @@ def dependent_stores(
         if not own:
             continue
         chosen = min(own, key=lambda column: (stores[column].value / left[column] ** 2, -column))
-        terms = {column: -value / left[chosen] for column, value in left.items() if column != chosen}
-        found = {column: substituted(old, {chosen: terms}) for column, old in found.items()} | {chosen: terms}
+        terms = {
+            column: -value / left[chosen] for column, value in left.items() if column != chosen
+        }
+        found = {column: substituted(old, {chosen: terms}) for column, old in found.items()} | {
+            chosen: terms
+        }
     return found
 
 

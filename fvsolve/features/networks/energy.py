@@ -15,7 +15,8 @@ def add_accounts(network: Network, accounts) -> None:
     for item in network.booked:
         at, (group, _, name) = accounts.take(1), item.part.partition(".")
         part = getattr(accounts.model.case, group)[name]
-        loss_of_other = item.ledger == "dissipated" and not part.in_network  # such as friction of a cylinder
+        # such as friction of a cylinder
+        loss_of_other = item.ledger == "dissipated" and not part.in_network
         kind = item.name.rpartition(".")[2] if loss_of_other else part.kind.replace("-", " ")
         stores = item.ledger == "stored"
         accounts.hold(name, kind, at if stores else None)
@@ -32,5 +33,8 @@ def norm_rows(network: Network) -> Iterator[tuple[str, dict[int, float]]]:
         if item.state_of is None:
             size = np.sqrt(0.5 * item.value * (SCALAR_WEIGHT if item.thermal else 1.0))
             terms = network.dependent.get(column, {column: 1.0})
-            row = {network.states[c]: float(size * value * network.stores[c].unit) for c, value in terms.items()}
+            row = {
+                network.states[c]: float(size * value * network.stores[c].unit)
+                for c, value in terms.items()
+            }
             yield item.part.partition(".")[2], row

@@ -12,7 +12,9 @@ from fvsolve.parts.network_elements import FLOW, INERTANCE, Element, node_or_ref
 
 AGREE = 1e-9  # relative difference of two values that are equal
 NO_SPEED = "has neither an inertia nor a given speed; give this shaft the key `inertia`"
-NO_INERTIA = "its speeds depend on its own torque at once; give the shafts at both ends an `inertia`"
+NO_INERTIA = (
+    "its speeds depend on its own torque at once; give the shafts at both ends an `inertia`"
+)
 
 
 class Words(NamedTuple):
@@ -26,12 +28,24 @@ class Words(NamedTuple):
 
 
 WORDS = {
-    "rotational": Words("speed", "torque", "a bearing", "give a shaft an `inertia`, or join a bearing", "a housing, or "
-                        "give a shaft an `inertia`"),
-    "electrical": Words("voltage", "current", "a resistor", "join a resistor in parallel", "a ground"),
-    "thermal": Words("temperature", "heat flow", "a thermal-conductor", "join a heat-capacity, or a thermal-conductor "
-                     "to an ambient", "an ambient or a heat-capacity"),
-}  # fmt: skip
+    "rotational": Words(
+        "speed",
+        "torque",
+        "a bearing",
+        "give a shaft an `inertia`, or join a bearing",
+        "a housing, or give a shaft an `inertia`",
+    ),
+    "electrical": Words(
+        "voltage", "current", "a resistor", "join a resistor in parallel", "a ground"
+    ),
+    "thermal": Words(
+        "temperature",
+        "heat flow",
+        "a thermal-conductor",
+        "join a heat-capacity, or a thermal-conductor to an ambient",
+        "an ambient or a heat-capacity",
+    ),
+}
 OTHER = Words("velocity", "force", "a resistance", "give it another way", "a mass or a housing")
 
 
@@ -48,7 +62,11 @@ def names_of(items: list[Element]) -> list[str]:
 def words_of(case, item: Element | str) -> Words:
     """Words of the domain of an element, or of a part at a place."""
     part = item if isinstance(item, str) else item.part
-    nodes = () if isinstance(item, str) else [case.nodes[end].domain for end in item.ends if end in case.nodes]
+    nodes = (
+        ()
+        if isinstance(item, str)
+        else [case.nodes[end].domain for end in item.ends if end in case.nodes]
+    )
     group, _, name = part.partition(".")
     found = getattr(case, group, {}).get(name)
     joined = [found.domain] if group == "nodes" else [*getattr(found, "joins", {}).values()]
@@ -78,7 +96,9 @@ def network_fault(fault: NetworkFault, case) -> tuple[str, str]:
         text = f"lies on the source {listing(names_of(fault.sources))}, which gives its "
         text += words.flow if store.kind == INERTANCE else words.potential
         return store.part, f"{text}; put {words.resistance} between them"
-    if turning := [(name, shaft) for name in names if (shaft := shaft_of(case.links.get(name))) is not None]:
+    if turning := [
+        (name, shaft) for name in names if (shaft := shaft_of(case.links.get(name))) is not None
+    ]:
         return f"links.{turning[0][0]}.ports.shaft", f"{turning[0][1]} {NO_SPEED}"
     if fault.sources:
         return contradiction(fault, case)
@@ -118,7 +138,9 @@ def shaft_of(part) -> str | None:
     return None if part is None else lowering_of(type(part)).turns_with(part)
 
 
-def stated_faults(relations: list[Terms], stores: dict[int, Element], fixed: set[int], case) -> Iterator:
+def stated_faults(
+    relations: list[Terms], stores: dict[int, Element], fixed: set[int], case
+) -> Iterator:
     """Yield a fault (place, text) for each store whose stated value contradicts those to which it is tied.
 
     relations, stores, fixed : as for `dependent_stores`
@@ -131,7 +153,9 @@ def stated_faults(relations: list[Terms], stores: dict[int, Element], fixed: set
                 yield fault
 
 
-def tie_fault(case, stores: dict[int, Element], column: int, found: float, total: float, terms: Terms):
+def tie_fault(
+    case, stores: dict[int, Element], column: int, found: float, total: float, terms: Terms
+):
     """Fault (place, text) of a store that has not the value of stores to which it is tied; None if they agree.
 
     found : its value; total : value that follows from the others; terms : as in `dependent_stores`
@@ -143,8 +167,11 @@ def tie_fault(case, stores: dict[int, Element], column: int, found: float, total
     part, quantity = getattr(case, group)[name], item.state.partition(".")[2] or "velocity"
     key = f"initial_{quantity}"
     stated = getattr(part, key, None)
-    sign = -1.0 if stated is not None and stated * found < 0.0 else 1.0  # of a store whose ends are reversed
-    shown, expected = (case.amount(sign * value, part.quantities[quantity], 6) for value in (found, total))
+    # of a store whose ends are reversed
+    sign = -1.0 if stated is not None and stated * found < 0.0 else 1.0
+    shown, expected = (
+        case.amount(sign * value, part.quantities[quantity], 6) for value in (found, total)
+    )
     text = f"{shown} at the start contradicts "
     text += f"{listing(tied)}, to which it is tied" if tied else "the parts that hold it"
     return item.part + f".{key}" * (stated is not None), f"{text}; expected {expected}"

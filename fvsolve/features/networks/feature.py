@@ -29,11 +29,17 @@ TERMS = RhsTerms(
     package=PACKAGE,
 )
 EXCHANGERS = RhsTerms(
-    outlet_values="networks: node_temperatures", scalar_rates="networks: network_rates", package=PACKAGE
+    outlet_values="networks: node_temperatures",
+    scalar_rates="networks: network_rates",
+    package=PACKAGE,
 )
 
 
-class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, domain thermal, element of a network"):
+class Networks(
+    Feature,
+    slot=3,
+    wakes="domain rotational, domain electrical, domain thermal, element of a network",
+):
     """Network of a case.
 
     network : its equations and numbers of its rows; None before it is lowered, or if no part has elements
@@ -51,8 +57,14 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         self.start_speeds: dict[int, float] = {}
         self.begun = None
         self.known: tuple = (None, {})
-        self.source_table, self.rates = np.zeros(0, tables.NETWORK_INPUT), np.zeros(0, tables.NETWORK_RATE)
-        self.elements, self.switches = np.zeros(0, tables.NETWORK_ELEMENT), np.zeros(0, tables.NETWORK_SWITCH)
+        self.source_table, self.rates = (
+            np.zeros(0, tables.NETWORK_INPUT),
+            np.zeros(0, tables.NETWORK_RATE),
+        )
+        self.elements, self.switches = (
+            np.zeros(0, tables.NETWORK_ELEMENT),
+            np.zeros(0, tables.NETWORK_SWITCH),
+        )
         self.settings = np.zeros(1, tables.NETWORK_SETTINGS)
         self.shafts: list[str] = []
         self.turned = self.turned_devices = np.zeros(0, dtype=np.int64)
@@ -64,9 +76,14 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
-        if probe.name not in case.network_places or probe.name in case.places or probe.name in case.nodes:
+        if (
+            probe.name not in case.network_places
+            or probe.name in case.places
+            or probe.name in case.nodes
+        ):
             return False
-        self.network.fill_node_probe(draft, row, probe.name, False)  # a place of the network alone: PUMP.shaft
+        # a place of the network alone: PUMP.shaft
+        self.network.fill_node_probe(draft, row, probe.name, False)
         return True
 
     def rate(self, draft) -> float:
@@ -125,7 +142,8 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         found = [("given", GIVEN), ("followed", FOLLOWED), ("devices", TERMS)]
         if self.shafts:
             found.append(("first", SHAFTS))
-            if (model.tables.schedules["pieces"] == 0).any():  # schedules that features set after `prepare`
+            # schedules that features set after `prepare`
+            if (model.tables.schedules["pieces"] == 0).any():
                 found.append(("pipes", DRIVEN_SHAFTS))
         return found + ([("carried", EXCHANGERS)] if len(model.tables.exchangers) else [])
 
@@ -135,7 +153,11 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
     def pattern(self, couplings):
         from fvsolve.features.networks.pattern import NetworkCouplings
 
-        return super().pattern(couplings) if self.network is None else NetworkCouplings(self, couplings)
+        return (
+            super().pattern(couplings)
+            if self.network is None
+            else NetworkCouplings(self, couplings)
+        )
 
     def add_accounts(self, accounts) -> None:
         from fvsolve.features.networks.energy import add_accounts
@@ -152,7 +174,11 @@ class Networks(Feature, slot=3, wakes="domain rotational, domain electrical, dom
         return {} if self.network is None else {"network": self.network.facts()}
 
     def remedy(self, event: str) -> str:
-        switches = [] if self.network is None else [item.part.partition(".")[2] for item in self.network.switches]
+        switches = (
+            []
+            if self.network is None
+            else [item.part.partition(".")[2] for item in self.network.switches]
+        )
         return "give it more resistance or inertia" if event in switches else ""
 
 
@@ -172,9 +198,16 @@ class NetworkRun(FeatureRun):
     def tables(self, view: str = "") -> tables.NetworkTables:
         own = self.feature
         return tables.NetworkTables(
-            own.source_table, own.rates, own.elements, own.switches, own.settings, own.turned, own.turned_devices,
-            self.places, self.factors,
-        )  # fmt: skip
+            own.source_table,
+            own.rates,
+            own.elements,
+            own.switches,
+            own.settings,
+            own.turned,
+            own.turned_devices,
+            self.places,
+            self.factors,
+        )
 
     def coefficients(self) -> list[np.ndarray]:
         return [self.places, self.factors]

@@ -9,7 +9,12 @@ import numpy as np
 from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import lowering_of
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.features.networks.elimination import Elimination, NetworkError, dependent_stores, substituted
+from fvsolve.features.networks.elimination import (
+    Elimination,
+    NetworkError,
+    dependent_stores,
+    substituted,
+)
 from fvsolve.features.networks.faults import NO_INERTIA, NO_SPEED, network_faults, stated_faults
 from fvsolve.features.networks.kernels.tables import (
     NETWORK_ELEMENT,
@@ -24,7 +29,12 @@ from fvsolve.parts.network_elements import FLOW, INERTANCE, Element, Switch, nod
 
 CURRENT_ROUNDING = 1e-13  # of diodes, over the sum of all sources divided by their resistance
 SAMPLES = 12  # times at which responses are computed for the sizes of states
-CATEGORIES = {"": codes.NOT_BOOKED, "stored": codes.STORED, "dissipated": codes.DISSIPATED, "supplied": codes.SUPPLIED}
+CATEGORIES = {
+    "": codes.NOT_BOOKED,
+    "stored": codes.STORED,
+    "dissipated": codes.DISSIPATED,
+    "supplied": codes.SUPPLIED,
+}
 EVENTS = {
     codes.SWITCH: ("closes", "opens"),
     codes.DIODE: ("conducts", "blocks"),
@@ -40,12 +50,17 @@ def lower_network(own, draft) -> Network | None:
     elements, switches = parts_of_network(draft.case)
     if not elements:
         return None
-    network = Network(elements, switches, tuple(sorted(draft.case.network_places)), rounding=draft.rounding)
+    network = Network(
+        elements, switches, tuple(sorted(draft.case.network_places)), rounding=draft.rounding
+    )
     try:
         found = network.equations(network.conducting)
     except NetworkError as error:
         case, fixed = draft.case, network.states_of_others
-        found = [*network_faults(error.faults, case), *stated_faults(error.relations, network.stores, fixed, case)]
+        found = [
+            *network_faults(error.faults, case),
+            *stated_faults(error.relations, network.stores, fixed, case),
+        ]
         for place, text in found:
             draft.fault(place, text)
         return None
@@ -65,7 +80,9 @@ def lower_network(own, draft) -> Network | None:
             network.states[column] = state_place(draft, item, sizes[column])
     for name in probed_angles(draft.case):
         network.integrals[name] = draft.states([f"{name}.angle"], 1.0)
-    network.integrals |= {item.name: state_place(draft, item, 1.0) for item in network.sources if item.state_of}
+    network.integrals |= {
+        item.name: state_place(draft, item, 1.0) for item in network.sources if item.state_of
+    }
     for place, text in speed_faults(draft, network):
         draft.fault(place, text)
     fill_tables(own, draft, network)
@@ -84,15 +101,25 @@ def parts_of_network(case) -> tuple[list[Element], list[Switch]]:
             switches += more
     for item in [item for item in elements if item.heat_to is not None]:
         node = node_or_reference(case, item.heat_to)
-        elements.append(Element(FLOW, f"{item.name}.heat", item.part, (None, node), reads=(codes.HEAT_INPUT, item.name),
-                                thermal=True))  # fmt: skip
+        elements.append(
+            Element(
+                FLOW,
+                f"{item.name}.heat",
+                item.part,
+                (None, node),
+                reads=(codes.HEAT_INPUT, item.name),
+                thermal=True,
+            )
+        )
     return elements, switches
 
 
 def friction_faults(network: Network, found: Elimination) -> Iterator[tuple[str, str]]:
     """Yield a fault (place, text) for each dry friction whose slip depends on a torque of friction at once."""
     torques = {
-        network.columns[item.name] for item in network.sources if item.reads and item.reads[0] == codes.FRICTION_FLOW
+        network.columns[item.name]
+        for item in network.sources
+        if item.reads and item.reads[0] == codes.FRICTION_FLOW
     }
     for switch in network.switches:
         if switch.kind == codes.FRICTION:
@@ -107,7 +134,10 @@ def speed_faults(draft, network: Network) -> Iterator[tuple[str, str]]:
     for name, part, device in draft.devices:
         shaft = device.turns_with(part)
         follows = () if shaft is None else rows[network.node_row(shaft)]
-        if any(column >= first and network.sources[column - first].schedule is None for column in follows):
+        if any(
+            column >= first and network.sources[column - first].schedule is None
+            for column in follows
+        ):
             yield f"links.{name}.ports.shaft", f"{shaft} {NO_SPEED}"
 
 
@@ -124,9 +154,21 @@ def state_place(draft, item: Element, size: float) -> int:
 def probed_angles(case) -> list[str]:
     """Nodes whose angle a probe of the case or an input of a block reads."""
     probes = [*case.probes, *case.extreme_probes]
-    probes += [item for block in case.controls.values() for item in block.inputs if not isinstance(item, str)]
-    return list(dict.fromkeys(p.name for p in probes if p.part == "nodes" and p.quantity == "angle"
-                              and case.nodes[p.name].domain == "rotational"))  # fmt: skip
+    probes += [
+        item
+        for block in case.controls.values()
+        for item in block.inputs
+        if not isinstance(item, str)
+    ]
+    return list(
+        dict.fromkeys(
+            p.name
+            for p in probes
+            if p.part == "nodes"
+            and p.quantity == "angle"
+            and case.nodes[p.name].domain == "rotational"
+        )
+    )
 
 
 def fill_tables(own, draft, network: Network) -> None:
@@ -162,7 +204,10 @@ def fill_tables(own, draft, network: Network) -> None:
     for item, row in zip(network.booked, own.elements, strict=True):
         row["drop"], row["flow"] = network.rows_of(item.name)
         row["category"] = CATEGORIES["" if item.heat_to is not None else item.ledger]
-        row["thermal"], row["weight"] = item.thermal, (item.ends[0] is not None) - (item.ends[1] is not None)
+        row["thermal"], row["weight"] = (
+            item.thermal,
+            (item.ends[0] is not None) - (item.ends[1] is not None),
+        )
         if item.is_store:
             row["inertance" if item.kind == INERTANCE else "capacity"] = item.value
     own.switches = np.zeros(len(network.switches), NETWORK_SWITCH)
@@ -182,12 +227,19 @@ def fill_tables(own, draft, network: Network) -> None:
 
 def exchanger_rows(draft, network: Network) -> np.ndarray:
     """Table of heat exchangers."""
-    case, capacity = draft.case, {item.ends[0]: item.value for item in network.stores.values() if item.thermal}
+    case = draft.case
+    capacity = {item.ends[0]: item.value for item in network.stores.values() if item.thermal}
     table = np.zeros(len(exchanger_names(case)), rec.EXCHANGER)
     for name, row in zip(exchanger_names(case), table, strict=True):
         link = case.links[name]
-        row["node"], row["place"] = draft.node_index[draft.inside(link.from_)], network.node_row(link.to)
-        row["conductance"], row["effectiveness"] = link.conductance or 0.0, link.effectiveness or 0.0
+        row["node"], row["place"] = (
+            draft.node_index[draft.inside(link.from_)],
+            network.node_row(link.to),
+        )
+        row["conductance"], row["effectiveness"] = (
+            link.conductance or 0.0,
+            link.effectiveness or 0.0,
+        )
         row["slowness"] = 1.0 / capacity[link.to] if link.to in capacity else 0.0
     return table
 
@@ -205,8 +257,13 @@ def response_sizes(network: Network, case) -> dict[int, float]:
         return small
     from scipy.linalg import expm
 
-    found, place = network.equations(network.conducting), {column: k for k, column in enumerate(free)}
-    inputs = {network.columns[item.name]: size for item in network.sources if (size := source_size(item)) > 0.0}
+    found = network.equations(network.conducting)
+    place = {column: k for k, column in enumerate(free)}
+    inputs = {
+        network.columns[item.name]: size
+        for item in network.sources
+        if (size := source_size(item)) > 0.0
+    }
     a, b = np.zeros((n, n)), np.zeros((n, len(inputs)))
     for column in free:
         for other, value in substituted(found.rate(column), network.dependent).items():
@@ -226,8 +283,11 @@ def response_sizes(network: Network, case) -> dict[int, float]:
     largest = np.zeros(n)
     for time in times:
         largest = np.maximum(largest, np.abs(expm(whole * time)[:n, n:]).sum(axis=1))
-    return small | {column: float(size) for column, size in zip(free, largest, strict=True)
-                    if np.isfinite(size) and size > 1e-9 * small[column]}  # fmt: skip
+    return small | {
+        column: float(size)
+        for column, size in zip(free, largest, strict=True)
+        if np.isfinite(size) and size > 1e-9 * small[column]
+    }
 
 
 def source_size(item: Element) -> float:
@@ -244,10 +304,17 @@ def network_rate(network: Network) -> float:
         return 0.0
     columns = list(network.states)
     rows = network.terms(network.conducting)[: len(columns)]
-    root = {column: network.stores[column].value ** 0.5 for column in columns}  # rates of energies have equal units
+    # rates of energies have equal units
+    root = {column: network.stores[column].value ** 0.5 for column in columns}
     if len(columns) > MOST_STATES:
-        sums = (sum(abs(value) * root[column] / root[other] for other, value in row.items() if other in root)
-                for column, row in zip(columns, rows, strict=True))  # fmt: skip
+        sums = (
+            sum(
+                abs(value) * root[column] / root[other]
+                for other, value in row.items()
+                if other in root
+            )
+            for column, row in zip(columns, rows, strict=True)
+        )
         return max(sums, default=0.0)
     matrix = np.array([[row.get(column, 0.0) for column in columns] for row in rows])
     return float(np.abs(np.linalg.eigvals(matrix)).max())

@@ -91,7 +91,11 @@ class Network:
         on = []
         for switch in self.switches:
             flag = self.flags[switch.name]
-            sticks = not (armed[flag] or armed[flag + 2]) if switch.kind == codes.FRICTION else bool(armed[flag])
+            sticks = (
+                not (armed[flag] or armed[flag + 2])
+                if switch.kind == codes.FRICTION
+                else bool(armed[flag])
+            )
             on.append(sticks)
         return tuple(on)
 
@@ -101,8 +105,13 @@ class Network:
             is_on = {switch.name: on for switch, on in zip(self.switches, mode, strict=True)}
             active = [item for item in self.elements if not item.switch or is_on[item.switch]]
             # an open switch is the limit of a small leak; slipping friction is no such limit
-            leaks = [item.ends for switch in self.switches if switch.kind != codes.FRICTION and not is_on[switch.name]
-                     for item in self.elements if item.name == switch.drop]  # fmt: skip
+            leaks = [
+                item.ends
+                for switch in self.switches
+                if switch.kind != codes.FRICTION and not is_on[switch.name]
+                for item in self.elements
+                if item.name == switch.drop
+            ]
             constant = () if mode == self.conducting else self.constant_columns
             self.solved[mode] = Elimination(active, self.columns, leaks, constant)
         return self.solved[mode]
@@ -115,13 +124,20 @@ class Network:
     @cached_property
     def constant_columns(self) -> set[int]:
         """Columns of sources that never change, to which friction may lock a store."""
-        return {self.columns[item.name] for item in self.sources
-                if item.schedule is not None and item.schedule.constant}  # fmt: skip
+        return {
+            self.columns[item.name]
+            for item in self.sources
+            if item.schedule is not None and item.schedule.constant
+        }
 
     def ties_of(self, mode: tuple[bool, ...]) -> dict[int, Terms]:
         """Stores that others determine in a mode only, such as speeds of a locked clutch: as `dependent`."""
         found = self.equations(mode)
-        own = [left for item in found.relations if (left := reduced(substituted(item, self.dependent), ()))]
+        own = [
+            left
+            for item in found.relations
+            if (left := reduced(substituted(item, self.dependent), ()))
+        ]
         return dependent_stores(own, self.stores) if own else {}
 
     # rows -----------------------------------------------------------------------------------------------------
@@ -129,7 +145,11 @@ class Network:
     @cached_property
     def nodes(self) -> list[str]:
         """Names of all nodes of the network."""
-        return list(dict.fromkeys([*self.places, *(node for item in self.elements for node in item.ends if node)]))
+        return list(
+            dict.fromkeys(
+                [*self.places, *(node for item in self.elements for node in item.ends if node)]
+            )
+        )
 
     @cached_property
     def totals(self) -> dict[str, list[Element]]:
@@ -189,10 +209,17 @@ class Network:
         if not self.switches:
             return [set(terms) for terms in rows]
         names = {node: k for k, node in enumerate(self.nodes)}
-        pairs = [(names[a], names[b]) for item in self.elements for a, b in zip(item.ends, item.ends[1:], strict=False)
-                 if a is not None and b is not None]  # fmt: skip
-        pairs += [(names[item.ends[0]], names[item.ends[2]]) for item in self.elements
-                  if len(item.ends) > 2 and item.ends[0] is not None and item.ends[2] is not None]  # fmt: skip
+        pairs = [
+            (names[a], names[b])
+            for item in self.elements
+            for a, b in zip(item.ends, item.ends[1:], strict=False)
+            if a is not None and b is not None
+        ]
+        pairs += [
+            (names[item.ends[0]], names[item.ends[2]])
+            for item in self.elements
+            if len(item.ends) > 2 and item.ends[0] is not None and item.ends[2] is not None
+        ]
         labels = union(len(names), pairs)
         islands: dict[int, set[int]] = {}
         for item in self.elements:
@@ -200,9 +227,16 @@ class Network:
                 for node in item.ends:
                     if node is not None:
                         islands.setdefault(labels[names[node]], set()).add(self.columns[item.name])
-        islands = {label: {column for column in own if column not in self.dependent} for label, own in islands.items()}
-        return [set().union(terms, *(own for own in islands.values() if own & set(terms))) if r < self.rows.elements
-                or len(terms) != 1 else set(terms) for r, terms in enumerate(rows)]  # fmt: skip
+        islands = {
+            label: {column for column in own if column not in self.dependent}
+            for label, own in islands.items()
+        }
+        return [
+            set().union(terms, *(own for own in islands.values() if own & set(terms)))
+            if r < self.rows.elements or len(terms) != 1
+            else set(terms)
+            for r, terms in enumerate(rows)
+        ]
 
     def facts(self) -> dict:
         """Facts for `fvsolve check`: states, tied stores, number of eliminated unknowns, passivity.
@@ -212,44 +246,68 @@ class Network:
         """
         found, columns = self.equations(self.conducting), list(self.states)
         name = {column: item.state for column, item in self.stores.items()}
-        tied = {name[column]: " + ".join(f"{value:.6g} {name[other]}" for other, value in terms.items())
-                for column, terms in self.dependent.items()}  # fmt: skip
+        tied = {
+            name[column]: " + ".join(f"{value:.6g} {name[other]}" for other, value in terms.items())
+            for column, terms in self.dependent.items()
+        }
         greatest = None
         if 0 < len(columns) <= MOST_STATES:
             rows = self.terms(self.conducting)[: len(columns)]
             a = np.array([[row.get(column, 0.0) for column in columns] for row in rows])
             share = {column: {column: 1.0} for column in columns} | self.dependent
-            spread = np.array([[terms.get(column, 0.0) for column in columns] for terms in share.values()])
+            spread = np.array(
+                [[terms.get(column, 0.0) for column in columns] for terms in share.values()]
+            )
             q = spread.T @ np.diag([self.stores[column].value for column in share]) @ spread
             greatest = float(np.linalg.eigvalsh(q @ a + a.T @ q).max())
             size = float(np.abs(q @ a).max(initial=0.0))
             greatest = 0.0 if abs(greatest) <= ROUNDING * size else greatest
         states = [name[column] for column in columns]
-        states += [self.elements[self.numbers[item]].state for item in self.integrals if item in self.numbers]
-        return {"states": states, "tied": tied, "eliminated": len(found.unknowns),
-                "passive": None if greatest is None else greatest <= 0.0, "greatest": greatest}  # fmt: skip
+        states += [
+            self.elements[self.numbers[item]].state
+            for item in self.integrals
+            if item in self.numbers
+        ]
+        return {
+            "states": states,
+            "tied": tied,
+            "eliminated": len(found.unknowns),
+            "passive": None if greatest is None else greatest <= 0.0,
+            "greatest": greatest,
+        }
 
     def is_known_early(self, row) -> bool:
         """True if a probe reads states alone."""
         if row["side"] == codes.LOCKED or row["index"] >= self.rows.integrals:
             return True
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else [])]
+        rows = [
+            int(row["index"]),
+            *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else []),
+        ]
         return all(column < len(self.stores) for r in rows for column in self.columns_of_rows[r])
 
     def inputs_of(self, row) -> set[int]:
         """Numbers of the sources that a probe reads, also through torques of friction and heat."""
         if row["side"] == codes.LOCKED or row["index"] >= self.rows.integrals:
             return set()
-        rows = [int(row["index"]), *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else [])]
+        rows = [
+            int(row["index"]),
+            *([int(row["cell"])] if row["side"] in (codes.POWER, codes.ENTROPY) else []),
+        ]
         return self.inputs_of_columns(set().union(*(self.columns_of_rows[r] for r in rows)))
 
     def inputs_of_columns(self, columns: set[int]) -> set[int]:
         """Numbers of the sources among columns, and of those that they follow."""
-        found, ahead = set(), {column - len(self.stores) for column in columns if column >= len(self.stores)}
+        found = set()
+        ahead = {column - len(self.stores) for column in columns if column >= len(self.stores)}
         while ahead:
             j = ahead.pop()
             found.add(j)
-            more = {column - len(self.stores) for column in self.columns_followed(j) if column >= len(self.stores)}
+            more = {
+                column - len(self.stores)
+                for column in self.columns_followed(j)
+                if column >= len(self.stores)
+            }
             ahead |= more - found
         return found
 
@@ -282,21 +340,30 @@ class Network:
     def fill_node_probe(self, draft, row, node: str, angle: bool) -> None:
         """Fill the row of a probe of the potential of a node, or of its angle."""
         row["kind"], row["side"], row["scale"] = codes.NETWORK_VALUE, codes.ROW, 1.0
-        row["index"] = self.rows.integrals + list(self.integrals).index(node) if angle else self.node_row(node)
+        row["index"] = (
+            self.rows.integrals + list(self.integrals).index(node) if angle else self.node_row(node)
+        )
 
     def terms(self, mode: tuple[bool, ...]) -> list[Terms]:
         """All rows in a mode, as linear functions of the stores and sources that are not determined by others."""
         found, ties = self.equations(mode), self.ties_of(mode)
         on = {switch.name: on for switch, on in zip(self.switches, mode, strict=True)}
-        rates = {column: cleaned(substituted(found.rate(column), self.dependent)) for column in self.states}
+        rates = {
+            column: cleaned(substituted(found.rate(column), self.dependent))
+            for column in self.states
+        }
         for column, terms in ties.items():
             if column in rates:
                 rates[column] = {}
                 for other, factor in terms.items():
                     add(rates[column], rates.get(other, {}), factor)
         rows = list(rates.values())
-        rows += [found.drop(self.elements[self.numbers[name]]) if name in self.numbers else found.potential(name)
-                 for name in self.integrals]  # fmt: skip
+        rows += [
+            found.drop(self.elements[self.numbers[name]])
+            if name in self.numbers
+            else found.potential(name)
+            for name in self.integrals
+        ]
         flows = {}
         for item in self.elements:
             active = not item.switch or on[item.switch]
@@ -321,11 +388,18 @@ class Network:
     def make_arrays(self, mode: tuple[bool, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Arrays as `arrays`; values at the start that are rounding are zero."""
         rows, count = self.terms(mode), len(self.stores)
-        places, numbers, starts, factors = [], [], [], []
+        places = []
+        numbers = []
+        starts = []
+        factors = []
         rated = list(self.states)
         for r, terms in enumerate(rows):
             unit = self.stores[rated[r]].unit if r < len(rated) else 1.0
-            own = {self.states[c]: value * self.stores[c].unit / unit for c, value in terms.items() if c in self.states}
+            own = {
+                self.states[c]: value * self.stores[c].unit / unit
+                for c, value in terms.items()
+                if c in self.states
+            }
             given = {c - count: value / unit for c, value in terms.items() if c >= count}
             starts.append(self.start_of(terms, self.values, unit))
             first = 3 * (len(rows) + len(self.integrals)) + len(numbers)
@@ -348,18 +422,32 @@ class Network:
 
     def schedules_of_node(self, node: str) -> list[int]:
         """Indices of the schedules that the potential of a node reads."""
-        sources = [self.sources[column - len(self.stores)] for column in self.columns_of_rows[self.node_row(node)]
-                   if column >= len(self.stores)]  # fmt: skip
-        return [self.schedules[item.part, item.key] for item in sources if item.schedule is not None]
+        sources = [
+            self.sources[column - len(self.stores)]
+            for column in self.columns_of_rows[self.node_row(node)]
+            if column >= len(self.stores)
+        ]
+        return [
+            self.schedules[item.part, item.key] for item in sources if item.schedule is not None
+        ]
 
     def lightness(self, node: str) -> float:
         """Rate of the potential of a node per flow into it through its torque of the fluid [1/kg/m2], at least 0."""
         rows, found = self.terms(self.conducting), 0.0
-        torques = [item for item in self.sources if item.reads is not None and item.reads[0] == codes.DEVICE_INPUT]
+        torques = [
+            item
+            for item in self.sources
+            if item.reads is not None and item.reads[0] == codes.DEVICE_INPUT
+        ]
         sources = [self.columns[item.name] for item in torques if item.ends[0] == node]
         rates = dict(zip(self.states, rows, strict=False))
         for column, factor in rows[self.node_row(node)].items():
-            found = max([found, *(abs(factor * rates.get(column, {}).get(source, 0.0)) for source in sources)])
+            found = max(
+                [
+                    found,
+                    *(abs(factor * rates.get(column, {}).get(source, 0.0)) for source in sources),
+                ]
+            )
         return found
 
     def cut_sources(self, mode: tuple[bool, ...], values: np.ndarray) -> list[Element]:
@@ -367,8 +455,12 @@ class Network:
 
         values : flows of all sources
         """
-        columns = [column - len(self.stores) for relation in self.equations(mode).relations for column in relation
-                   if len(relation) == 1 and column >= len(self.stores)]  # fmt: skip
+        columns = [
+            column - len(self.stores)
+            for relation in self.equations(mode).relations
+            for column in relation
+            if len(relation) == 1 and column >= len(self.stores)
+        ]
         return [self.sources[j] for j in columns if abs(values[j]) > CUT * self.sources[j].small]
 
     def fault_in(self, mode: tuple[bool, ...], y: np.ndarray, sources: np.ndarray) -> str:
@@ -376,8 +468,11 @@ class Network:
 
         sources : present values of all sources
         """
-        changed = [item.part.partition(".")[2] for item, on, other in zip(
-            self.switches, mode, self.conducting, strict=True) if on != other]  # fmt: skip
+        changed = [
+            item.part.partition(".")[2]
+            for item, on, other in zip(self.switches, mode, self.conducting, strict=True)
+            if on != other
+        ]
         try:
             ties = self.ties_of(mode)
         except NetworkError as error:
@@ -398,12 +493,18 @@ class Network:
                 return f"{text} at once; {ANOTHER_WAY}"
         return ""
 
-    def commutated(self, mode: tuple[bool, ...], y: np.ndarray, sources: np.ndarray) -> tuple[bool, ...] | None:
+    def commutated(
+        self, mode: tuple[bool, ...], y: np.ndarray, sources: np.ndarray
+    ) -> tuple[bool, ...] | None:
         """Mode in which further diodes take over the flows that an opened switch would cut; None without one.
 
         sources : present values of all sources
         """
-        blocking = [k for k, switch in enumerate(self.switches) if switch.kind == codes.DIODE and not mode[k]]
+        blocking = [
+            k
+            for k, switch in enumerate(self.switches)
+            if switch.kind == codes.DIODE and not mode[k]
+        ]
         for count in range(1, min(len(blocking), MOST_DIODES) + 1):
             for chosen in combinations(blocking, count):
                 other = tuple(on or k in chosen for k, on in enumerate(mode))
@@ -416,8 +517,12 @@ class Network:
         """Flow of switch k in a mode and state; sources : values of all sources."""
         row, count = self.rows_of(self.switches[k].flow)[1], len(self.stores)
         terms = self.terms(mode)[row]
-        stored = self.sum_of({column: value for column, value in terms.items() if column < count}, y)
-        return stored + sum(value * sources[column - count] for column, value in terms.items() if column >= count)
+        stored = self.sum_of(
+            {column: value for column, value in terms.items() if column < count}, y
+        )
+        return stored + sum(
+            value * sources[column - count] for column, value in terms.items() if column >= count
+        )
 
     def set_diodes(self, mode: tuple[bool, ...], armed: np.ndarray) -> None:
         """Set the event flags of all diodes to a mode."""

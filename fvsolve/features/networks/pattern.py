@@ -29,7 +29,9 @@ class NetworkCouplings(FeaturePattern):
         """States on which a linear function of stores and sources of a network depends."""
         network = self.network
         own = [network.states[column] for column in columns if column in network.states]
-        return unique_states(*own, *(self.source_states(j) for j in network.inputs_of_columns(columns)))
+        return unique_states(
+            *own, *(self.source_states(j) for j in network.inputs_of_columns(columns))
+        )
 
     def row_states(self, row: int) -> np.ndarray:
         """States on which a row of a network depends."""
@@ -52,7 +54,9 @@ class NetworkCouplings(FeaturePattern):
 
     def source_states(self, j: int) -> np.ndarray:
         """States on which a source of a network depends."""
-        row, network, model = self.source_table[j], self.network, self.couplings
+        row = self.source_table[j]
+        network = self.network
+        model = self.couplings
         i = int(row["index"])
         if row["kind"] == codes.SCHEDULE_INPUT:
             return model.schedule(i)

@@ -9,7 +9,8 @@ from fvsolve.core.model.build import flags_at_start
 from fvsolve.core.model.steady_start import SteadyStart
 from fvsolve.features.networks.start import unknown_speeds
 
-TURNS, DIFFERENCE = 40, 1e-6  # Newton iterations for speeds at the start; change of a speed for differences [rad/s]
+# Newton iterations for speeds at the start; change of a speed for differences [rad/s]
+TURNS, DIFFERENCE = 40, 1e-6
 
 
 def balanced_speeds(own, draft, trial) -> dict[int, float]:
@@ -37,7 +38,9 @@ def balanced_speeds(own, draft, trial) -> dict[int, float]:
         if not found.any():
             return dict(zip(columns, map(float, speeds), strict=True))
         size = np.where(found != 0.0, np.sign(found), 1.0) * DIFFERENCE * (1.0 + np.abs(speeds))
-        slopes = np.array([(rates(speeds + change) - found) / change.sum() for change in np.diag(size)]).T
+        slopes = np.array(
+            [(rates(speeds + change) - found) / change.sum() for change in np.diag(size)]
+        ).T
         step = np.linalg.lstsq(slopes, -found, rcond=None)[0]
         for halvings in range(30):
             trial_speeds = speeds + 0.5**halvings * step
@@ -48,6 +51,8 @@ def balanced_speeds(own, draft, trial) -> dict[int, float]:
             return dict(zip(columns, map(float, speeds), strict=True))
         speeds, found = trial_speeds, after
     store = own.network.stores[columns[0]]
-    draft.fault(store.part, "no speed balances the torques on it at the start; give the key `initial_speed`")
+    draft.fault(
+        store.part, "no speed balances the torques on it at the start; give the key `initial_speed`"
+    )
     draft.check()
     return {}

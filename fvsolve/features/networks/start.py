@@ -32,14 +32,25 @@ class NetworkStart:
     """
 
     def __init__(self, own, draft, start, solved: bool = True) -> None:
-        self.own, self.draft, self.start, self.network, self.solved = own, draft, start, own.network, solved
+        self.own, self.draft, self.start, self.network, self.solved = (
+            own,
+            draft,
+            start,
+            own.network,
+            solved,
+        )
         self.values = np.zeros(len(self.network.columns))
-        self.integrating = {self.network.columns[item.name]: item for item in self.network.sources if item.state_of}
+        self.integrating = {
+            self.network.columns[item.name]: item for item in self.network.sources if item.state_of
+        }
         self.free = self.stated_values()
         self.switches = self.network.switches
         self.known = self.stores.keys() - {*self.free}
-        self.exchange = [self.fluid_exchange(item) for item in self.network.sources
-                         if item.reads is not None and item.reads[0] == codes.FLUID_HEAT]  # fmt: skip
+        self.exchange = [
+            self.fluid_exchange(item)
+            for item in self.network.sources
+            if item.reads is not None and item.reads[0] == codes.FLUID_HEAT
+        ]
         self.directions = [self.first_direction(k) for k in range(len(self.switches))]
         self.mode = tuple(self.begins_on(k) for k in range(len(self.switches)))
 
@@ -69,14 +80,22 @@ class NetworkStart:
                 known.add(column)
         for column, terms in network.dependent.items():
             unknown = [other for other in terms if other not in known]
-            rest = sum(value * self.values[other] for other, value in terms.items() if other in known)
+            rest = sum(
+                value * self.values[other] for other, value in terms.items() if other in known
+            )
             if column in known and unknown:
                 self.values[unknown[0]] = (self.values[column] - rest) / terms[unknown[0]]
                 known.add(unknown[0])
             elif column in known:
                 self.check_tie(column, float(rest), terms)
-        stores = [column for column in self.stores if column not in known and column not in network.dependent]
-        return stores + [column for column, item in self.integrating.items() if item.initial is None]
+        stores = [
+            column
+            for column in self.stores
+            if column not in known and column not in network.dependent
+        ]
+        return stores + [
+            column for column, item in self.integrating.items() if item.initial is None
+        ]
 
     def given_by_others(self, item: Element) -> float:
         """Quantity of a device, such as the torque of the fluid on a shaft, or force on a mass, at the start."""
@@ -87,9 +106,15 @@ class NetworkStart:
         name, quantity, sign = name
         k = draft.device_names.index(name)
         _, part, device = draft.devices[k]
-        own = [column for column, other in self.integrating.items() if other.state_of == ("device", name)]
+        own = [
+            column
+            for column, other in self.integrating.items()
+            if other.state_of == ("device", name)
+        ]
         flow = float(self.values[own[0]]) if own else 0.0
-        return sign * device.source_at_start(self.start, part, draft.device_table[k], quantity, flow)
+        return sign * device.source_at_start(
+            self.start, part, draft.device_table[k], quantity, flow
+        )
 
     def fluid_exchange(self, item: Element) -> tuple[int, int, float, float]:
         """Heat exchanger at the start: (column of its heat, of its thermal node, conductance [W/K], temperature [K]).
@@ -98,7 +123,8 @@ class NetworkStart:
         mixed, if the temperature of the thermal node is not stated.
         """
         case, name = self.draft.case, item.reads[1]
-        link, row = case.links[name], self.draft.tables.exchangers[exchanger_names(case).index(name)]
+        link = case.links[name]
+        row = self.draft.tables.exchangers[exchanger_names(case).index(name)]
         label, scalar = next((key, value) for key, value in case.scalars.items() if value.heat)
         place, i = case.nodes[link.from_], int(row["node"])
         value = place.scalars[label].first if label in place.scalars else scalar.initial
@@ -107,7 +133,9 @@ class NetworkStart:
         for table in (self.draft.valve_table, self.draft.pipe_table):
             inflow += float(table["flow"][table["to_node"] == i].clip(min=0.0).sum())
             inflow -= float(table["flow"][table["from_node"] == i].clip(max=0.0).sum())
-        conductance = float(row["conductance"] + row["effectiveness"] * inflow * scalar.specific_heat)
+        conductance = float(
+            row["conductance"] + row["effectiveness"] * inflow * scalar.specific_heat
+        )
         if node in self.free and place.kind == "junction":
             text = f"its temperature at the start follows from that of junction {link.from_}"
             self.draft.fault(self.stores[node].part, f"{text}; give the key `initial_temperature`")
@@ -125,7 +153,9 @@ class NetworkStart:
         if kind == "mass":
             return coordinate_of(draft, name).velocity
         k = draft.device_names.index(name)
-        return item.unit * float(draft.devices[k][2].speed_at(self.start, int(draft.device_table[k]["valve"])))
+        return item.unit * float(
+            draft.devices[k][2].speed_at(self.start, int(draft.device_table[k]["valve"]))
+        )
 
     def first_direction(self, k: int) -> float:
         """Direction of a slip between known speeds; 0 for friction that may stick, and for other switches."""
@@ -167,25 +197,37 @@ class NetworkStart:
             self.draft.fault(place, text)
         count = len(self.stores)
         for item in self.network.cut_sources(self.mode, self.values[count:]) if not faults else ():
-            self.draft.fault(item.part, "its current at the start has no way; close a switch, or leave out the flux")
+            self.draft.fault(
+                item.part,
+                "its current at the start has no way; close a switch, or leave out the flux",
+            )
         for column, terms in self.network.ties_of(self.mode).items() if not faults else ():
             self.check_tie(column, self.sum_of(terms), terms)
         self.write()
 
     def check_tie(self, column: int, value: float, terms: Terms) -> None:
         """Add a fault if a store does not have the value that the stores have to which it is tied."""
-        if fault := tie_fault(self.draft.case, self.stores, column, float(self.values[column]), value, terms):
+        if fault := tie_fault(
+            self.draft.case, self.stores, column, float(self.values[column]), value, terms
+        ):
             self.draft.fault(*fault)
 
     def let_slip(self) -> bool:
         """Let the last friction slip that sticks, where the mode has no solution; False if there is none."""
-        sticking = [k for k, on in enumerate(self.mode) if on and self.switches[k].kind == codes.FRICTION]
+        sticking = [
+            k for k, on in enumerate(self.mode) if on and self.switches[k].kind == codes.FRICTION
+        ]
         if not sticking:
             return False
         k, network = sticking[-1], self.network
         found = network.equations(network.conducting)
-        slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
-        self.directions[k], self.mode = float(np.sign(slip)) or 1.0, (*self.mode[:k], False, *self.mode[k + 1 :])
+        slip = self.sum_of(
+            substituted(found.drop(self.element(self.switches[k].drop)), network.dependent)
+        )
+        self.directions[k], self.mode = (
+            float(np.sign(slip)) or 1.0,
+            (*self.mode[:k], False, *self.mode[k + 1 :]),
+        )
         return True
 
     def sum_of(self, terms: Terms) -> float:
@@ -198,7 +240,11 @@ class NetworkStart:
 
     def rounding(self, terms: Terms) -> float:
         """Value of a linear function below which it is rounding."""
-        small = sum(abs(value) * self.stores[column].small for column, value in terms.items() if column in self.stores)
+        small = sum(
+            abs(value) * self.stores[column].small
+            for column, value in terms.items()
+            if column in self.stores
+        )
         return SLIP * (small + self.size_of(terms))
 
     def solve(self) -> list[tuple[str, str]]:
@@ -210,18 +256,30 @@ class NetworkStart:
             for column, terms in self.network.dependent.items():
                 self.values[column] = self.sum_of(terms)
             self.set_nonlinear_sources()
-            if np.all(np.abs(self.values - before) <= 1e-14 * (np.abs(before) + np.abs(self.values))):
+            if np.all(
+                np.abs(self.values - before) <= 1e-14 * (np.abs(before) + np.abs(self.values))
+            ):
                 break
         return faults
 
     def balance(self) -> list[tuple[str, str]]:
         """Set the free stores so that their rates are zero and ties of the mode hold; returns faults (place, text)."""
-        network, found, place = self.network, self.network.equations(self.mode), {c: k for k, c in enumerate(self.free)}
+        network = self.network
+        found = self.network.equations(self.mode)
+        place = {c: k for k, c in enumerate(self.free)}
         if not place:
             return []
         ties = network.ties_of(self.mode)
-        laws = [substituted(self.rate(found, column), network.dependent) for column in self.free if column not in ties]
-        laws += [{column: -1.0} | terms for column, terms in ties.items() if place.keys() & {column, *terms}]
+        laws = [
+            substituted(self.rate(found, column), network.dependent)
+            for column in self.free
+            if column not in ties
+        ]
+        laws += [
+            {column: -1.0} | terms
+            for column, terms in ties.items()
+            if place.keys() & {column, *terms}
+        ]
         matrix, given = np.zeros((len(laws), len(place))), np.zeros(len(laws))
         self.set_fluid_heat()
         for row, law in enumerate(laws):
@@ -234,7 +292,9 @@ class NetworkStart:
         sizes = np.array([self.item(column).small for column in self.free])
         largest = np.abs(matrix * sizes).max(axis=1)
         scale = 1.0 / np.where(largest > 0.0, largest, 1.0)
-        solution, _, rank, _ = np.linalg.lstsq(matrix * sizes * scale[:, None], given * scale, rcond=1e-11)
+        solution, _, rank, _ = np.linalg.lstsq(
+            matrix * sizes * scale[:, None], given * scale, rcond=1e-11
+        )
         self.values[self.free] += solution * sizes
         self.set_fluid_heat()
         moves = [abs(self.sum_of(law)) > RESTING * self.size_of(law) for law in laws]
@@ -256,9 +316,14 @@ class NetworkStart:
         laws, count = reads.shape
         labels = union(laws + count, [(k, j + laws) for k, j in np.argwhere(reads).tolist()])
         for label in dict.fromkeys(labels[k] for k in range(laws) if moves[k]):
-            items = [self.item(column) for j, column in enumerate(self.free) if labels[laws + j] == label]
+            items = [
+                self.item(column) for j, column in enumerate(self.free) if labels[laws + j] == label
+            ]
             names = listing([item.state for item in items], 4)
-            yield items[0].part, f"there is no equilibrium of {names} at the start; state its initial value"
+            yield (
+                items[0].part,
+                f"there is no equilibrium of {names} at the start; state its initial value",
+            )
 
     def rate(self, found: Elimination, column: int) -> Terms:
         """Rate of a store, or of the state of an integrating source."""
@@ -283,13 +348,19 @@ class NetworkStart:
                 self.values[network.columns[item.name]] = self.given_by_others(item)
             elif kind == codes.FRICTION_FLOW:
                 k = numbers[name]
-                slip = self.sum_of(substituted(found.drop(self.element(self.switches[k].drop)), network.dependent))
-                self.values[network.columns[item.name]] = self.directions[k] * self.friction_torque(k, slip)
+                slip = self.sum_of(
+                    substituted(found.drop(self.element(self.switches[k].drop)), network.dependent)
+                )
+                self.values[network.columns[item.name]] = self.directions[k] * self.friction_torque(
+                    k, slip
+                )
             elif kind == codes.HEAT_INPUT:
                 other = self.element(name)
                 active = not other.switch or on[other.switch]
-                drop, flow = (self.sum_of(substituted(terms, network.dependent))
-                              for terms in (found.drop(other), found.flow(other)))  # fmt: skip
+                drop, flow = (
+                    self.sum_of(substituted(terms, network.dependent))
+                    for terms in (found.drop(other), found.flow(other))
+                )
                 self.values[network.columns[item.name]] = drop * flow * active
 
     def element(self, name: str) -> Element:
@@ -305,7 +376,9 @@ class NetworkStart:
             return torque * factor if at_rest else torque
         if at_rest:
             return static
-        return kinetic + ((static - kinetic) * float(np.exp(-((slip / stribeck) ** 2))) if stribeck else 0.0)
+        return kinetic + (
+            (static - kinetic) * float(np.exp(-((slip / stribeck) ** 2))) if stribeck else 0.0
+        )
 
     def change_switch(self) -> bool:
         """Change the first switch whose state contradicts the values; False if there is none."""
@@ -316,7 +389,11 @@ class NetworkStart:
             if switch.kind == codes.DIODE:
                 flow = found.flow(self.element(switch.flow)) if on else {}
                 least = -self.own.switches[k]["rounding"]
-                changes = self.sum_of(substituted(flow, network.dependent)) < least if on else drop > switch.numbers[0]
+                changes = (
+                    self.sum_of(substituted(flow, network.dependent)) < least
+                    if on
+                    else drop > switch.numbers[0]
+                )
                 direction = 0.0
             elif switch.kind == codes.SWITCH:
                 continue
@@ -337,13 +414,18 @@ class NetworkStart:
         """Write the start to the tables and event flags of the draft."""
         draft, network = self.draft, self.network
         self.own.network = network = replace(network, values=self.values.copy(), written={})
-        self.own.source_table["start"] = [self.values[network.columns[item.name]] for item in network.sources]
+        self.own.source_table["start"] = [
+            self.values[network.columns[item.name]] for item in network.sources
+        ]
         for k, switch in enumerate(self.switches):
             flag = network.flags[switch.name]
             if switch.kind == codes.FRICTION:
                 terms = network.terms(network.conducting)[network.rows_of(switch.drop)[0]]
                 self.own.switches[k]["rounding"] = self.rounding(terms)
-                draft.start_flags |= {flag: self.directions[k] > 0.0, flag + 2: self.directions[k] < 0.0}
+                draft.start_flags |= {
+                    flag: self.directions[k] > 0.0,
+                    flag + 2: self.directions[k] < 0.0,
+                }
             else:
                 draft.start_flags[flag] = self.mode[k]
         for item, row in zip(network.booked, self.own.elements, strict=True):
@@ -354,8 +436,14 @@ class NetworkStart:
 def unknown_speeds(own, draft, start) -> list[int]:
     """Columns of stores without a stated value whose potential turns a displacement machine."""
     search, network = NetworkStart(own, draft, start, solved=False), own.network
-    rows, shafts = network.terms(network.conducting), {device.turns_with(part) for _, part, device in draft.devices}
-    read = {column for node in network.nodes if node in shafts for column in rows[network.node_row(node)]}
+    rows = network.terms(network.conducting)
+    shafts = {device.turns_with(part) for _, part, device in draft.devices}
+    read = {
+        column
+        for node in network.nodes
+        if node in shafts
+        for column in rows[network.node_row(node)]
+    }
     return [column for column in search.free if column in read]
 
 
@@ -363,7 +451,10 @@ def known_potentials(own, draft, start) -> dict[str, float]:
     """Potentials at the start of nodes that stores and schedules determine; stores of unknown value count as 0."""
     search, network = NetworkStart(own, draft, start, solved=False), own.network
     rows = network.terms(network.conducting)
-    return {node: network.start_of(rows[network.node_row(node)], search.values) for node in network.nodes}
+    return {
+        node: network.start_of(rows[network.node_row(node)], search.values)
+        for node in network.nodes
+    }
 
 
 def start_network(own, draft, start) -> list[str]:
@@ -375,7 +466,10 @@ def start_network(own, draft, start) -> list[str]:
         return []
     factors, texts = network.arrays(search.mode)[1], []
     by_name = {item.name: item for item in network.elements}
-    items = [*(network.stores[column] for column in network.states), *map(by_name.get, network.integrals)]
+    items = [
+        *(network.stores[column] for column in network.states),
+        *map(by_name.get, network.integrals),
+    ]
     for rate, item in zip(factors, items, strict=False):
         if rate != 0.0 and item is not None and item.state:
             texts.append(f"{item.state} changes by {rate * item.unit:.4g} per second")
@@ -394,4 +488,8 @@ def accelerations_of_masses(own, draft, start) -> dict[str, float]:
     network = own.network
     rates = zip(network.states, network.arrays(search.mode)[1], strict=False)
     found = ((network.stores[column], float(rate)) for column, rate in rates)
-    return {item.state_of[1]: item.unit * rate for item, rate in found if item.state_of and item.state_of[0] == "mass"}
+    return {
+        item.state_of[1]: item.unit * rate
+        for item, rate in found
+        if item.state_of and item.state_of[0] == "mass"
+    }

@@ -24,7 +24,10 @@ def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     n, o = int(pipe["cells"]), int(pipe["y"])
     for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
         base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
-        mass = model.tables.profile[base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
+        mass = (
+            model.tables.profile[base : base + n]
+            + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
+        )
         values[name] = y[at : at + n] / (mass + wall_masses(model.tables, row)[k])
     return values
 
@@ -37,14 +40,20 @@ def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
 
 def total_amount(model, q: int, y: np.ndarray) -> float:
     """Amount of scalar q in all pipes, nodes and basins [kg times the unit of the scalar]."""
-    pipes, nodes, row = model.tables.pipes, model.tables.nodes, model.tables.scalars[q]
+    pipes = model.tables.pipes
+    nodes = model.tables.nodes
+    row = model.tables.scalars[q]
     total = 0.0
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
         total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
-    total += sum(float(np.sum(basin.mass_per_depth() * basin.amounts(y)[q])) for basin in model.meshed)
+    total += sum(
+        float(np.sum(basin.mass_per_depth() * basin.amounts(y)[q])) for basin in model.meshed
+    )
     places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
-    return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
+    return total + float(
+        sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES)
+    )
 
 
 def wall_amount(model, q: int, y: np.ndarray) -> float:
@@ -52,7 +61,9 @@ def wall_amount(model, q: int, y: np.ndarray) -> float:
     name, total = list(model.case.scalars)[q], 0.0
     for k, wall in enumerate(wall_masses(model.tables, model.tables.scalars[q])):
         if wall > 0.0:
-            total += wall * model.tables.pipes[k]["dx"] * float(np.sum(pipe_values(model, k, y)[name]))
+            total += (
+                wall * model.tables.pipes[k]["dx"] * float(np.sum(pipe_values(model, k, y)[name]))
+            )
     return float(total)
 
 
@@ -82,19 +93,33 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
             by_place[place] = by_place.get(place, 0.0) + flow
         turnover = float(np.sum(np.abs(flows))) + abs(decayed) + abs(heated) + abs(formed)
         turnover = max(abs(initial), abs(final), turnover)
-        in_wall = {key: wall_amount(model, q, state) for key, state in (("initial", model.start), ("final", y))}
+        in_wall = {
+            key: wall_amount(model, q, state)
+            for key, state in (("initial", model.start), ("final", y))
+        }
         in_fluid = {"initial": initial - in_wall["initial"], "final": final - in_wall["final"]}
         ledgers[name] = {
-            "initial": initial, "final": final, "inflow": float(flows[0].sum()),
-            "outflow": float(0.0 - flows[1].sum()), "decayed": decayed,
-            **({"fluid": in_fluid, "wall": in_wall} if wall_masses(model.tables, row).any() else {}),
+            "initial": initial,
+            "final": final,
+            "inflow": float(flows[0].sum()),
+            "outflow": float(0.0 - flows[1].sum()),
+            "decayed": decayed,
+            **(
+                {"fluid": in_fluid, "wall": in_wall} if wall_masses(model.tables, row).any() else {}
+            ),
             **({"reacted": formed} if name in reacting(model.case) else {}),
-            "by_node": {place: float(flow.sum()) for place, flow in by_place.items() if flow.sum() != 0.0},
-            "nodes": {place: {"inflow": float(x), "outflow": float(0.0 - y)}
-                      for place, (x, y) in by_place.items() if x != 0.0 or y != 0.0},
+            "by_node": {
+                place: float(flow.sum()) for place, flow in by_place.items() if flow.sum() != 0.0
+            },
+            "nodes": {
+                place: {"inflow": float(x), "outflow": float(0.0 - y)}
+                for place, (x, y) in by_place.items()
+                if x != 0.0 or y != 0.0
+            },
             **({"heated": float(heated), "heat": heat} if row["specific_heat"] > 0.0 else {}),
-            "remainder": remainder, "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
-        }  # fmt: skip
+            "remainder": remainder,
+            "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
+        }
     return ledgers
 
 
@@ -130,4 +155,7 @@ def heat_by_part(model, ledger: np.ndarray, q: int) -> dict[str, float]:
             count = int(row["cells"]) if tables.scalars[q]["by_cell"] else 1
             heat[pipe.name] = float(rows[row["heat"] :][:count].sum())
     exchangers = rows[rows.size - len(tables.exchangers) :]
-    return heat | {name: float(value) for name, value in zip(exchanger_names(model.case), exchangers, strict=True)}
+    return heat | {
+        name: float(value)
+        for name, value in zip(exchanger_names(model.case), exchangers, strict=True)
+    }

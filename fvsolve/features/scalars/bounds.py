@@ -18,7 +18,9 @@ def scalar_bounds(model, q: int):
     limits = row["least"], row["greatest"]
     for pipe, wall in zip(tables.pipes, wall_masses(tables, row), strict=True):
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
-        states, wave, masses = row["y"] + pipe["cell"] + k, pipe["y"] + k, tables.profile[pipe["center"] + k] + wall
+        states = row["y"] + pipe["cell"] + k
+        wave = pipe["y"] + k
+        masses = tables.profile[pipe["center"] + k] + wall
         yield bound_rows(states, wave, wave + n, masses, 1.0 / pipe["speed"], *limits)
     places = tables.integers[row["places"] : row["places"] + len(tables.nodes)]
     for node, place in zip(tables.nodes, places, strict=True):
@@ -28,5 +30,9 @@ def scalar_bounds(model, q: int):
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
-        depth = (int(basin.row["y"]) + np.arange(basin.n), basin.at_rest()) if basin.deep else (NO_STATE, 1.0)
+        depth = (
+            (int(basin.row["y"]) + np.arange(basin.n), basin.at_rest())
+            if basin.deep
+            else (NO_STATE, 1.0)
+        )
         yield bound_rows(states, depth[0], NO_STATE, depth[1], 1.0, *limits)

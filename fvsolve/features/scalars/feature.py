@@ -47,7 +47,9 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
         part = {**case.places, **case.nodes}.get(probe.name) if probe.part == "nodes" else part
         if probe.quantity not in case.scalars or probe.part == "sections" or is_in_network(part):
             return False
-        if probe.part == "nodes" and (probe.name in case.lumped or (probe.name in case.meshes and probe.point is None)):
+        if probe.part == "nodes" and (
+            probe.name in case.lumped or (probe.name in case.meshes and probe.point is None)
+        ):
             return False
         row["scalar"] = draft.scalar_index[probe.quantity]
         if probe.point is not None:
@@ -69,7 +71,11 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
             of_scalar = fill_probes(draft, [place])[0]
             for key in ("side", "cell", "count", "weights"):
                 row[key] = of_scalar[key]
-            row["kind"], row["head"], row["scalar"] = rec.LOCAL_AFFINITY, of_scalar["kind"], of_scalar["index"]
+            row["kind"], row["head"], row["scalar"] = (
+                rec.LOCAL_AFFINITY,
+                of_scalar["kind"],
+                of_scalar["index"],
+            )
         else:
             row["kind"], row["side"] = rec.REACTION_VALUE, REACTION_QUANTITIES.index(probe.quantity)
         row["index"] = list(draft.case.reactions).index(probe.name.removeprefix("reactions."))
@@ -79,7 +85,9 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     def terms(self, model, cast) -> Iterator[tuple[str, RhsTerms]]:
         linear, tables = cast.family == "linear", model.tables
         heated = bool((tables.scalars["specific_heat"] > 0.0).any())
-        if any(row["kind"] in SENSED for feature in model.features for row in feature.probe_rows()[0]):
+        if any(
+            row["kind"] in SENSED for feature in model.features for row in feature.probe_rows()[0]
+        ):
             if heated:
                 yield "solved", terms.HEAT_FOR_EVENTS[linear]
             yield "solved", terms.VALUES_FOR_EVENTS
@@ -107,7 +115,9 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     def modes(self, model) -> list:
         from fvsolve.features.scalars.modes import basin_scalar_modes, pipe_scalar_modes
 
-        return pipe_scalar_modes(model) + basin_scalar_modes(model) + reactions.reaction_modes(model)
+        return (
+            pipe_scalar_modes(model) + basin_scalar_modes(model) + reactions.reaction_modes(model)
+        )
 
     def weigh(self, model, weights: np.ndarray, y: np.ndarray) -> None:
         from fvsolve.features.scalars.weights import weigh_scalars
@@ -133,7 +143,8 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     def bounds(self, model) -> list[tuple[np.ndarray, np.ndarray]]:
         from fvsolve.features.scalars.bounds import scalar_bounds
 
-        reacting = reactions.reacting(model.case)  # limits of single amounts would break sums that reactions keep
+        # limits of single amounts would break sums that reactions keep
+        reacting = reactions.reacting(model.case)
         names = [(q, name) for q, name in enumerate(model.case.scalars) if name not in reacting]
         return [row for q, _ in names for row in scalar_bounds(model, q)]
 
@@ -155,5 +166,8 @@ class ScalarRun(FeatureRun):
         model = self.run_data.model
         k = model.tables.heat_sources[index]["valve"]
         end = "from_node" if out[model.layout["valve"] + k] < 0.0 else "to_node"
-        names = {"part": model.valve_names[k], "name": model.node_names[model.tables.valves[k][end]]}
+        names = {
+            "part": model.valve_names[k],
+            "name": model.node_names[model.tables.valves[k][end]],
+        }
         return names | {"rise": GREATEST_RISE}

@@ -23,7 +23,10 @@ UNBOUNDED = 1e100  # greatest value of a scalar that reactions form
 
 def lower_scalars(draft) -> None:
     """Fill the table of scalars; add states for their amounts and schedules for their values."""
-    case, pipes, nodes, basins = draft.case, draft.pipe_table, draft.node_table, draft.basin_table
+    case = draft.case
+    pipes = draft.pipe_table
+    nodes = draft.node_table
+    basins = draft.basin_table
     draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
@@ -41,10 +44,17 @@ def lower_scalars(draft) -> None:
         row["least"], row["greatest"] = bounds(case, name)
         if scalar.decay > 0.0:
             row["loss"] = sum(draft.scalar_table["losses"])
-            row["losses"] = 1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+            row["losses"] = (
+                1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+            )
         row["wall_masses"] = len(draft.floats)
-        draft.floats += [*(draft.fluid.density * pipe["area"] * (case.retardation(link, name) - 1.0)
-                           for link, pipe in zip(draft.pipe_names, pipes, strict=True)), 0.0]  # fmt: skip
+        draft.floats += [
+            *(
+                draft.fluid.density * pipe["area"] * (case.retardation(link, name) - 1.0)
+                for link, pipe in zip(draft.pipe_names, pipes, strict=True)
+            ),
+            0.0,
+        ]
         basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
         if scalar.heat:
             row["specific_heat"], row["zero"] = scalar.specific_heat, scalar.zero
@@ -59,15 +69,20 @@ def lower_scalars(draft) -> None:
 
 def reserve_scalars(draft) -> None:
     """Reserve the arrays of scalars and heat exchangers; rows of the ledger: inflow through nodes, decay, heat."""
-    scalars, nodes, pipes = len(draft.scalar_table), len(draft.node_table), len(draft.pipe_table)
+    scalars = len(draft.scalar_table)
+    nodes = len(draft.node_table)
+    pipes = len(draft.pipe_table)
     exchangers, sizes = len(draft.exchanger_table), draft.sizes
     sizes.ledger("gain", scalars * nodes)
     sizes.ledger("loss", sum(draft.scalar_table["losses"]))
     sizes.ledger("heat", draft.heat_rows + exchangers)
     for name, size in (
-        ("value", scalars * nodes), ("edge", 2 * pipes * scalars), ("carried", 2 * pipes * scalars),
-        ("scalar_inflow", scalars * nodes), ("exchange", 2 * exchangers),
-    ):  # fmt: skip
+        ("value", scalars * nodes),
+        ("edge", 2 * pipes * scalars),
+        ("carried", 2 * pipes * scalars),
+        ("scalar_inflow", scalars * nodes),
+        ("exchange", 2 * exchangers),
+    ):
         sizes.out(name, size)
     if scalars:
         sizes.need_scratch(lambda places: 5 * places + 64)
@@ -80,18 +95,30 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
     heat_from : names of parts, or "all"; by_cell : True for a row of the ledger for each cell, else for each pipe
     Adds a fault for a part that dissipates nothing in the fluid.
     """
-    case, cut, rows = draft.case, pieces_of(draft.case.raw), []
-    owners = {link: name for name, part in [*case.nodes.items(), *case.links.items()] for link in part.inner(name)[1]}
+    case = draft.case
+    cut = pieces_of(draft.case.raw)
+    rows = []
+    owners = {
+        link: name
+        for name, part in [*case.nodes.items(), *case.links.items()]
+        for link in part.inner(name)[1]
+    }
     unused = set() if heat_from == "all" else {*heat_from}
     named = {name: whole for whole in unused for name in cut.get(whole, [whole])}
-    devices = {name: (k if calls.hook_of(device.law, "power") is not None else -1, device.dissipates(part))
-               for k, (name, part, device) in enumerate(draft.devices)}  # fmt: skip
+    devices = {
+        name: (k if calls.hook_of(device.law, "power") is not None else -1, device.dissipates(part))
+        for k, (name, part, device) in enumerate(draft.devices)
+    }
 
     def heats(name: str) -> bool:
         unused.discard(named.get(name))
         return heat_from == "all" or name in named
 
-    restrictions = [(link, name) for link, _, lowering in rows_in(case, "valve") for name in lowering.row_names(link)]
+    restrictions = [
+        (link, name)
+        for link, _, lowering in rows_in(case, "valve")
+        for name in lowering.row_names(link)
+    ]
     for k, (link, name) in enumerate(restrictions):
         device, dissipates = devices.get(name, (-1, True))
         if dissipates and (heats(owners.get(link, link)) or heats(link)):
@@ -102,7 +129,9 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
         if heats(name):
             if case.links[name].friction.model == "unsteady" and not case.law.linear:
                 text = f'unsteady friction of {name} heats the fluid under law = "linear" only'
-                draft.fault(f"scalars.{scalar}.heat_from", f"{text}; expected quasi-steady friction")
+                draft.fault(
+                    f"scalars.{scalar}.heat_from", f"{text}; expected quasi-steady friction"
+                )
             row["heat"] = count
             count += int(row["cells"]) if by_cell else 1
     draft.heat_rows = count
@@ -146,7 +175,9 @@ def stated_range(case, name: str) -> tuple[float, float]:
 def scale_scalars(draft) -> None:
     """Set steady masses per length in pipes, and the size of a small deviation of scalar amounts in pipes and nodes."""
     profile, rho = draft.tables.profile, draft.fluid.density
-    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) and draft.case.law.linear else ()):
+    for k, row in enumerate(
+        draft.pipe_table if len(draft.case.scalars) and draft.case.law.linear else ()
+    ):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
     scale = np.array(draft.scale)
@@ -165,7 +196,10 @@ def typical_value(case, name: str) -> float:
     """Size of the values of a scalar: the greatest magnitude in the case; without any that of scalars that react."""
     own = max(map(abs, stated_range(case, name)))
     if own == 0.0 and name in (names := reacting(case)):
-        amounts = [max(map(abs, stated_range(case, other))) * molar_factor(case.scalars[other]) for other in names]
+        amounts = [
+            max(map(abs, stated_range(case, other))) * molar_factor(case.scalars[other])
+            for other in names
+        ]
         own = max(amounts) / molar_factor(case.scalars[name])
     return own or 1.0
 
@@ -175,18 +209,24 @@ def indices_at_nodes(draft, row) -> np.ndarray:
 
     It is -1 at a node with neither.
     """
-    return np.array(draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int)
+    return np.array(
+        draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int
+    )
 
 
 def start_amounts(draft, y: np.ndarray) -> None:
     """Write the amounts of all scalars in pipes, tanks and chambers at the start into the state vector y."""
     case, profile = draft.case, draft.tables.profile
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
-        for pipe, mesh, wall in zip(draft.pipe_table, draft.meshes, wall_masses(draft.tables, row), strict=True):
+        for pipe, mesh, wall in zip(
+            draft.pipe_table, draft.meshes, wall_masses(draft.tables, row), strict=True
+        ):
             cells = np.arange(mesh.cells)
             value = case.links[mesh.name].scalars.get(name, scalar.initial)
             y[row["y"] + pipe["cell"] + cells] = value * (profile[pipe["center"] + cells] + wall)
-        for node, part, place in zip(draft.node_table, case.places.values(), indices_at_nodes(draft, row), strict=True):
+        for node, part, place in zip(
+            draft.node_table, case.places.values(), indices_at_nodes(draft, row), strict=True
+        ):
             if node["kind"] in STORES:
                 value = part.scalars[name].first if name in part.scalars else scalar.initial
                 y[place] = value * node["mass"]

@@ -14,7 +14,8 @@ from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
 from fvsolve.parts import law_elements as codes
 
-LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
+# cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
+LIMITER_CELLS = 2
 
 
 class ScalarPattern(FeaturePattern):
@@ -40,7 +41,9 @@ class ScalarPattern(FeaturePattern):
     def temperature(self):
         """Couplings of the scalar that is the temperature of the fluid."""
         model = self.couplings.model
-        return ScalarCouplings(self.couplings, model, int(np.argmax(model.tables.scalars["specific_heat"])))
+        return ScalarCouplings(
+            self.couplings, model, int(np.argmax(model.tables.scalars["specific_heat"]))
+        )
 
 
 class ScalarCouplings:
@@ -68,9 +71,12 @@ class ScalarCouplings:
             self.through[i] += flow
             self.through[j] += flow
         self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
-        self.heat_end = int(model.layout["extent"] - model.layout["supply"])  # rows of the ledger up to that of heat
+        # rows of the ledger up to that of heat
+        self.heat_end = int(model.layout["extent"] - model.layout["supply"])
         for exchanger in self.tables.exchangers if self.heated else ():
-            self.through[exchanger["node"]].append(with_slot(of.features, codes.SLOT).row_states(exchanger["place"]))
+            self.through[exchanger["node"]].append(
+                with_slot(of.features, codes.SLOT).row_states(exchanger["place"])
+            )
         for source in self.tables.heat_sources if self.heated else ():
             for i in ends_of(of.valves[source["valve"]]):
                 self.through[i] += self.heat_states(source)
@@ -105,7 +111,9 @@ class ScalarCouplings:
         first = self.of.size + self.heat_end - len(self.tables.exchangers)
         for k, exchanger in enumerate(self.tables.exchangers):
             i = exchanger["node"]
-            yield pairs_of(unique_states(first + k), unique_states(self.values[i], *self.through[i]))
+            yield pairs_of(
+                unique_states(first + k), unique_states(self.values[i], *self.through[i])
+            )
 
     def own(self, i: int) -> list:
         """States that set the scalar's value at node i, a storing node or one of a feature; else an empty list."""
@@ -122,7 +130,9 @@ class ScalarCouplings:
     def edge(self, pipe, right: int) -> list[np.ndarray]:
         """States of amounts and waves in the cells that give the value at an end of a pipe; right : 1 for `to`."""
         n = int(pipe["cells"])
-        cells = np.arange(n)[::-1][: LIMITER_CELLS + 1] if right else np.arange(n)[: LIMITER_CELLS + 1]
+        cells = (
+            np.arange(n)[::-1][: LIMITER_CELLS + 1] if right else np.arange(n)[: LIMITER_CELLS + 1]
+        )
         return [self.row["y"] + pipe["cell"] + cells, pipe["y"] + cells, pipe["y"] + n + cells]
 
     def mixed_values(self) -> list[np.ndarray]:
@@ -139,7 +149,9 @@ class ScalarCouplings:
             enter[group[i]] += self.own(j)
             enter[group[j]] += self.own(i)
         joined = [unique_states(*parts) for parts in enter]
-        return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
+        return [
+            joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))
+        ]
 
     def pairs(self) -> Iterator[Pairs]:
         """Yield the couplings of the scalar in pipes and nodes; some couplings of a state with itself are missing."""
@@ -183,7 +195,11 @@ class ScalarCouplings:
         cells, at = np.arange(n), self.row["y"] + pipe["cell"]
         for offset in range(-self.wide, self.wide + 1):
             here = cells[(cells + offset >= 0) & (cells + offset < n)]
-            for first in (pipe["y"], pipe["y"] + n, *([at] if abs(offset) <= LIMITER_CELLS else [])):
+            for first in (
+                pipe["y"],
+                pipe["y"] + n,
+                *([at] if abs(offset) <= LIMITER_CELLS else []),
+            ):
                 yield at + here, first + here + offset
 
     def close(self, pipe, right: int) -> np.ndarray:
@@ -211,19 +227,31 @@ def reaction_pairs(couplings, model) -> Iterator[Pairs]:
     These are amounts of scalars and the mass at the same place.
     """
     tables, scalars = model.tables, list(model.case.scalars)
-    ledger = couplings.size + len(couplings.nodes) * (1 + len(scalars)) + int(sum(tables.scalars["losses"]))
+    ledger = (
+        couplings.size
+        + len(couplings.nodes) * (1 + len(scalars))
+        + int(sum(tables.scalars["losses"]))
+    )
     stores = np.flatnonzero(np.isin(tables.nodes["kind"], STORES))
     for row, reaction in zip(tables.reactions, model.case.reactions.values(), strict=True):
-        changed = [scalars.index(name) for name in reaction.sides.names if reaction.sides.change(name) != 0.0]
+        changed = [
+            scalars.index(name)
+            for name in reaction.sides.names
+            if reaction.sides.change(name) != 0.0
+        ]
         read = [scalars.index(name) for name in names_read(reaction, model.case.scalars)]
         first, single = ledger + row["extent"], row["extents"] == 1
         for entries, masses, amounts in reacting_places(couplings, model, stores):
-            rows = [amounts(q) for q in changed] + [np.full(entries.size, first) if single else first + entries]
+            rows = [amounts(q) for q in changed] + [
+                np.full(entries.size, first) if single else first + entries
+            ]
             for states in [*(amounts(q) for q in read), *masses]:
                 yield from ((here, states) for here in rows)
 
 
-def reacting_places(couplings, model, stores: np.ndarray) -> Iterator[tuple[np.ndarray, list, Callable]]:
+def reacting_places(
+    couplings, model, stores: np.ndarray
+) -> Iterator[tuple[np.ndarray, list, Callable]]:
     """Yield groups of places of reactions: their numbers, states of the masses there, states of amounts of a scalar.
 
     stores : numbers of nodes with storage

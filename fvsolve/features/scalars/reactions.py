@@ -43,7 +43,11 @@ def lower_reactions(draft) -> None:
             row["program"] = draft.schedules.add_program(program, located=False)
         row["forward"], row["reverse"] = reaction.forward or 0.0, reaction.reverse or 0.0
         row["thermal"] = GAS_CONSTANT * case.properties.temperature
-        row["scalars"], row["count"], row["data"] = len(draft.integers), len(names), len(draft.floats)
+        row["scalars"], row["count"], row["data"] = (
+            len(draft.integers),
+            len(names),
+            len(draft.floats),
+        )
         for name in names:
             q = list(case.scalars).index(name)
             draft.integers.append(q)
@@ -69,9 +73,14 @@ def reacting(case, side: str = "") -> set[str]:
     """
     sign, names = {"right": 1.0, "left": -1.0, "": 0.0}[side], set()
     for reaction in case.reactions.values():
-        sides, both = reaction.sides, reaction.rate is not None or bool(reaction.reverse) or not side
+        sides = reaction.sides
+        both = reaction.rate is not None or bool(reaction.reverse) or not side
         changes = {name: sides.change(name) for name in sides.names}
-        names |= {name for name, change in changes.items() if change * sign > 0.0 or (both and change != 0.0)}
+        names |= {
+            name
+            for name, change in changes.items()
+            if change * sign > 0.0 or (both and change != 0.0)
+        }
     return names
 
 
@@ -79,18 +88,32 @@ def names_read(reaction: Reaction, scalars: dict[str, Any]) -> list[str]:
     """Names of the scalars on which the rate of a reaction depends; scalars : those of the case."""
     if reaction.rate is None:
         sides = reaction.sides
-        return [*sides.left, *(name for name in sides.right if reaction.reverse and name not in sides.left)]
+        return [
+            *sides.left,
+            *(name for name in sides.right if reaction.reverse and name not in sides.left),
+        ]
     names = list(scalars)
-    return list(dict.fromkeys(names[int(number)] for code, number in reaction.program(scalars).steps if code == INPUT))
+    return list(
+        dict.fromkeys(
+            names[int(number)] for code, number in reaction.program(scalars).steps if code == INPUT
+        )
+    )
 
 
 def rate_at(reaction: Reaction, case, values: dict[str, float]) -> float:
     """Rate of a reaction [mol/m3/s] at values of scalars in their own units; it may not be finite."""
-    amounts = {name: value * (molar_factor(case.scalars[name]) or 1.0) for name, value in values.items()}
+    amounts = {
+        name: value * (molar_factor(case.scalars[name]) or 1.0) for name, value in values.items()
+    }
     if reaction.rate is not None:
-        return reaction.program(case.scalars).value(0.0, inputs=tuple(amounts[name] for name in case.scalars))
+        return reaction.program(case.scalars).value(
+            0.0, inputs=tuple(amounts[name] for name in case.scalars)
+        )
     sides, result = reaction.sides, 0.0
-    for constant, side in ((reaction.forward, sides.left), (-(reaction.reverse or 0.0), sides.right)):
+    for constant, side in (
+        (reaction.forward, sides.left),
+        (-(reaction.reverse or 0.0), sides.right),
+    ):
         result += constant * math.prod(amounts[name] ** order for name, order in side.items())
     return result
 
@@ -104,7 +127,13 @@ def start_values(case, kinds, meshes: list, basins: list) -> Iterator[tuple[str,
     for (name, part), kind in zip(case.places.items(), kinds, strict=True):
         if kind in (rec.TANK, rec.CHAMBER):
             stated = part.scalars
-            yield name, {key: stated[key].first if key in stated else item.initial for key, item in scalars.items()}
+            yield (
+                name,
+                {
+                    key: stated[key].first if key in stated else item.initial
+                    for key, item in scalars.items()
+                },
+            )
     for mesh in meshes:
         stated = case.links[mesh.name].scalars
         yield mesh.name, {key: stated.get(key, item.initial) for key, item in scalars.items()}
@@ -112,26 +141,42 @@ def start_values(case, kinds, meshes: list, basins: list) -> Iterator[tuple[str,
         if not basin.scalars:
             continue
         stated = case.nodes[basin.name].scalars
-        cells = {key: means(samples(stated[key], basin.mesh)) if key in stated else np.full(basin.n, item.initial)
-                 for key, item in scalars.items()}  # fmt: skip
-        extremes = {int(choose(values)) for values in cells.values() for choose in (np.argmin, np.argmax)}
+        cells = {
+            key: means(samples(stated[key], basin.mesh))
+            if key in stated
+            else np.full(basin.n, item.initial)
+            for key, item in scalars.items()
+        }
+        extremes = {
+            int(choose(values)) for values in cells.values() for choose in (np.argmin, np.argmax)
+        }
         for i in sorted(extremes):
             x, y = basin.mesh.centre[i]
-            yield f"{basin.name} at x = {x:.6g} m, y = {y:.6g} m", {key: float(cells[key][i]) for key in cells}
+            yield (
+                f"{basin.name} at x = {x:.6g} m, y = {y:.6g} m",
+                {key: float(cells[key][i]) for key in cells},
+            )
 
 
 def check_start(draft, name: str, reaction: Reaction) -> None:
     """Add a fault if the rate of a reaction is not finite at the start, with the first such place and its values."""
-    for place, values in start_values(draft.case, draft.node_table["kind"], draft.meshes, draft.meshed):
+    for place, values in start_values(
+        draft.case, draft.node_table["kind"], draft.meshes, draft.meshed
+    ):
         try:
             finite = math.isfinite(rate_at(reaction, draft.case, values))
         except (OverflowError, ZeroDivisionError):
             finite = False
         if not finite:
             key = "rate" if reaction.rate is not None else "forward"
-            read = [f"{item} = {values[item]:g}" for item in names_read(reaction, draft.case.scalars)]
+            read = [
+                f"{item} = {values[item]:g}" for item in names_read(reaction, draft.case.scalars)
+            ]
             text = f"{reaction.law} is not finite at the start in {place}, where {listing(read)}"
-            draft.fault(f"reactions.{name}.{key}", f"{text}; expected a finite rate, or values above 0 there")
+            draft.fault(
+                f"reactions.{name}.{key}",
+                f"{text}; expected a finite rate, or values above 0 there",
+            )
             return
 
 
@@ -141,7 +186,9 @@ def reaction_facts(model) -> dict[str, dict[str, Any]]:
         return {}
     out = model.evaluate(model.case.numerics.start, model.start)[1]
     facts, rho = {}, model.case.properties.density
-    for row, (name, reaction) in zip(model.tables.reactions, model.case.reactions.items(), strict=True):
+    for row, (name, reaction) in zip(
+        model.tables.reactions, model.case.reactions.items(), strict=True
+    ):
         at = int(model.layout["extent"] + row["extent"])
         flow = float(np.sum(out[at : at + int(row["extents"])])) / rho
         facts[name] = {"equation": reaction.equation, "law": reaction.law, "rate": flow}
@@ -154,7 +201,11 @@ def reaction_modes(model) -> list[tuple[str, np.ndarray]]:
     The eigenvalues are those of the slopes of all rates by the extents of all reactions.
     """
     case, modes = model.case, []
-    places = start_values(case, model.tables.nodes["kind"], model.pipes, model.meshed) if case.reactions else ()
+    places = (
+        start_values(case, model.tables.nodes["kind"], model.pipes, model.meshed)
+        if case.reactions
+        else ()
+    )
     for place, values in places:
         scale = max(abs(value) for value in values.values()) or 1.0
         slopes, step = np.zeros((len(case.reactions),) * 2), 1e-6 * scale
@@ -163,6 +214,8 @@ def reaction_modes(model) -> list[tuple[str, np.ndarray]]:
                 moved, sides = dict(values), other.sides
                 for name in sides.names:
                     moved[name] += step * sides.change(name) / molar_factor(case.scalars[name])
-                slopes[k, other_k] = (rate_at(reaction, case, moved) - rate_at(reaction, case, values)) / step
+                slopes[k, other_k] = (
+                    rate_at(reaction, case, moved) - rate_at(reaction, case, values)
+                ) / step
         modes.append((f"{place}.{next(iter(case.reactions))}", np.linalg.eigvals(slopes)))
     return modes

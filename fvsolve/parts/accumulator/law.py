@@ -32,14 +32,18 @@ def gas_state(st, floats, node, at, y):
     stiffness : dp/dm, rise of pressure per mass of fluid
     st : settings of the model; node : row of the node; floats[at:] : parameters of the accumulator
     """
-    n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK_STIFFNESS], y - floats[at + EMPTY_MASS]
+    n = floats[at + EXPONENT]
+    neck = floats[at + NECK_STIFFNESS]
+    above_empty = y - floats[at + EMPTY_MASS]
     if st["law"] != LAW_LINEAR:
         return gas_state_dense(st, floats, node, at, y)
     if neck > 0.0 and above_empty < 0.0:
         squeezed = y if floats[at + EMPTY_MASS] > 0.0 else above_empty
         base = 0.0 if floats[at + EMPTY_MASS] > 0.0 else floats[at + EMPTY_PRESSURE]
         return full_bladder_gas(floats, node, at), base + neck * squeezed, neck
-    p, gas, inflow = node["pressure"], floats[at + GAS_VOLUME], y
+    p = node["pressure"]
+    gas = floats[at + GAS_VOLUME]
+    inflow = y
     if neck > 0.0 and floats[at + EMPTY_MASS] > 0.0:  # the bladder fills its vessel at the start
         p, inflow = p + floats[at + EMPTY_PRESSURE], above_empty
     ratio = max(1e-9, 1.0 - inflow / (st["rho"] * gas))
@@ -62,13 +66,18 @@ def full_bladder_gas(floats, node, at):
 @njit
 def gas_state_dense(st, floats, node, at, y):
     """Results of `gas_state` under density laws other than `linear`, with its arguments."""
-    n, gas, total, neck = (
-        floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + NECK_STIFFNESS],
-    )  # fmt: skip
-    p0, mass, empty = node["pressure"], node["mass"] + y, floats[at + EMPTY_MASS]
+    n = floats[at + EXPONENT]
+    gas = floats[at + GAS_VOLUME]
+    total = floats[at + TOTAL_VOLUME]
+    neck = floats[at + NECK_STIFFNESS]
+    p0 = node["pressure"]
+    mass = node["mass"] + y
+    empty = floats[at + EMPTY_MASS]
     if neck > 0.0 and y < empty:
         expansion = full_bladder_gas(floats, node, at)
-        p = pressure_of_log(st, floats, 0.0, log(mass / (st["rho"] * (total - gas * exp(expansion)))))
+        p = pressure_of_log(
+            st, floats, 0.0, log(mass / (st["rho"] * (total - gas * exp(expansion))))
+        )
         if empty > 0.0 and y == 0.0:
             p = p0
         return expansion, p - p0, 1.0 / (log_density(st, floats, p)[1] * mass)
@@ -135,14 +144,23 @@ def gas_energy(p, gas, n, ambient, u):
 @njit
 def accumulator_energy(st, floats, node, at, y):
     """Stored energy of an accumulator minus that at the start [J]; arguments as for `gas_state`."""
-    n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + EMPTY_MASS], node["pressure"]
+    n = floats[at + EXPONENT]
+    gas = floats[at + GAS_VOLUME]
+    empty = floats[at + EMPTY_MASS]
+    p0 = node["pressure"]
     neck = floats[at + NECK_STIFFNESS] if st["law"] == LAW_LINEAR else 0.0
-    first = p0 + floats[at + EMPTY_PRESSURE] if floats[at + NECK_STIFFNESS] > 0.0 and empty > 0.0 else p0
+    first = (
+        p0 + floats[at + EMPTY_PRESSURE]
+        if floats[at + NECK_STIFFNESS] > 0.0 and empty > 0.0
+        else p0
+    )
     u, change, _ = gas_state(st, floats, node, at, y)
     energy = gas_energy(first, gas, n, st["ambient"], u)
     if st["law"] != LAW_LINEAR:
         total = floats[at + TOTAL_VOLUME]
-        energy += vessel_energy(st, floats, node, node["mass"] + y, total - gas * exp(u), p0 + change)
+        energy += vessel_energy(
+            st, floats, node, node["mass"] + y, total - gas * exp(u), p0 + change
+        )
         return energy - vessel_energy(st, floats, node, node["mass"], total - gas, p0)
     inflow, p = min(y, empty), p0
     if empty <= 0.0:

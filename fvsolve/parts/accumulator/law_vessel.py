@@ -19,7 +19,12 @@ from math import acos, cos, exp, expm1, log, log1p, pi, sin, sqrt
 
 from fvsolve.core.kernels.density import density, enthalpy, log_density, pressure_of_enthalpy
 from fvsolve.core.kernels.dtypes import LAW_LINEAR
-from fvsolve.core.kernels.network_energy import height_pressure, level_moment, vessel_energy, vessel_power
+from fvsolve.core.kernels.network_energy import (
+    height_pressure,
+    level_moment,
+    vessel_energy,
+    vessel_power,
+)
 from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.core.kernels.tanks import level_of_volume
 from fvsolve.jit import njit
@@ -74,7 +79,9 @@ def cylinder_depths(floats, at, z):
     Depths are in radii, relative to the lowest points of the ends; the upper depth may be negative.
     z : level above the lowest point [m]; floats[at:] : parameters of the shape, see `shape_numbers`
     """
-    radius, length, slope = floats[at + FIRST_SIZE], floats[at + SECOND_SIZE], floats[at + THIRD_SIZE]
+    radius = floats[at + FIRST_SIZE]
+    length = floats[at + SECOND_SIZE]
+    slope = floats[at + THIRD_SIZE]
     tangent = sin(slope) / cos(slope)
     d = z / (radius * cos(slope))
     return d, d - length / radius * tangent, tangent
@@ -94,7 +101,9 @@ def volume_below(floats, at, z):
     if kind == INCLINED_CYLINDER:
         d, upper, tangent = cylinder_depths(floats, at, z)
         return first * first * first / tangent * (segment_integral(d) - segment_integral(upper))
-    rows, o, k = int(first), at + NUMBER_COUNT, 0
+    rows = int(first)
+    o = at + NUMBER_COUNT
+    k = 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
     low, high = floats[o + rows + k], floats[o + rows + k + 1]
@@ -116,7 +125,9 @@ def surface_at(floats, at, z):
     if kind == INCLINED_CYLINDER:
         d, upper, _ = cylinder_depths(floats, at, z)
         return first * first * (segment(d) - segment(upper)) / sin(floats[at + THIRD_SIZE])
-    rows, o, k = int(first), at + NUMBER_COUNT, 0
+    rows = int(first)
+    o = at + NUMBER_COUNT
+    k = 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
     low, high = floats[o + rows + k], floats[o + rows + k + 1]
@@ -131,13 +142,16 @@ def moment_below(floats, at, z):
     if kind == PRISM:
         return 0.5 * first * z * z
     if kind == HORIZONTAL_CYLINDER:
-        return z * volume_below(floats, at, z) - first * first * first * floats[at + SECOND_SIZE] * segment_integral(
-            z / first
-        )
+        return z * volume_below(floats, at, z) - first * first * first * floats[
+            at + SECOND_SIZE
+        ] * segment_integral(z / first)
     if kind == INCLINED_CYLINDER:
         d, upper, tangent = cylinder_depths(floats, at, z)
         difference = segment_double_integral(d) - segment_double_integral(upper)
-        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD_SIZE]) / tangent * difference
+        return (
+            z * volume_below(floats, at, z)
+            - first**4 * cos(floats[at + THIRD_SIZE]) / tangent * difference
+        )
     return level_moment(floats, at + NUMBER_COUNT, int(first), z)
 
 
@@ -172,11 +186,14 @@ def level_at(floats, at, volume):
     return z
 
 
-GAS_PRESSURE, LEVEL, BOTTOM, COMPRESSOR_RATE, START_LEVEL, STOP_LEVEL, SHAPE = range(SHAPED, SHAPED + 7)
+GAS_PRESSURE, LEVEL, BOTTOM, COMPRESSOR_RATE, START_LEVEL, STOP_LEVEL, SHAPE = range(
+    SHAPED, SHAPED + 7
+)
 """Indices into the numbers of a vessel: gas pressure [Pa] and level [m] at the start; height of the bottom above the
 node [m]; gas that the compressor adds per second, relative to the gas at the start [1/s]; levels at which it starts and
 stops [m]; the first number of the shape."""
-LEAST_SURFACE = 1e-3  # of the mean surface: lower bound in the stiffness, for a little fluid in a corner
+# of the mean surface: lower bound in the stiffness, for a little fluid in a corner
+LEAST_SURFACE = 1e-3
 
 
 @njit
@@ -193,9 +210,10 @@ def vessel_state(st, floats, node, at, y, a):
     y : inflow since the start [kg]; a : gas that a compressor has added, relative to the gas at the start [-]
     st : settings of the model; node : row of the node; floats[at:] : parameters of the vessel
     """
-    gas, total, n, first = (
-        floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + EXPONENT], floats[at + GAS_PRESSURE],
-    )  # fmt: skip
+    gas = floats[at + GAS_VOLUME]
+    total = floats[at + TOTAL_VOLUME]
+    n = floats[at + EXPONENT]
+    first = floats[at + GAS_PRESSURE]
     if st["law"] == LAW_LINEAR:
         ratio = max(1e-9, 1.0 - y / (st["rho"] * gas))
         u = log1p(-y / (st["rho"] * gas)) if ratio > 1e-9 else log(ratio)
@@ -212,9 +230,10 @@ def vessel_state_dense(st, floats, node, at, y, a):
     V : gas volume, V0 : gas volume at the start. Newton's method solves rho(q) times fluid volume = mass of the fluid,
     with the density rho at the pressure q at the centroid of the fluid.
     """
-    gas, total, n, first = (
-        floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + EXPONENT], floats[at + GAS_PRESSURE],
-    )  # fmt: skip
+    gas = floats[at + GAS_VOLUME]
+    total = floats[at + TOTAL_VOLUME]
+    n = floats[at + EXPONENT]
+    first = floats[at + GAS_PRESSURE]
     mass = node["mass"] + y
     if y == 0.0 and a == 0.0:
         return 0.0, total - gas
@@ -246,7 +265,9 @@ def centroid_pressure_rise(st, floats, at, mass, volume):
     level = level_at(floats, at + SHAPE, volume)
     arm = level - moment_below(floats, at + SHAPE, level) / volume
     pressure_per_height = st["gravity"] * mass / volume
-    return pressure_per_height * arm, pressure_per_height * (1.0 / surface_area(floats, at, level) - 2.0 * arm / volume)
+    return pressure_per_height * arm, pressure_per_height * (
+        1.0 / surface_area(floats, at, level) - 2.0 * arm / volume
+    )
 
 
 @njit
@@ -267,7 +288,9 @@ def pressure_and_stiffness(st, floats, node, at, y, a):
     p, gas_stiffness = floats[at + GAS_PRESSURE] + change, n / (gas * exp(u))
     weight = st["gravity"] / surface_area(floats, at, level) if level > 0.0 else 0.0
     if st["law"] == LAW_LINEAR:
-        return change + st["rho"] * st["gravity"] * (level - floats[at + LEVEL]), gas_stiffness * p / st["rho"] + weight
+        return change + st["rho"] * st["gravity"] * (
+            level - floats[at + LEVEL]
+        ), gas_stiffness * p / st["rho"] + weight
     if y == 0.0 and a == 0.0:
         change = 0.0
     else:
@@ -275,7 +298,9 @@ def pressure_and_stiffness(st, floats, node, at, y, a):
         change = node_pressure(st, floats, at, q, z) - node["pressure"]
     value, compressibility = log_density(st, floats, p)
     stiffness = gas_stiffness * p + st["rho"] * exp(value) * weight
-    return change, stiffness / (st["rho"] * exp(value) * (1.0 + max(0.0, volume) * compressibility * stiffness))
+    return change, stiffness / (
+        st["rho"] * exp(value) * (1.0 + max(0.0, volume) * compressibility * stiffness)
+    )
 
 
 @njit
@@ -295,13 +320,17 @@ def node_pressure(st, floats, at, q, z):
     q : pressure of the fluid at its centroid [Pa]; z : height of the centroid above the bottom [m]
     st, floats, at : as for `vessel_state`
     """
-    return pressure_of_enthalpy(st, floats, enthalpy(st, floats, q) + st["gravity"] * (floats[at + BOTTOM] + z))
+    return pressure_of_enthalpy(
+        st, floats, enthalpy(st, floats, q) + st["gravity"] * (floats[at + BOTTOM] + z)
+    )
 
 
 @njit
 def set(t, y, out, tables, device):
     """Write to `out` the pressure of the node minus that at the start [Pa], and the stiffness dp/dm [Pa/kg]."""
-    i, layout, at = device["node"], tables.layout[0], device["data"]
+    i = device["node"]
+    layout = tables.layout[0]
+    at = device["data"]
     node, st = tables.nodes[i], tables.settings[0]
     a = compressor_gas(y, device)
     change, stiffness = pressure_and_stiffness(st, tables.floats, node, at, y[node["y"]], a)
@@ -330,21 +359,32 @@ def events(t, y, out, tables, device, g):
     With a compressor, the level at which it next starts or stops minus the present level [m] follows, then its
     negative.
     """
-    node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
+    node = tables.nodes[device["node"]]
+    st = tables.settings[0]
+    floats = tables.floats
+    at = device["data"]
     left, flag = y[node["y"]] - floats[at + EMPTY_MASS], device["event"]
     g[flag], g[flag + 1] = left, -left
     if device["states"] > 0:
         level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))[3]
         event_pair(
-            tables, g, flag + 2, floats[at + (STOP_LEVEL if tables.armed[flag + 2] > 0.0 else START_LEVEL)] - level
+            tables,
+            g,
+            flag + 2,
+            floats[at + (STOP_LEVEL if tables.armed[flag + 2] > 0.0 else START_LEVEL)] - level,
         )
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
     """Gas volume [m3] for quantity 0, gas pressure [Pa] for quantity 1, level [m] for quantity 2."""
-    node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
-    u, change, _, level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))
+    node = tables.nodes[device["node"]]
+    st = tables.settings[0]
+    floats = tables.floats
+    at = device["data"]
+    u, change, _, level = vessel_state(
+        st, floats, node, at, y[node["y"]], compressor_gas(y, device)
+    )
     if quantity == 2:
         return level
     return floats[at + GAS_PRESSURE] + change if quantity == 1 else floats[at + GAS_VOLUME] * exp(u)
@@ -378,9 +418,10 @@ def compression_energy_rate(p, gas, n, ambient, a):
 @njit
 def stored_energy_change(st, floats, node, at, y, a):
     """Stored energy of a vessel minus that at the start [J]; arguments as for `vessel_state`."""
-    n, gas, total, first = (
-        floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + TOTAL_VOLUME], floats[at + GAS_PRESSURE],
-    )  # fmt: skip
+    n = floats[at + EXPONENT]
+    gas = floats[at + GAS_VOLUME]
+    total = floats[at + TOTAL_VOLUME]
+    first = floats[at + GAS_PRESSURE]
     u, change, volume, level = vessel_state(st, floats, node, at, y, a)
     start, start_volume = floats[at + LEVEL], total - gas
     energy = gas_energy(first, gas, n, st["ambient"], u)
@@ -394,7 +435,9 @@ def stored_energy_change(st, floats, node, at, y, a):
         content, mass = (volume, node["mass"] + y) if side == 1 else (start_volume, node["mass"])
         p, height = (first + change, level) if side == 1 else (first, start)
         q, z = centroid_state(st, floats, node, at, mass - node["mass"], p, content, height)
-        stored = vessel_energy(st, floats, node, mass, content, q) + mass * st["gravity"] * (floats[at + BOTTOM] + z)
+        stored = vessel_energy(st, floats, node, mass, content, q) + mass * st["gravity"] * (
+            floats[at + BOTTOM] + z
+        )
         energy += stored if side == 1 else -stored
     return energy
 
@@ -404,7 +447,12 @@ def stored(y, tables, device):
     """Stored energy of the vessel minus that at the start [J]."""
     node = tables.nodes[device["node"]]
     return stored_energy_change(
-        tables.settings[0], tables.floats, node, device["data"], y[node["y"]], compressor_gas(y, device)
+        tables.settings[0],
+        tables.floats,
+        node,
+        device["data"],
+        y[node["y"]],
+        compressor_gas(y, device),
     )
 
 
@@ -413,9 +461,13 @@ def power(t, y, dydt, out, tables, device):
     """(power supplied by the compressor, rate of the stored energy, dissipated power, which is 0) [W]."""
     supplied, rate = 0.0, compressor_rate(tables, device)
     if rate > 0.0:
-        st, floats, at = tables.settings[0], tables.floats, device["data"]
+        st = tables.settings[0]
+        floats = tables.floats
+        at = device["data"]
         node, a = tables.nodes[device["node"]], compressor_gas(y, device)
         u, change, _, _ = vessel_state(st, floats, node, at, y[node["y"]], a)
         p, gas_volume = floats[at + GAS_PRESSURE] + change, floats[at + GAS_VOLUME] * exp(u)
-        supplied = rate * compression_energy_rate(p, gas_volume, floats[at + EXPONENT], st["ambient"], a)
+        supplied = rate * compression_energy_rate(
+            p, gas_volume, floats[at + EXPONENT], st["ambient"], a
+        )
     return supplied, vessel_power(dydt, out, tables, device) + supplied, 0.0

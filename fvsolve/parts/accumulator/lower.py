@@ -9,7 +9,8 @@ from fvsolve.errors import Notice
 from fvsolve.parts.accumulator import law, law_vessel
 from fvsolve.parts.accumulator.part import UPRIGHT, height_of, length_of
 
-SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
+# axis rise over radius below which a cylinder counts as horizontal; likewise for upright
+SLOPE_TOLERANCE = 1e-6
 
 
 class VesselStart:
@@ -48,7 +49,11 @@ class VesselStart:
         q = gas
         for _ in range(20):
             q = gas + float(self.law.density(q)) * self.gravity * (self.level - self.centroid)
-        return float(self.law.pressure_of_enthalpy(self.law.enthalpy(q) + self.gravity * (self.bottom + self.centroid)))
+        return float(
+            self.law.pressure_of_enthalpy(
+                self.law.enthalpy(q) + self.gravity * (self.bottom + self.centroid)
+            )
+        )
 
 
 def shape_numbers(part) -> list[float]:
@@ -64,11 +69,21 @@ def shape_numbers(part) -> list[float]:
             return [law_vessel.PRISM, top, float(area), 0.0, 0.0]
         level, area = part.area.level, part.area.area
         steps = [
-            0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
+            0.5 * (a + b) * (high - low)
+            for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
         ]
         volume = [math.fsum(steps[:k]) for k in range(len(level))]
-        return [law_vessel.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
-    radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
+        return [
+            law_vessel.AREA_TABLE,
+            top,
+            len(level),
+            0.0,
+            0.0,
+            *map(float, (*level, *area, *volume)),
+        ]
+    radius = 0.5 * part.diameter
+    length = length_of(part)
+    slope = UPRIGHT if part.slope is None else part.slope
     if radius * math.cos(slope) <= SLOPE_TOLERANCE * length * math.sin(slope):
         return [law_vessel.PRISM, top, math.pi * radius**2, 0.0, 0.0]
     if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope):
@@ -91,7 +106,13 @@ class AccumulatorRows(Device, kind="accumulator"):
     remedy = "give the accumulator a connection, whose loss damps the flow in and out"
 
     def of(self, part) -> Device:
-        return self if not part.has_shape else ShapedRows() if part.compressor is None else CompressorRows()
+        return (
+            self
+            if not part.has_shape
+            else ShapedRows()
+            if part.compressor is None
+            else CompressorRows()
+        )
 
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
@@ -109,8 +130,11 @@ class AccumulatorRows(Device, kind="accumulator"):
         model = run_data.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
-        if floats[law.NECK_STIFFNESS] > 0.0 and run_data.armed[row["event"]] > 0.0:  # the neck takes up far less mass
-            scale[at] = -(1e5 / floats[law.NECK_STIFFNESS] + NECK_ERROR_SHARE * abs(floats[law.EMPTY_MASS]))
+        # the neck takes up far less mass
+        if floats[law.NECK_STIFFNESS] > 0.0 and run_data.armed[row["event"]] > 0.0:
+            scale[at] = -(
+                1e5 / floats[law.NECK_STIFFNESS] + NECK_ERROR_SHARE * abs(floats[law.EMPTY_MASS])
+            )
 
     def begin(self, start, part, row) -> list[str]:
         draft, fluid = start.draft, start.draft.fluid
@@ -118,23 +142,44 @@ class AccumulatorRows(Device, kind="accumulator"):
         p, density = float(node["pressure"]), draft.case.law.density
         neck = NECK_SHARE * part.volume if part.precharge is not None else 0.0
         charge_pressure = part.precharge if part.precharge is not None else p
-        gas = part.gas_volume or part.volume * min(1.0, (charge_pressure / p) ** (1.0 / part.exponent))
+        gas = part.gas_volume or part.volume * min(
+            1.0, (charge_pressure / p) ** (1.0 / part.exponent)
+        )
         total = part.volume + neck
         mass = density(p) * (total - gas)
         excess = (charge_pressure if neck else p * (gas / part.volume) ** part.exponent) - p
         stiffness = fluid.bulk_modulus / (fluid.density * neck) if neck else 0.0
         empty = density(p + excess) * neck - mass
         if draft.case.law.linear:
-            empty = excess / stiffness if neck and excess > 0.0 else -fluid.density * (part.volume - gas)
+            empty = (
+                excess / stiffness
+                if neck and excess > 0.0
+                else -fluid.density * (part.volume - gas)
+            )
         floats = draft.tables.floats
-        floats[row["data"] : row["data"] + law.NUMBER_COUNT] = [part.exponent, gas, total, stiffness, empty, excess]
+        floats[row["data"] : row["data"] + law.NUMBER_COUNT] = [
+            part.exponent,
+            gas,
+            total,
+            stiffness,
+            empty,
+            excess,
+        ]
         node["mass"] = mass
-        node["stiffness"] = stiffness if excess > 0.0 and neck else part.exponent * p / (fluid.density * gas)
+        node["stiffness"] = (
+            stiffness if excess > 0.0 and neck else part.exponent * p / (fluid.density * gas)
+        )
         if neck and excess >= 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            charge, pressure = (draft.case.amount(value, "pressure", 6) for value in (charge_pressure, p))
+            charge, pressure = (
+                draft.case.amount(value, "pressure", 6) for value in (charge_pressure, p)
+            )
             text = f"{name}: empty at the start: precharge {charge} is not below the pressure at the node, {pressure}"
-            draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(charge_pressure), float(p)))
+            draft.warnings.append(
+                Notice(
+                    "start", f"nodes.{name}", text, "precharge", float(charge_pressure), float(p)
+                )
+            )
         return []
 
     def change(self, model, row, y: float) -> float:
@@ -142,7 +187,9 @@ class AccumulatorRows(Device, kind="accumulator"):
 
         row : row of the accumulator in the table of devices
         """
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes[row["node"]]
         return law.gas_state(st, floats, node, int(row["data"]), y)[1]
 
     def energy(self, model, row, y: float) -> float:
@@ -150,7 +197,9 @@ class AccumulatorRows(Device, kind="accumulator"):
 
         row : row of the accumulator in the table of devices
         """
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes[row["node"]]
         return law.accumulator_energy(st, floats, node, int(row["data"]), y)
 
     def above(self, model, part, row) -> float:
@@ -165,10 +214,14 @@ class AccumulatorRows(Device, kind="accumulator"):
         node, at = model.tables.nodes[row["node"]], int(row["data"])
 
         def head(y: float) -> float:
-            return energy_head(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
+            return energy_head(
+                st, floats, node, float(node["pressure"] + self.change(model, row, y))
+            )
 
         low = (
-            float(floats[at + law.EMPTY_MASS]) if not floats[at + law.NECK_STIFFNESS] else -0.999 * float(node["mass"])
+            float(floats[at + law.EMPTY_MASS])
+            if not floats[at + law.NECK_STIFFNESS]
+            else -0.999 * float(node["mass"])
         )
         high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS_VOLUME])
         if head(low) < 0.0:
@@ -188,7 +241,11 @@ class ShapedRows(AccumulatorRows, kind=""):
         compressor = [0.0, 0.0, 0.0]
         if part.compressor is not None:
             compressor = [0.0, part.compressor.start, part.compressor.stop]
-        return [0.0] * law.NUMBER_COUNT + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_numbers(part)
+        return (
+            [0.0] * law.NUMBER_COUNT
+            + [0.0, 0.0, part.bottom or 0.0, *compressor]
+            + shape_numbers(part)
+        )
 
     def begin(self, start, part, row) -> list[str]:
         draft, n = start.draft, part.exponent
@@ -200,10 +257,14 @@ class ShapedRows(AccumulatorRows, kind=""):
             height = at_start.level + at_start.bottom
             pressure = draft.case.amount(node["pressure"], "pressure", 6)
             head = draft.case.amount(height, "head", span=True)
-            text = (f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
-                    "high, so the gas would have no pressure; set the key `bottom` or `level` "
-                    "lower, or `gas_volume` greater")  # fmt: skip
-            draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
+            text = (
+                f"no steady state: the pressure at the node, {pressure}, is below that of the fluid column, {head} "
+                "high, so the gas would have no pressure; set the key `bottom` or `level` "
+                "lower, or `gas_volume` greater"
+            )
+            draft.fault(
+                f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text
+            )
             return []
         floats = draft.tables.floats
         empty = -draft.fluid.density * at_start.fluid_volume if start.law.linear else -mass
@@ -219,11 +280,15 @@ class ShapedRows(AccumulatorRows, kind=""):
         return []
 
     def change(self, model, row, y: float) -> float:
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes[row["node"]]
         return self.law.pressure_and_stiffness(st, floats, node, int(row["data"]), y, 0.0)[0]
 
     def energy(self, model, row, y: float) -> float:
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes[row["node"]]
         return self.law.stored_energy_change(st, floats, node, int(row["data"]), y, 0.0)
 
 
@@ -244,10 +309,16 @@ class CompressorRows(ShapedRows, kind=""):
         With added gas a, inflow y, density rho, gas pressure p and volume V, exponent n and free surface S, the energy
         is n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas and g / (2 rho S) dy^2 of the weight of the fluid.
         """
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
-        at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes[row["node"]]
+        at = int(row["data"])
+        mass = int(node["y"])
+        a = float(y[row["y"]])
+        rho = model.case.properties.density
         u, change, _, _ = self.law.vessel_state(st, floats, node, at, float(y[mass]), a)
-        gas, p = floats[at + law.GAS_VOLUME] * math.exp(u), floats[at + self.law.GAS_PRESSURE] + change
+        gas = floats[at + law.GAS_VOLUME] * math.exp(u)
+        p = floats[at + self.law.GAS_PRESSURE] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
         total = super().energy_rows(model, part, row, y, out)[0][mass]
         rest = math.sqrt(max(0.0, total**2 - (root / (rho * gas)) ** 2))

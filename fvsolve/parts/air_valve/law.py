@@ -24,7 +24,14 @@ from fvsolve.core.kernels.restrictions import flow_at_drop, restriction_slope
 from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
 
-VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
+VOLUME = 0
+AIR_MASS = 1
+RT = 2
+INLET_AREA = 3
+OUTLET_AREA = 4
+SWITCH_PRESSURE = 5
+THROTTLED_AREA = 6
+SWITCH_FLOW = 7
 INLET_TABLE, OUTLET_TABLE, THROTTLED_TABLE, OWN_NUMBERS = 8, 9, 10, 11
 """Numbers of an air valve: chamber volume V0 [m3], mass of air in V0 at ambient pressure [kg], R T [J/kg], Cd A of the
 inlet and of the outlet [m2]; pressure above ambient from which the valve throttles [Pa], 0 for none; Cd A of the outlet
@@ -32,11 +39,15 @@ while it throttles [m2]; flow of fluid from which it throttles [kg/s], 0 for non
 outlet and throttled outlet, 0 for none. A table has a count, pressure differences [Pa] and squares of mass flows."""
 KAPPA = 1.4
 CRITICAL_RATIO = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
-SMALL_DROP = 1e-3  # pressure drop over upstream pressure below which a polynomial replaces the square root
-REVERSAL_DROP = 0.02  # such a ratio below which a step may reverse the flow: the larger area then sets the rate limit
-PRESSURE_MARGIN = 10.0  # below ambient at which it opens, above ambient at which the flow may throttle it [Pa]
+# pressure drop over upstream pressure below which a polynomial replaces the square root
+SMALL_DROP = 1e-3
+# such a ratio below which a step may reverse the flow: the larger area then sets the rate limit
+REVERSAL_DROP = 0.02
+# below ambient at which it opens, above ambient at which the flow may throttle it [Pa]
+PRESSURE_MARGIN = 10.0
 OVERFILL = 1e-9  # fluid in excess of V0 at which it shuts, over V0
-EQUALISATION_TIME = 0.02  # shortest time constant in which the air left after shutting returns to ambient pressure [s]
+# shortest time constant in which the air left after shutting returns to ambient pressure [s]
+EQUALISATION_TIME = 0.02
 
 
 @njit
@@ -76,7 +87,10 @@ def outlet_bore(tables, device):
 
     Cd is the discharge coefficient, A the area.
     """
-    if has_throttled_outlet(tables.floats, device["data"]) and tables.armed[device["event"] + 2] > 0.0:
+    if (
+        has_throttled_outlet(tables.floats, device["data"])
+        and tables.armed[device["event"] + 2] > 0.0
+    ):
         return THROTTLED_AREA, THROTTLED_TABLE
     return OUTLET_AREA, OUTLET_TABLE
 
@@ -124,10 +138,14 @@ def air_inflow(st, floats, at, gauge, area, table):
     """
     p, ambient = st["ambient"] + gauge, st["ambient"]
     if gauge < 0.0:
-        high, r, sign = ambient, p / ambient, 1.0
+        high = ambient
+        r = p / ambient
+        sign = 1.0
         own, own_table = INLET_AREA, INLET_TABLE
     else:
-        high, r, sign = p, ambient / p, -1.0
+        high = p
+        r = ambient / p
+        sign = -1.0
         own, own_table = area, table
     x = max(1.0 - r, SMALL_DROP)
     largest = bore_flow(floats, at, own, own_table, high, 1.0 - x)
@@ -144,7 +162,10 @@ def set(t, y, out, tables, device):
     The pressure is relative to ambient [Pa], the stiffness is dp/dm [Pa/kg]. The conductance [kg2/s2/Pa] is 0 while the
     valve is shut.
     """
-    st, floats, layout, i = tables.settings[0], tables.floats, tables.layout[0], device["node"]
+    st = tables.settings[0]
+    floats = tables.floats
+    layout = tables.layout[0]
+    i = device["node"]
     node, k = tables.nodes[i], device["valve"]
     gauge, volume, _ = air_state(st, floats, node, device["data"], y[node["y"]], y[device["y"]])
     change = gauge
@@ -160,14 +181,18 @@ def set(t, y, out, tables, device):
 @njit
 def air_rate(y, tables, device):
     """(rate of the air mass in the chamber [kg/s], its rate limit [1/s], R T ln(p / p_ambient) of the air [J/kg])."""
-    st, floats, at = tables.settings[0], tables.floats, device["data"]
+    st = tables.settings[0]
+    floats = tables.floats
+    at = device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
     area, table = outlet_bore(tables, device)
     flow, slope = air_inflow(st, floats, at, gauge, area, table)
     ambient_mass = st["ambient"] * volume / floats[at + RT]  # mass of the air at ambient pressure
     rate = slope / min(mass, ambient_mass)
-    if tables.armed[device["event"]] <= 0.0 and abs(flow) * EQUALISATION_TIME >= abs(ambient_mass - mass):
+    if tables.armed[device["event"]] <= 0.0 and abs(flow) * EQUALISATION_TIME >= abs(
+        ambient_mass - mass
+    ):
         flow, rate = (ambient_mass - mass) / EQUALISATION_TIME, 1.0 / EQUALISATION_TIME
     return flow, rate, floats[at + RT] * log1p(gauge / st["ambient"])
 
@@ -188,7 +213,10 @@ def fluid_rate_limit(out, tables, device):
 
     It is the stiffness of the chamber times the sum of d flow / d pressure of all other parts at the node.
     """
-    layout, nodes, valves, own = tables.layout[0], tables.nodes, tables.valves, device["valve"]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    valves = tables.valves
+    own = device["valve"]
     place = valves[own]["from_node"]
     if tables.armed[device["event"]] <= 0.0:
         return 0.0
@@ -209,24 +237,35 @@ def events(t, y, out, tables, device, g):
     of fluid that must still flow in until it shuts [kg].
     With a throttled outlet, the margin until throttling begins or ends follows.
     """
-    st, floats, at = tables.settings[0], tables.floats, device["event"]
+    st = tables.settings[0]
+    floats = tables.floats
+    at = device["event"]
     node, place = tables.nodes[device["node"]], tables.valves[device["valve"]]["from_node"]
     fluid = y[node["y"]]
     overfill = OVERFILL * node["density"] * floats[device["data"] + VOLUME]
     margin = fluid - overfill
-    if out[tables.layout[0]["valve"] + device["valve"]] <= 0.0:  # full as at shutting, but fluid flows out
+    # full as at shutting, but fluid flows out
+    if out[tables.layout[0]["valve"] + device["valve"]] <= 0.0:
         margin = min(margin, -overfill)
     if tables.armed[at] <= 0.0:
-        p = tables.nodes[place]["pressure"] + out[tables.layout[0]["pressure"] + place] - st["ambient"]
+        p = (
+            tables.nodes[place]["pressure"]
+            + out[tables.layout[0]["pressure"] + place]
+            - st["ambient"]
+        )
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         margin = p - min(gauge, 0.0) + PRESSURE_MARGIN
     event_pair(tables, g, at, margin)
     if has_throttled_outlet(floats, device["data"]):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
-        if tables.armed[at] <= 0.0:  # while it is shut no air moves, and the sign of its pressure is that of rounding
+        # while it is shut no air moves, and the sign of its pressure is that of rounding
+        if tables.armed[at] <= 0.0:
             gauge = max(gauge, 0.5 * PRESSURE_MARGIN)
         event_pair(
-            tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else throttling_margin(out, tables, device, gauge)
+            tables,
+            g,
+            at + 2,
+            -gauge if tables.armed[at + 2] > 0.0 else throttling_margin(out, tables, device, gauge),
         )
 
 
@@ -241,7 +280,10 @@ def throttling_margin(out, tables, device, gauge):
     floats, at = tables.floats, device["data"]
     if floats[at + SWITCH_PRESSURE] > 0.0:
         return floats[at + SWITCH_PRESSURE] - gauge
-    return max(floats[at + SWITCH_FLOW] - out[tables.layout[0]["valve"] + device["valve"]], PRESSURE_MARGIN - gauge)
+    return max(
+        floats[at + SWITCH_FLOW] - out[tables.layout[0]["valve"] + device["valve"]],
+        PRESSURE_MARGIN - gauge,
+    )
 
 
 @njit
@@ -269,7 +311,9 @@ def air_energy(st, floats, node, at, y_fluid, y_air):
 def stored(y, tables, device):
     """Stored energy of the chamber minus that at the start [J]."""
     node = tables.nodes[device["node"]]
-    return air_energy(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]])
+    return air_energy(
+        tables.settings[0], tables.floats, node, device["data"], y[node["y"]], y[device["y"]]
+    )
 
 
 @njit

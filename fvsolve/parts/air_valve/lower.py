@@ -39,16 +39,33 @@ class AirValveRows(Device, kind="air-valve"):
         air_mass = draft.case.ambient_pressure * part.volume / rt
         bores = part.inlet, part.outlet, part.throttled_outlet
         into, wide, small, always = (
-            0.0 if d is None or isinstance(d, AirFlow) else part.discharge_coefficient * math.pi / 4.0 * d**2
+            0.0
+            if d is None or isinstance(d, AirFlow)
+            else part.discharge_coefficient * math.pi / 4.0 * d**2
             for d in (*bores, part.automatic)
         )
-        own = [part.volume, air_mass, rt, into, wide + always, part.switch or 0.0, small + always, 0.0]
+        own = [
+            part.volume,
+            air_mass,
+            rt,
+            into,
+            wide + always,
+            part.switch or 0.0,
+            small + always,
+            0.0,
+        ]
         tables: list[float] = []
         density = draft.case.ambient_pressure / rt
-        for bore, place in zip(bores, (law.INLET_TABLE, law.OUTLET_TABLE, law.THROTTLED_TABLE), strict=True):
+        for bore, place in zip(
+            bores, (law.INLET_TABLE, law.OUTLET_TABLE, law.THROTTLED_TABLE), strict=True
+        ):
             given = isinstance(bore, AirFlow)
             own.append(float(law.OWN_NUMBERS + len(tables) - place) if given else 0.0)
-            tables += [len(bore.pressure), *bore.pressure, *((density * q) ** 2 for q in bore.flow)] if given else []
+            tables += (
+                [len(bore.pressure), *bore.pressure, *((density * q) ** 2 for q in bore.flow)]
+                if given
+                else []
+            )
         return own + tables
 
     def scales(self, draft, name, part) -> list[float]:
@@ -71,7 +88,9 @@ class AirValveRows(Device, kind="air-valve"):
             return []
         below = start.case.amount(deficit, "pressure", span=True)
         text = f"{name}: the air valve is open at the start, at a pressure of {below} below ambient"
-        start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0))
+        start.draft.warnings.append(
+            Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0)
+        )
         return [f"air valve {name} opens, at a pressure of {below} below ambient"]
 
     def energy_rows(self, model, part, row, y, out):
@@ -82,11 +101,17 @@ class AirValveRows(Device, kind="air-valve"):
         The energy is R T / (2 m) (dm + m / (V rho) dy)^2 of air and fluid in the chamber, with air mass m, air volume
         V, fluid density rho, and deviations dm and dy of air and fluid mass.
         """
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
+        st = model.tables.settings[0]
+        floats = model.tables.floats
+        node = model.tables.nodes
         node, at = node[row["node"]], int(row["data"])
-        _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
+        _, volume, mass = law.air_state(
+            st, floats, node, at, float(y[node["y"]]), float(y[row["y"]])
+        )
         root = math.sqrt(floats[at + law.RT] / (2.0 * mass))
-        return [{int(row["y"]): root, int(node["y"]): root * mass / (volume * float(node["density"]))}]
+        return [
+            {int(row["y"]): root, int(node["y"]): root * mass / (volume * float(node["density"]))}
+        ]
 
 
 class ThrottledAirValveRows(AirValveRows, kind=""):
@@ -103,5 +128,7 @@ class ThrottledAirValveRows(AirValveRows, kind=""):
             joins = (table["from_node"] == place) | (table["to_node"] == place)
             widest = max(widest, *table["area"][joins], 0.0)
         density = start.nodes[row["node"]]["density"]
-        start.draft.tables.floats[row["data"] + law.SWITCH_FLOW] = (part.switch_velocity or 0.0) * density * widest
+        start.draft.tables.floats[row["data"] + law.SWITCH_FLOW] = (
+            (part.switch_velocity or 0.0) * density * widest
+        )
         return super().begin(start, part, row)

@@ -30,7 +30,9 @@ def is_shut(tables, device):
 def set(t, y, out, tables, device):
     """Write to `out` the conductance of the valve [kg2/s2/Pa], 0 while it is shut."""
     k = device["valve"]
-    out[tables.layout[0]["conductance"] + k] = 0.0 if is_shut(tables, device) else tables.valves[k]["conductance"]
+    out[tables.layout[0]["conductance"] + k] = (
+        0.0 if is_shut(tables, device) else tables.valves[k]["conductance"]
+    )
 
 
 @njit
@@ -41,7 +43,9 @@ def events(t, y, out, tables, device, g):
     that of `NO_FLOW` [kg/s]. While it is shut: the drop towards the allowed direction, less `MARGIN` [Pa], or the
     distance of the level from the limit, less the differential [m], whichever is above 0.
     """
-    k, at, st = device["valve"], device["event"], tables.settings[0]
+    k = device["valve"]
+    at = device["event"]
+    st = tables.settings[0]
     node, flow = tables.nodes[tables.valves[k]["to_node"]], out[tables.layout[0]["valve"] + k]
     rho = st["rho"] if st["law"] == LAW_LINEAR else node["density"]
     level, drop = tank_level(node, tables.floats, rho, y[node["y"]]), head_drop(tables, out, k)[1]

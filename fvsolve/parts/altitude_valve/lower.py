@@ -4,7 +4,8 @@ from fvsolve.core.assembly.lowering import Device
 
 from . import law
 
-SMALL_FLOW, SMALL_DROP = 1e-9, 1e-6  # rounding: over the flow scale of the model [-], of potentials [Pa]
+# rounding: over the flow scale of the model [-], of potentials [Pa]
+SMALL_FLOW, SMALL_DROP = 1e-9, 1e-6
 NO_LEVEL = 1e300
 
 
@@ -16,24 +17,40 @@ class AltitudeValveRows(Device, kind="altitude-valve"):
     events = ("shuts: the tank is full", "opens", "shuts: the tank is empty", "opens")
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [NO_LEVEL if part.full_level is None else part.full_level,
-                -NO_LEVEL if part.empty_level is None else part.empty_level, part.differential]  # fmt: skip
+        return [
+            NO_LEVEL if part.full_level is None else part.full_level,
+            -NO_LEVEL if part.empty_level is None else part.empty_level,
+            part.differential,
+        ]
 
     def shut_reason(self, start, k):
         part = start.case.conduits[start.draft.valve_names[k]]
-        return "the tank is full" if start.case.nodes[part.to].level == part.full_level else "the tank is empty"
+        return (
+            "the tank is full"
+            if start.case.nodes[part.to].level == part.full_level
+            else "the tank is empty"
+        )
 
     def flags_at_start(self, start, part, row) -> dict[int, bool]:
-        shut, level, at = int(row["valve"]) in start.shut, start.case.nodes[part.to].level, int(row["event"])
-        return {at + law.FULL: shut and level == part.full_level, at + law.EMPTY: shut and level == part.empty_level}
+        shut = int(row["valve"]) in start.shut
+        level = start.case.nodes[part.to].level
+        at = int(row["event"])
+        return {
+            at + law.FULL: shut and level == part.full_level,
+            at + law.EMPTY: shut and level == part.empty_level,
+        }
 
     def revise_state(self, start, part, row) -> bool:
         k, level = int(row["valve"]), start.case.nodes[part.to].level
-        full, empty = (limit is not None and level == limit for limit in (part.full_level, part.empty_level))
+        full, empty = (
+            limit is not None and level == limit for limit in (part.full_level, part.empty_level)
+        )
         if k in start.shut:
             outside, inside = start.across(k)
             drop = outside - inside
-            opens = (full and drop < -law.MARGIN - SMALL_DROP) or (empty and drop > law.MARGIN + SMALL_DROP)
+            opens = (full and drop < -law.MARGIN - SMALL_DROP) or (
+                empty and drop > law.MARGIN + SMALL_DROP
+            )
             start.shut -= {k} if opens else set()
             return opens
         flow, least = float(start.valve_flows()[k]), SMALL_FLOW * start.flow_scale

@@ -20,30 +20,55 @@ class AltitudeValve(Sized, TwoPort, kind="altitude-valve"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    full_level: Annotated[float | None, Quantity(
-        "level", positive, "level of the tank at which no more flows into it [m]; no limit if left out", LEVELS, SHAPE
-    )] = None  # fmt: skip
-    empty_level: Annotated[float | None, Quantity(
-        "level", nonnegative, "level of the tank at which no more flows out of it [m]; no limit if left out", LEVELS,
-        SHAPE,
-    )] = None  # fmt: skip
+    full_level: Annotated[
+        float | None,
+        Quantity(
+            "level",
+            positive,
+            "level of the tank at which no more flows into it [m]; no limit if left out",
+            LEVELS,
+            SHAPE,
+        ),
+    ] = None
+    empty_level: Annotated[
+        float | None,
+        Quantity(
+            "level",
+            nonnegative,
+            "level of the tank at which no more flows out of it [m]; no limit if left out",
+            LEVELS,
+            SHAPE,
+        ),
+    ] = None
 
-    differential: Annotated[float, Quantity(
-        "level", positive, "distance of the level from `full_level` or `empty_level` at which the shut valve opens [m]",
-        LEVELS,
-    )] = 0.005  # fmt: skip
+    differential: Annotated[
+        float,
+        Quantity(
+            "level",
+            positive,
+            "distance of the level from `full_level` or `empty_level` at which the shut valve opens [m]",
+            LEVELS,
+        ),
+    ] = 0.005
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if not {"full_level", "empty_level"} & given.keys():
-            faults.append(((), "level is missing; expected `full_level`, `empty_level` or both, or a valve"))
+            faults.append(
+                ((), "level is missing; expected `full_level`, `empty_level` or both, or a valve")
+            )
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
-        tank, full, empty = around.nodes.get(self.to), self.full_level, self.empty_level
+        tank = around.nodes.get(self.to)
+        full = self.full_level
+        empty = self.empty_level
         if full is not None and empty is not None and full <= empty:
-            yield ("full_level",), f"{full:g} m is not above `empty_level`, {empty:g} m; expected a higher level"
+            yield (
+                ("full_level",),
+                f"{full:g} m is not above `empty_level`, {empty:g} m; expected a higher level",
+            )
         if tank is None:
             return
         if tank.kind != "tank":
@@ -51,7 +76,10 @@ class AltitudeValve(Sized, TwoPort, kind="altitude-valve"):
             yield ("to",), f"{text}; expected a tank, or a check-valve"
             return
         if tank.connection is not None:
-            yield ("to",), f"{self.to} has a `connection`; join the valve to a tank without this key"
+            yield (
+                ("to",),
+                f"{self.to} has a `connection`; join the valve to a tank without this key",
+            )
         if full is not None and tank.level > full:
             text = f"{self.to} starts at {tank.level:g} m, above `full_level`, {full:g} m"
             yield ("full_level",), f"{text}; expected a level of the tank of at most that"

@@ -15,22 +15,35 @@ from fvsolve.core.kernels.dtypes import FIRM
 from fvsolve.core.kernels.isolated_nodes import inner_row
 from fvsolve.core.kernels.structures import FACE_SHARE, least_slope
 from fvsolve.jit import njit
-from fvsolve.parts.conduit.law_section import SlottedSection, celerity, riemann_function, section_at_depth
+from fvsolve.parts.conduit.law_section import (
+    SlottedSection,
+    celerity,
+    riemann_function,
+    section_at_depth,
+)
 
 NUMBERS = len(SlottedSection._fields)  # of a section
 INSIDE = 7  # numbers of the state inside an end, see `end_state`
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
-DRY_CELERITY = 1e-4  # celerity at a dry end for its least derivative [m/s]; far below that of films of water
+# celerity at a dry end for its least derivative [m/s]; far below that of films of water
+DRY_CELERITY = 1e-4
 ROUNDING = 1e-14  # relative error of depths that solve an equation
 SWEEPS = 100
-CHORD = 1e-6  # error of the flow, over that of the full section at sqrt(g D), above which a chord replaces the tangent
+# error of the flow, over that of the full section at sqrt(g D), above which a chord replaces the tangent
+CHORD = 1e-6
 
 
 @njit
 def section_at(floats, at):
     """`SlottedSection` whose numbers are floats[at:]."""
     return SlottedSection(
-        floats[at], floats[at + 1], floats[at + 2], floats[at + 3], floats[at + 4], floats[at + 5], floats[at + 6]
+        floats[at],
+        floats[at + 1],
+        floats[at + 2],
+        floats[at + 3],
+        floats[at + 4],
+        floats[at + 5],
+        floats[at + 6],
     )
 
 
@@ -40,7 +53,9 @@ def invariant_and_slope(section, h):
     area, width, _ = section_at_depth(section, h)
     c = celerity(section, width, area)
     narrowing = 2.0 * (section.diameter - 2.0 * h) / width if h < section.depth else 0.0  # dT / dh
-    return riemann_function(section, h) + c, section.g / c * (1.5 - 0.5 * area * narrowing / (width * width))
+    return riemann_function(section, h) + c, section.g / c * (
+        1.5 - 0.5 * area * narrowing / (width * width)
+    )
 
 
 @njit
@@ -77,7 +92,15 @@ def end_state(section, h, e, u):
 @njit
 def read_state(work, at):
     """Result of `end_state` whose numbers are work[at:]."""
-    return work[at], work[at + 1], work[at + 2], work[at + 3], work[at + 4], work[at + 5], work[at + 6]
+    return (
+        work[at],
+        work[at + 1],
+        work[at + 2],
+        work[at + 3],
+        work[at + 4],
+        work[at + 5],
+        work[at + 6],
+    )
 
 
 @njit
@@ -116,7 +139,9 @@ def passing_head(section, target, inside):
     low, rise = e - h, 1e-3 * section.diameter
     z, high = e, e + rise
     while end_flow(section, high, inside)[0] < target and rise < 1e9:
-        low, high, rise = high, high + rise, 4.0 * rise
+        low = high
+        high = high + rise
+        rise = 4.0 * rise
     for _ in range(SWEEPS):
         q, slope, _ = end_flow(section, z, inside)
         if q < target:

@@ -43,7 +43,9 @@ def exact_area(x: np.ndarray) -> np.ndarray:
     """Wetted share A / A_f of a circle at depths x = h / D : float64[n]; by a series at small x."""
     t = 2.0 * np.arcsin(np.sqrt(x))
     w = (2.0 * t) ** 2
-    series = 1.0 - w / 20.0 * (1.0 - w / 42.0 * (1.0 - w / 72.0 * (1.0 - w / 110.0 * (1.0 - w / 156.0))))
+    series = 1.0 - w / 20.0 * (
+        1.0 - w / 42.0 * (1.0 - w / 72.0 * (1.0 - w / 110.0 * (1.0 - w / 156.0)))
+    )
     return np.where(t < 0.3, 8.0 * t**3 / 6.0 * series, 2.0 * t - np.sin(2.0 * t)) / (2.0 * pi)
 
 
@@ -70,13 +72,18 @@ def polynomials() -> tuple[np.ndarray, ...]:
         terms = found.convert(kind=np.polynomial.Polynomial, domain=[-1.0, 1.0]).coef
         return np.append(terms, np.zeros(TERMS - terms.size))
 
-    def below(x):  # mean over w from 0 to x^(1/2) of sqrt(T / A) 2 w, with the depth w^2, and with T / D and A / D^2
+    # mean over w from 0 to x^(1/2) of sqrt(T / A) 2 w, with the depth w^2, and with T / D and A / D^2
+    def below(x):
         depth = x[:, None] * at**2
-        return (2.0 * np.sqrt(2.0 * np.sqrt(1.0 - depth) * depth**1.5 / (0.25 * pi * exact_area(depth)))) @ weight
+        return (
+            2.0 * np.sqrt(2.0 * np.sqrt(1.0 - depth) * depth**1.5 / (0.25 * pi * exact_area(depth)))
+        ) @ weight
 
     def above(root):  # mean over y^(1/4) from 0 of sqrt(T / A) 4 y^(3/4), over y
         y = root[:, None] ** 2 * at**4
-        return (4.0 * np.sqrt(2.0 * np.sqrt(1.0 - y) / (0.25 * pi * exact_area(1.0 - y))) * at**4) @ weight
+        return (
+            4.0 * np.sqrt(2.0 * np.sqrt(1.0 - y) / (0.25 * pi * exact_area(1.0 - y))) * at**4
+        ) @ weight
 
     area = fit(lambda x: exact_area(x) / (2.0 * x * np.sqrt(x * (1.0 - x))), 0.5)
     depth = fit(lambda square: exact_depth(square**1.5) / square, HALF_SQUARE)
@@ -102,7 +109,8 @@ def polynomial(p, x):
     return four_terms(p, 0, x, square) + fourth * (four_terms(p, 4, x, square) + fourth * value)
 
 
-FULL_PHI = float(sqrt(0.5) * polynomial(LOW, 0.5) + 0.5**1.25 * polynomial(HIGH, sqrt(0.5)))  # phi / sqrt(g D)
+# phi / sqrt(g D)
+FULL_PHI = float(sqrt(0.5) * polynomial(LOW, 0.5) + 0.5**1.25 * polynomial(HIGH, sqrt(0.5)))
 
 
 @njit(forceinline=True)
@@ -117,8 +125,16 @@ def section_at_depth(section, h):
     t = pi * share + s * k
     if above >= 0.0:
         area = section.area + section.slot * above
-        return area, section.slot, section.thrust + above * (section.area + 0.5 * section.slot * above)
-    return 0.25 * pi * d * d * share, d * s, d * d * d * (s * (3.0 - s * s) - 3.0 * t * k) * (1.0 / 24.0)
+        return (
+            area,
+            section.slot,
+            section.thrust + above * (section.area + 0.5 * section.slot * above),
+        )
+    return (
+        0.25 * pi * d * d * share,
+        d * s,
+        d * d * d * (s * (3.0 - s * s) - 3.0 * t * k) * (1.0 / 24.0),
+    )
 
 
 @njit(forceinline=True)
@@ -153,7 +169,9 @@ def riemann_function(section, h):
         return 0.0
     if h >= section.depth:
         area = area_of(section, h)
-        return section.phi + 2.0 * sqrt(section.g / section.slot) * (sqrt(area) - sqrt(section.area))
+        return section.phi + 2.0 * sqrt(section.g / section.slot) * (
+            sqrt(area) - sqrt(section.area)
+        )
     x = h / section.diameter
     if x <= 0.5:
         value = sqrt(x) * polynomial(LOW, x)
@@ -180,4 +198,6 @@ def section_of(gravity: float, diameter: float, surcharge_celerity: float) -> Sl
     depth = 0.5 * diameter * (1.0 + sqrt(1.0 - (slot / diameter) ** 2))
     blank = SlottedSection(gravity, diameter, slot, 2.0 * diameter, full, 0.0, 0.0)
     area, _, thrust = section_at_depth(blank, depth)
-    return SlottedSection(gravity, diameter, slot, depth, area, thrust, riemann_function(blank, depth))
+    return SlottedSection(
+        gravity, diameter, slot, depth, area, thrust, riemann_function(blank, depth)
+    )

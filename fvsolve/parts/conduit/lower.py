@@ -20,14 +20,21 @@ class ConduitRows(Lowering, kind="conduit"):
         carries = probe.quantity in draft.case.scalars
         if probe.quantity == "flow" and probe.fraction in (0.0, 1.0, None):
             end = "to" if probe.fraction == 1.0 else "from"
-            row["kind"], row["index"] = rec.VALVE_FLOW, draft.valve_names.index(f"{name}.{end}.face")
+            row["kind"], row["index"] = (
+                rec.VALVE_FLOW,
+                draft.valve_names.index(f"{name}.{end}.face"),
+            )
             row["side"] = -1 if end == "to" else 0
             return
         ((k, basin),) = ((k, basin) for k, basin in enumerate(draft.meshed) if basin.name == name)
         at = min(max((probe.fraction or 0.0) * basin.n - 0.5, 0.0), basin.n - 1.0)
         first = min(int(at), max(basin.n - 2, 0))
         cells, weights = [first, min(first + 1, basin.n - 1)], [1.0 - (at - first), at - first]
-        row["kind"], row["index"], row["count"] = rec.CELL_SCALAR if carries else rec.CELL_FIELD, k, 2
+        row["kind"], row["index"], row["count"] = (
+            rec.CELL_SCALAR if carries else rec.CELL_FIELD,
+            k,
+            2,
+        )
         row["cell"], row["weights"] = len(draft.integers), len(draft.floats)
         draft.integers += cells
         draft.floats += weights
@@ -42,15 +49,24 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
 
     def restriction(self, draft, name, link, row) -> None:
         conduit, gravity = draft.case.links[link.conduit], draft.case.gravity
-        size = draft.fluid.density * 0.25 * math.pi * conduit.diameter**2 * math.sqrt(gravity * conduit.diameter)
+        size = (
+            draft.fluid.density
+            * 0.25
+            * math.pi
+            * conduit.diameter**2
+            * math.sqrt(gravity * conduit.diameter)
+        )
         row["conductance"] = size**2 / (draft.fluid.density * gravity * conduit.diameter)
         row["chained"] = 1  # the links at the node limit its rate
-        row["drive"] = 1.0  # unlike that of valves without a shaft: the velocity in the cells may change alone
+        # unlike that of valves without a shaft: the velocity in the cells may change alone
+        row["drive"] = 1.0
 
     def numbers(self, draft, name, link) -> list[float]:
         patches = [place for place in draft.case.places.values() if place.kind == "patch"]
         conduit = draft.case.links[link.conduit]
-        section = section_of(draft.case.gravity, conduit.diameter, conduit.celerity(draft.case.gravity))
+        section = section_of(
+            draft.case.gravity, conduit.diameter, conduit.celerity(draft.case.gravity)
+        )
         return [*section, float(patches.index(draft.case.places[link.to]))]
 
     def follow(self, start, k: int) -> None:

@@ -39,33 +39,69 @@ class Conduit(TwoPort, kind="conduit"):
     """
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
-    along: ClassVar[dict[str, str]] = {"depth": "level", "filling": "number", "flow": "flow", "head": "head"}
+    along: ClassVar[dict[str, str]] = {
+        "depth": "level",
+        "filling": "number",
+        "flow": "flow",
+        "head": "head",
+    }
     fixes_pressure: ClassVar[bool] = True
     own_scalars: ClassVar[str] = "along"
 
-    diameter: Annotated[float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, PROFILE)]
-    length: Annotated[float, Quantity("length", positive, "length along its axis [m]", changes=PROFILE)]
+    diameter: Annotated[
+        float, Quantity("length", positive, "inner diameter [m]", DIAMETERS, PROFILE)
+    ]
+    length: Annotated[
+        float, Quantity("length", positive, "length along its axis [m]", changes=PROFILE)
+    ]
     inverts: Annotated[
         tuple[float, float],
-        Rows("length", length=2, about="height of the invert above datum at `from` and at `to` [m]", changes=PROFILE),
+        Rows(
+            "length",
+            length=2,
+            about="height of the invert above datum at `from` and at `to` [m]",
+            changes=PROFILE,
+        ),
     ]
-    manning: Annotated[float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNING_RANGE, PROFILE)]
+    manning: Annotated[
+        float, Number(nonnegative, "Manning's n of the wall [s/m^(1/3)]", MANNING_RANGE, PROFILE)
+    ]
     minor_loss: Annotated[float, LOSS] = 0.0
     cells: Annotated[int, Whole(between(1, 10**6), "number of cells", SHAPE)] = DEFAULT_CELLS
-    surcharge_celerity: Annotated[float | None, Quantity(
-        "velocity", positive, "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
-        "if left out", UsualRange(1.0, 400.0, "wide slots to elastic pipes"), PROFILE,
-    )] = None  # fmt: skip
-    initial_depth: Annotated[float | None, Quantity(
-        "length", nonnegative, "depth of water at the start, above the diameter under pressure [m]; that of gradually "
-        "varied flow, without flow a level between those of both nodes, if left out", changes=PROFILE,
-    )] = None  # fmt: skip
-    initial_flow: Annotated[float | None, Quantity(
-        "flow", about="flow at the start [m3/s]; that of an inflow at an end, or the steady flow between the heads "
-        "of both nodes, 0 where these are not known, if left out", changes=PROFILE,
-    )] = None  # fmt: skip
+    surcharge_celerity: Annotated[
+        float | None,
+        Quantity(
+            "velocity",
+            positive,
+            "speed of waves in the full conduit [m/s]; 28 sqrt(diameter), by a slot of 1 % of it "
+            "if left out",
+            UsualRange(1.0, 400.0, "wide slots to elastic pipes"),
+            PROFILE,
+        ),
+    ] = None
+    initial_depth: Annotated[
+        float | None,
+        Quantity(
+            "length",
+            nonnegative,
+            "depth of water at the start, above the diameter under pressure [m]; that of gradually "
+            "varied flow, without flow a level between those of both nodes, if left out",
+            changes=PROFILE,
+        ),
+    ] = None
+    initial_flow: Annotated[
+        float | None,
+        Quantity(
+            "flow",
+            about="flow at the start [m3/s]; that of an inflow at an end, or the steady flow between the heads "
+            "of both nodes, 0 where these are not known, if left out",
+            changes=PROFILE,
+        ),
+    ] = None
 
-    scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the conduit at the start", Number())] = {}
+    scalars: Annotated[
+        dict[str, Any], ScalarValues("scalar values in the conduit at the start", Number())
+    ] = {}
 
     def celerity(self, gravity: float) -> float:
         """Speed of waves in the full conduit [m/s]."""
@@ -77,12 +113,17 @@ class Conduit(TwoPort, kind="conduit"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if name in around.nodes:
-            yield (), f"a node has the name {name} too; expected another name, since results name the water by it"
+            yield (
+                (),
+                f"a node has the name {name} too; expected another name, since results name the water by it",
+            )
         fall = abs(self.inverts[0] - self.inverts[1])
         if fall >= self.length:
             text = f"fall by {fall:g} m over a length of {self.length:g} m; expected a slope below 1: check the units"
             yield ("inverts",), text
-        for key, invert, node in zip((0, 1), self.inverts, map(around.nodes.get, self.ports.values()), strict=True):
+        for key, invert, node in zip(
+            (0, 1), self.inverts, map(around.nodes.get, self.ports.values()), strict=True
+        ):
             bottom = getattr(node, "elevation", None) or 0.0
             if getattr(node, "kind", "") == "tank" and invert < bottom:
                 text = f"{invert:g} m is below the bottom of {list(self.ports.values())[key]} at {bottom:g} m"
@@ -92,7 +133,9 @@ class Conduit(TwoPort, kind="conduit"):
         elif around.gravity is not None:
             least = math.sqrt(0.25 * math.pi * around.gravity * self.diameter / WIDEST_SLOT)
             if self.surcharge_celerity is not None and self.surcharge_celerity < least:
-                text = f"{self.surcharge_celerity:g} m/s is slower than waves in a nearly full section"
+                text = (
+                    f"{self.surcharge_celerity:g} m/s is slower than waves in a nearly full section"
+                )
                 yield ("surcharge_celerity",), f"{text}; expected at least {least:.3g} m/s"
         if around.fluid is not None and not ConduitFlow.accepts_law(around.fluid.law):
             text = f'density law "{around.fluid.law}" does not apply to conduits; expected fluid.law = "linear"'
@@ -170,5 +213,10 @@ class ConduitWater(Basin):
         return first + (last - first) * (np.arange(self.conduit.cells) + 0.5) / self.conduit.cells
 
     def face_link(self, name: str, patch: str, length: float) -> ConduitEnd:
-        ends = {"from_": self.conduit.ports[patch], "to": f"{name}.{patch}", "conduit": name, "patch": patch}
+        ends = {
+            "from_": self.conduit.ports[patch],
+            "to": f"{name}.{patch}",
+            "conduit": name,
+            "patch": patch,
+        }
         return ConduitEnd.model_construct(**ends)

@@ -22,8 +22,25 @@ from fvsolve.jit import njit, specialise
 # sum of loss coefficients; 19.63 n^2 L [m^(4/3)]; number of open barrels; length; inverts at `from` and `to`; flows at
 # HW = 0.95 D into both ends [m3/s]
 (
-    FORM, K, M, C, Y, KS, WIDTH, HEIGHT, AREA, GRAVITY, LOSS, FRICTION, BARRELS, LENGTH, FROM, TO, FLOW_FROM, FLOW_TO,
-) = range(18)  # fmt: skip
+    FORM,
+    K,
+    M,
+    C,
+    Y,
+    KS,
+    WIDTH,
+    HEIGHT,
+    AREA,
+    GRAVITY,
+    LOSS,
+    FRICTION,
+    BARRELS,
+    LENGTH,
+    FROM,
+    TO,
+    FLOW_FROM,
+    FLOW_TO,
+) = range(18)
 KU = 1.811
 WEIR_END, ORIFICE_START = 0.95, 4.0  # HW / D and x between which the inlet control is interpolated
 PARTLY, FULL_FROM = 0.75, 1.0  # HW / D between which partly full and full barrels are interpolated
@@ -39,9 +56,17 @@ def section(floats, at, depth):
     height, width = floats[at + HEIGHT], floats[at + WIDTH]
     depth = min(max(depth, 0.0), height)
     if width > 0.0:
-        return width * depth, width, width + 2.0 * depth if depth < height else 2.0 * (width + height)
+        return (
+            width * depth,
+            width,
+            width + 2.0 * depth if depth < height else 2.0 * (width + height),
+        )
     angle = 2.0 * acos(1.0 - 2.0 * depth / height)
-    return 0.125 * height * height * (angle - sin(angle)), 2.0 * sqrt(depth * (height - depth)), 0.5 * height * angle
+    return (
+        0.125 * height * height * (angle - sin(angle)),
+        2.0 * sqrt(depth * (height - depth)),
+        0.5 * height * angle,
+    )
 
 
 @njit
@@ -77,9 +102,17 @@ def excess(floats, at, balance, depth, given, head):
     height = floats[at + HEIGHT]
     flow, specific = critical_flow(floats, at, depth)
     if balance == INLET:
-        return specific + height * floats[at + K] * relative_flow(floats, at, flow) ** floats[at + M] - head
+        return (
+            specific
+            + height * floats[at + K] * relative_flow(floats, at, flow) ** floats[at + M]
+            - head
+        )
     if balance == FULL:
-        return 0.5 * (depth + height) + loss_factor(floats, at, *section(floats, at, height)[::2]) * flow * flow - head
+        return (
+            0.5 * (depth + height)
+            + loss_factor(floats, at, *section(floats, at, height)[::2]) * flow * flow
+            - head
+        )
     area, _, perimeter = section(floats, at, 0.5 * (given + depth))
     return depth + loss_factor(floats, at, area, perimeter) * flow * flow - head
 
@@ -90,7 +123,8 @@ def critical_depth(floats, at, balance, low, high, given, head):
 
     Other arguments as for `excess`
     """
-    below, above = excess(floats, at, balance, low, given, head), excess(floats, at, balance, high, given, head)
+    below = excess(floats, at, balance, low, given, head)
+    above = excess(floats, at, balance, high, given, head)
     if below >= 0.0:
         return low
     if above <= 0.0:
@@ -125,7 +159,9 @@ def inlet_weir_flow(floats, at, slope, headwater):
     head = headwater - floats[at + KS] * slope * min(height, headwater / FADING)
     if head <= 0.0:
         return 0.0
-    return critical_flow(floats, at, critical_depth(floats, at, INLET, 0.0, min(head, height), 0.0, head))[0]
+    return critical_flow(
+        floats, at, critical_depth(floats, at, INLET, 0.0, min(head, height), 0.0, head)
+    )[0]
 
 
 @njit
@@ -135,7 +171,8 @@ def inlet_flow(floats, at, slope, headwater, joint):
     if headwater <= WEIR_END * height:
         return inlet_weir_flow(floats, at, slope, headwater)
     constant, unit = floats[at + Y] + floats[at + KS] * slope, floats[at + AREA] * sqrt(height) / KU
-    start = max(floats[at + C] * ORIFICE_START**2 + constant, WEIR_END + 1e-3) * height  # headwater at x = 4
+    # headwater at x = 4
+    start = max(floats[at + C] * ORIFICE_START**2 + constant, WEIR_END + 1e-3) * height
     if headwater < start:
         share = (headwater - WEIR_END * height) / (start - WEIR_END * height)
         return joint + share * (ORIFICE_START * unit - joint)
@@ -149,14 +186,17 @@ def outlet_flow(floats, at, balance, headwater, head, tail):
     headwater : depth of the higher level at the inlet; head, tail : of both levels above the invert of the outlet [m]
     """
     height = floats[at + HEIGHT]
-    given, at_critical = min(headwater, height), tail  # critical depth with an outlet's head equal to the tail
+    # critical depth with an outlet's head equal to the tail
+    given, at_critical = min(headwater, height), tail
     area, _, perimeter = section(floats, at, 0.5 * (given + min(max(tail, 0.0), height)))
     if balance == FULL:
         at_critical = 2.0 * tail - height
         area, _, perimeter = section(floats, at, height)
     most = critical_flow(floats, at, given)[0]
     drowned = sqrt(max(head - tail, 0.0) / loss_factor(floats, at, area, perimeter))
-    if at_critical >= height or (at_critical > 0.0 and critical_flow(floats, at, at_critical)[0] >= drowned):
+    if at_critical >= height or (
+        at_critical > 0.0 and critical_flow(floats, at, at_critical)[0] >= drowned
+    ):
         return (drowned, DROWNED) if balance == FULL or drowned < most else (most, FREE)
     high = height if balance == FULL else given
     depth = critical_depth(floats, at, balance, min(max(at_critical, 0.0), high), high, given, head)
@@ -168,11 +208,14 @@ def outlet_flow(floats, at, balance, headwater, head, tail):
 @njit
 def controlled_flow(floats, at, ahead, z, fall):
     """(flow [m3/s], regime, control) of a culvert; arguments as in `kernels.structures`."""
-    near, far = (floats[at + FROM], floats[at + TO]) if ahead else (floats[at + TO], floats[at + FROM])
+    near, far = (
+        (floats[at + FROM], floats[at + TO]) if ahead else (floats[at + TO], floats[at + FROM])
+    )
     headwater, height = z - near, floats[at + HEIGHT]
     if headwater <= 0.0:
         return 0.0, NONE, DRY
-    slope, joint = (near - far) / floats[at + LENGTH], floats[at + FLOW_FROM] if ahead else floats[at + FLOW_TO]
+    slope = (near - far) / floats[at + LENGTH]
+    joint = floats[at + FLOW_FROM] if ahead else floats[at + FLOW_TO]
     inlet = inlet_flow(floats, at, slope, headwater, joint)
     share = min(max((headwater / height - PARTLY) / (FULL_FROM - PARTLY), 0.0), 1.0)
     flow, regime = 0.0, FREE
@@ -181,7 +224,8 @@ def controlled_flow(floats, at, ahead, z, fall):
         flow, regime = (1.0 - share) * min(inlet, outlet), found if outlet < inlet else FREE
     if share > 0.0:
         outlet, found = outlet_flow(floats, at, FULL, headwater, z - far, z - far - fall)
-        flow, regime = flow + share * min(inlet, outlet), max(found, regime) if outlet < inlet else regime
+        flow = flow + share * min(inlet, outlet)
+        regime = max(found, regime) if outlet < inlet else regime
     control = INLET_WEIR if headwater <= WEIR_END * height else INLET_ORIFICE
     if flow < (1.0 - 1e-9) * inlet:
         control = OUTLET
@@ -196,17 +240,32 @@ def rule(floats, at, setting, ahead, z, fall):
 
 
 set = structures.set_structure
-flow = culvert_law_flow = specialise(structures.flow_template, "culvert_law_flow", RULE=rule, __name__=__name__)
-slopes = culvert_law_slopes = specialise(structures.slopes_template, "culvert_law_slopes", FLOW=flow, __name__=__name__)
-chord = culvert_law_chord = specialise(structures.chord_template, "culvert_law_chord", FLOW=flow, __name__=__name__)
+flow = culvert_law_flow = specialise(
+    structures.flow_template, "culvert_law_flow", RULE=rule, __name__=__name__
+)
+slopes = culvert_law_slopes = specialise(
+    structures.slopes_template, "culvert_law_slopes", FLOW=flow, __name__=__name__
+)
+chord = culvert_law_chord = specialise(
+    structures.chord_template, "culvert_law_chord", FLOW=flow, __name__=__name__
+)
 line = culvert_law_line = specialise(
-    structures.line_template, "culvert_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
+    structures.line_template,
+    "culvert_law_line",
+    FLOW=flow,
+    SLOPES=slopes,
+    CHORD=chord,
+    __name__=__name__,
 )
 step = culvert_law_step = specialise(
     structures.step_template, "culvert_law_step", FLOW=flow, LINE=line, __name__=__name__
 )
-lift = culvert_law_lift = specialise(structures.lift_template, "culvert_law_lift", SLOPES=slopes, __name__=__name__)
-slope = culvert_law_slope = specialise(structures.slope_template, "culvert_law_slope", SLOPES=slopes, __name__=__name__)
+lift = culvert_law_lift = specialise(
+    structures.lift_template, "culvert_law_lift", SLOPES=slopes, __name__=__name__
+)
+slope = culvert_law_slope = specialise(
+    structures.slope_template, "culvert_law_slope", SLOPES=slopes, __name__=__name__
+)
 regime_of = culvert_law_regime_of = specialise(
     structures.regime_template, "culvert_law_regime_of", FLOW=flow, __name__=__name__
 )
@@ -219,4 +278,8 @@ def value(t, y, out, tables, device, quantity):
         return regime_of(t, y, out, tables, device, quantity)
     k = device["valve"]
     ahead, z, fall = higher_level(tables, out, k, head_drop(tables, out, k)[1])
-    return float(controlled_flow(tables.floats, tables.valves[k]["data"], ahead, z, max(fall, LINEAR_FALL))[2])
+    return float(
+        controlled_flow(tables.floats, tables.valves[k]["data"], ahead, z, max(fall, LINEAR_FALL))[
+            2
+        ]
+    )

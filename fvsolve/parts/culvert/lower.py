@@ -38,10 +38,26 @@ def culvert_numbers(part, gravity: float) -> list[float]:
     inlet, (near, far) = inlets()[part.inlet], part.inverts
     height = part.height if part.diameter is None else part.diameter
     numbers = [
-        inlet.form, inlet.K, inlet.M, inlet.c, inlet.Y, inlet.slope_factor, part.width or 0.0, height,
-        barrel_area(part), gravity, part.losses, FRICTION * part.manning**2 * part.length,
-        part.barrels * (1.0 - part.blockage), part.length, near, far,
-    ]  # fmt: skip
+        inlet.form,
+        inlet.K,
+        inlet.M,
+        inlet.c,
+        inlet.Y,
+        inlet.slope_factor,
+        part.width or 0.0,
+        height,
+        barrel_area(part),
+        gravity,
+        part.losses,
+        FRICTION * part.manning**2 * part.length,
+        part.barrels * (1.0 - part.blockage),
+        part.length,
+        near,
+        far,
+    ]
     numbers, slope = [float(number) for number in numbers], (near - far) / part.length
-    at_joint = (law.inlet_weir_flow(np.array(numbers), 0, side, law.WEIR_END * height) for side in (slope, -slope))
+    at_joint = (
+        law.inlet_weir_flow(np.array(numbers), 0, side, law.WEIR_END * height)
+        for side in (slope, -slope)
+    )
     return [*numbers, *map(float, at_joint)]

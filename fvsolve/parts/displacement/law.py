@@ -23,9 +23,22 @@ from fvsolve.jit import njit
 # setting at the start; range of a compensator [Pa], 0 without one; shares that the set pressure and the sensed pressure
 # give at the start; schedule of the set pressure, -1 for none, and its value at the start [Pa]; sensed node, or -1
 (
-    DISPLACEMENT, LEAKAGE, VISCOUS, DRY, SHAFT, LIGHTNESS, LAG, SETTING, RANGE, SHARE, SENSED_SHARE, SET_SCHEDULE,
-    SET_PRESSURE, SENSED, COUNT,
-) = range(15)  # fmt: skip
+    DISPLACEMENT,
+    LEAKAGE,
+    VISCOUS,
+    DRY,
+    SHAFT,
+    LIGHTNESS,
+    LAG,
+    SETTING,
+    RANGE,
+    SHARE,
+    SENSED_SHARE,
+    SET_SCHEDULE,
+    SET_PRESSURE,
+    SENSED,
+    COUNT,
+) = range(15)
 FULL, NONE, LIMITED = 0, 2, 4  # event flags of a compensator, beside `event`
 RELUCTANCE = 1e-10  # margin of the share at events, so that rounding does not change the mode
 TORQUE, SETTING_VALUE, TAKEN = 0, 1, 2  # quantities
@@ -52,7 +65,9 @@ def machine_setting(t, y, tables, device):
 def set(t, y, out, tables, device):
     """Write to `out` the speed times the setting [rad/s], as drive, and the conductance that marks it as open."""
     layout, k = tables.layout[0], device["valve"]
-    out[layout["drive"] + k] = machine_setting(t, y, tables, device) * machine_speed(t, out, tables, device)
+    out[layout["drive"] + k] = machine_setting(t, y, tables, device) * machine_speed(
+        t, out, tables, device
+    )
     out[layout["conductance"] + k] = tables.valves[k]["conductance"]
 
 
@@ -62,7 +77,9 @@ def step(out, tables, k, g, m, drop, denser, wide):
 
     Arguments as for `restriction_step`.
     """
-    floats, at, rho = tables.floats, tables.valves[k]["data"], tables.settings[0]["rho"]
+    floats = tables.floats
+    at = tables.valves[k]["data"]
+    rho = tables.settings[0]["rho"]
     leakage = denser * rho * floats[at + LEAKAGE]
     swept = floats[at + DISPLACEMENT] * out[tables.layout[0]["drive"] + k]
     return inlet_density(out, tables, k) * swept + leakage * drop - m, leakage
@@ -71,7 +88,9 @@ def step(out, tables, k, g, m, drop, denser, wide):
 @njit
 def inlet_density(out, tables, k):
     """Density of the fluid that machine k takes in [kg/m3]."""
-    st, valve, nodes = tables.settings[0], tables.valves[k], tables.nodes
+    st = tables.settings[0]
+    valve = tables.valves[k]
+    nodes = tables.nodes
     if st["law"] == LAW_LINEAR:
         return st["rho"]
     i = valve["from_node"] if out[tables.layout[0]["drive"] + k] >= 0.0 else valve["to_node"]
@@ -88,7 +107,9 @@ def slope(out, tables, k, g, drop):
 def fluid_torque(t, y, out, tables, device):
     """Torque of the fluid on the shaft [N m], positive in the direction of the flow from `from` to `to`."""
     drop = pressure_drop(out, tables, device["valve"])
-    return machine_setting(t, y, tables, device) * tables.floats[device["data"] + DISPLACEMENT] * drop
+    return (
+        machine_setting(t, y, tables, device) * tables.floats[device["data"] + DISPLACEMENT] * drop
+    )
 
 
 @njit
@@ -114,7 +135,9 @@ def compensator_shares(t, out, tables, device):
 
     A large number stands for a share that does not exist.
     """
-    floats, at, pressure = tables.floats, device["data"], tables.layout[0]["pressure"]
+    floats = tables.floats
+    at = device["data"]
+    pressure = tables.layout[0]["pressure"]
     behind = out[pressure + tables.valves[device["valve"]]["to_node"]]
     own = sensed = 1e300
     schedule, node = int(floats[at + SET_SCHEDULE]), int(floats[at + SENSED])
@@ -141,7 +164,9 @@ def compensator_share(t, out, tables, device):
 @njit
 def move(t, y, dydt, out, tables, device):
     """Write the rate of the setting to `dydt`, and raise out[RATE] to the rate limit of setting and shaft."""
-    floats, at, k = tables.floats, device["data"], device["valve"]
+    floats = tables.floats
+    at = device["data"]
+    k = device["valve"]
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], machine_rate(t, y, out, tables, device))
     if dydt.size == 0 or device["y"] < 0:
@@ -155,9 +180,14 @@ def move(t, y, dydt, out, tables, device):
 @njit
 def machine_rate(t, y, out, tables, device):
     """Rate limit [1/s]: of the setting with its lag and compensator, and of the shaft against the pressures."""
-    floats, at, nodes, layout = tables.floats, device["data"], tables.nodes, tables.layout[0]
+    floats = tables.floats
+    at = device["data"]
+    nodes = tables.nodes
+    layout = tables.layout[0]
     valve, rate = tables.valves[device["valve"]], 0.0
-    i, j, rho = valve["from_node"], valve["to_node"], tables.settings[0]["rho"]
+    i = valve["from_node"]
+    j = valve["to_node"]
+    rho = tables.settings[0]["rho"]
     behind = stiffness_of(nodes, layout, out, j)
     if device["y"] >= 0:
         rate = 1.0 / floats[at + LAG]
@@ -165,7 +195,11 @@ def machine_rate(t, y, out, tables, device):
             w = machine_speed(t, out, tables, device)
             gain = rho * floats[at + DISPLACEMENT] * abs(w) * rate / floats[at + RANGE]
             rate += max(gain * node_impedance(tables, j), sqrt(gain * behind))
-    gain = rho * floats[at + LIGHTNESS] * (machine_setting(t, y, tables, device) * floats[at + DISPLACEMENT]) ** 2
+    gain = (
+        rho
+        * floats[at + LIGHTNESS]
+        * (machine_setting(t, y, tables, device) * floats[at + DISPLACEMENT]) ** 2
+    )
     impedance = node_impedance(tables, i) + node_impedance(tables, j)
     return max(rate, gain * impedance, sqrt(gain * (stiffness_of(nodes, layout, out, i) + behind)))
 
@@ -189,7 +223,9 @@ def events(t, y, out, tables, device, g):
         none -= RELUCTANCE
     event_pair(tables, g, at + FULL, full)
     event_pair(tables, g, at + NONE, none)
-    event_pair(tables, g, at + LIMITED, own - sensed + (-RELUCTANCE if armed[at + LIMITED] > 0.0 else 0.0))
+    event_pair(
+        tables, g, at + LIMITED, own - sensed + (-RELUCTANCE if armed[at + LIMITED] > 0.0 else 0.0)
+    )
 
 
 @njit
@@ -201,7 +237,11 @@ def value(t, y, out, tables, device, quantity):
     if quantity == SETTING_VALUE:
         return machine_setting(t, y, tables, device)
     by_network = tables.floats[device["data"] + SHAFT] >= 0.0
-    torque = fluid_torque(t, y, out, tables, device) if by_network else shaft_torque(t, y, out, tables, device)
+    torque = (
+        fluid_torque(t, y, out, tables, device)
+        if by_network
+        else shaft_torque(t, y, out, tables, device)
+    )
     return torque if quantity == TORQUE else 0.0 - torque
 
 

@@ -12,11 +12,18 @@ from fvsolve.parts import law_elements as codes
 from fvsolve.parts.displacement import law
 from fvsolve.parts.displacement.part import LAG
 from fvsolve.parts.law_elements import SLOT
-from fvsolve.parts.network_elements import FLOW, Element, fill_network_probe, network_of, node_or_reference
+from fvsolve.parts.network_elements import (
+    FLOW,
+    Element,
+    fill_network_probe,
+    network_of,
+    node_or_reference,
+)
 from fvsolve.parts.network_parts import dry_friction
 from fvsolve.parts.rotation import resistances
 
-SPEED, PRESSURE = 100.0, 1e5  # sizes of speeds [rad/s], where nothing states one, and of pressure drops [Pa]
+# sizes of speeds [rad/s], where nothing states one, and of pressure drops [Pa]
+SPEED, PRESSURE = 100.0, 1e5
 FULL, REGULATING, NONE = "full", "regulating", "none"  # modes of a compensator in the steady start
 SMALL_SHARE = 1e-9  # share of the displacement that counts as rounding
 
@@ -26,14 +33,19 @@ class MachineRows(Device, kind="displacement-pump"):
 
     law = law
     quantities = ("torque", "setting")  # then the torque of a pump
-    direction: ClassVar[float] = -1.0  # of the probe `torque`, as a torque that turns the shaft forward
+    # of the probe `torque`, as a torque that turns the shaft forward
+    direction: ClassVar[float] = -1.0
     remedy = "give the pump a longer setting_time or its compensator a greater range"
 
     def of(self, part):
         return COMPENSATED if compensator_of(part) is not None else self
 
     def states_of(self, draft, name, part) -> tuple[str, ...]:
-        return ("setting",) if compensator_of(part) is not None or part.setting_time is not None else ()
+        return (
+            ("setting",)
+            if compensator_of(part) is not None or part.setting_time is not None
+            else ()
+        )
 
     def scales(self, draft, name, part) -> list[float]:
         return [0.1 for _ in self.states_of(draft, name, part)]
@@ -49,7 +61,11 @@ class MachineRows(Device, kind="displacement-pump"):
     def inputs(self, model, name, part):
         row = self.row_of(model, name)
         own = {"setting": Input(POSITION, int(model.tables.valves[row["valve"]]["schedule"]))}
-        return own if part.speed is None else own | {"speed": Input(ANGULAR_SPEED, int(row["schedule"]))}
+        return (
+            own
+            if part.speed is None
+            else own | {"speed": Input(ANGULAR_SPEED, int(row["schedule"]))}
+        )
 
     def network_elements(self, case, name, part):
         """Elements of the shaft: torque of the fluid and friction, each into the part."""
@@ -58,13 +74,25 @@ class MachineRows(Device, kind="displacement-pump"):
         if shaft is None:
             return [], []
         ends, (_, viscous, dry) = (shaft, None), part.losses
-        found = [Element(FLOW, f"{place}.fluid", place, ends, reads=(codes.DEVICE_INPUT, (name, "torque", -1.0)))]
+        found = [
+            Element(
+                FLOW,
+                f"{place}.fluid",
+                place,
+                ends,
+                reads=(codes.DEVICE_INPUT, (name, "torque", -1.0)),
+            )
+        ]
         found += resistances(place, ends, viscous)
-        friction, switches = dry_friction(place, ends, (dry, dry, 0.0, 1.0)) if dry > 0.0 else ([], [])
+        friction, switches = (
+            dry_friction(place, ends, (dry, dry, 0.0, 1.0)) if dry > 0.0 else ([], [])
+        )
         return found + friction, switches
 
     def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity == "torque" and f"links.{name}" in getattr(network_of(draft), "total_numbers", {}):
+        if probe.quantity == "torque" and f"links.{name}" in getattr(
+            network_of(draft), "total_numbers", {}
+        ):
             fill_network_probe(draft, row, f"links.{name}", "all flows", -self.direction)
             return
         super().probe(draft, name, probe, row)
@@ -85,9 +113,15 @@ class MachineRows(Device, kind="displacement-pump"):
         if part.speed is not None:
             device["schedule"] = draft.schedules.add(part.speed)
         numbers = {
-            law.DISPLACEMENT: part.displacement, law.LEAKAGE: leakage, law.VISCOUS: viscous, law.DRY: dry,
-            law.SHAFT: -1.0, law.LAG: part.setting_time or LAG, law.SET_SCHEDULE: -1.0, law.SENSED: -1.0,
-        }  # fmt: skip
+            law.DISPLACEMENT: part.displacement,
+            law.LEAKAGE: leakage,
+            law.VISCOUS: viscous,
+            law.DRY: dry,
+            law.SHAFT: -1.0,
+            law.LAG: part.setting_time or LAG,
+            law.SET_SCHEDULE: -1.0,
+            law.SENSED: -1.0,
+        }
         return [float(numbers.get(k, 0.0)) for k in range(law.COUNT)]
 
     def part(self, start, k: int):
@@ -119,7 +153,9 @@ class MachineRows(Device, kind="displacement-pump"):
         density = start.density_at(i if setting * speed >= 0.0 else j)
         full = density * part.displacement * setting * speed
         slope = start.draft.fluid.density * density_ratio * part.losses[0]
-        return self.edge_of(start, k, full, slope, ratio, Edge(i, j, None, full, drives=speed != 0.0))
+        return self.edge_of(
+            start, k, full, slope, ratio, Edge(i, j, None, full, drives=speed != 0.0)
+        )
 
     def edge_of(self, start, k: int, full: float, slope: float, ratio: float, edge: Edge) -> Edge:
         """Edge in the steady problem with the mass flow full + slope drop.
@@ -142,7 +178,9 @@ class MachineRows(Device, kind="displacement-pump"):
 
     def begin(self, start, part, row) -> list[str]:
         k, draft = int(row["valve"]), start.draft
-        floats, at, valve = draft.tables.floats, int(row["data"]), start.valves[int(row["valve"])]
+        floats = draft.tables.floats
+        at = int(row["data"])
+        valve = start.valves[int(row["valve"])]
         setting = float(start.schedule_value(valve["schedule"])) * self.share(start, k)
         floats[at + law.SETTING] = setting
         valve["drive"] = setting * self.speed_at(start, k)
@@ -152,7 +190,8 @@ class MachineRows(Device, kind="displacement-pump"):
         return []
 
     def source_at_start(self, start, part, row, quantity, flow) -> float:
-        drop, setting = start.valve_drive(int(row["valve"]))[0], start.draft.tables.floats[row["data"] + law.SETTING]
+        drop = start.valve_drive(int(row["valve"]))[0]
+        setting = start.draft.tables.floats[row["data"] + law.SETTING]
         return float(setting) * part.displacement * float(drop)
 
 
@@ -165,8 +204,14 @@ class MotorRows(MachineRows, kind="displacement-motor"):
 class CompensatedRows(MachineRows, kind=""):
     """Conversion to table rows of displacement pumps with a compensator."""
 
-    events = ("has full displacement", "is destroked", "has no displacement", "delivers again",
-              "is limited by its set_pressure", "follows the sensed pressure")  # fmt: skip
+    events = (
+        "has full displacement",
+        "is destroked",
+        "has no displacement",
+        "delivers again",
+        "is limited by its set_pressure",
+        "follows the sensed pressure",
+    )
 
     def of(self, part):
         return self
@@ -191,7 +236,9 @@ class CompensatedRows(MachineRows, kind=""):
         if own.set_pressure is not None:
             values[0] = (self.set_pressure(start, k) - behind) / own.range
         if own.senses is not None:
-            values[1] = (start.pressure(start.draft.node_index[own.senses]) + own.margin - behind) / own.range
+            values[1] = (
+                start.pressure(start.draft.node_index[own.senses]) + own.margin - behind
+            ) / own.range
         return values[0], values[1]
 
     def share(self, start, k):
@@ -211,17 +258,26 @@ class CompensatedRows(MachineRows, kind=""):
         edge.sensed_nodes, steep, height = places, per * full / own.range, start.nodes["elevation"]
 
         def newton(flow, present, *potentials):
-            behind, *sensed = (start.law.pressure_of(p, height[i]) for p, i in zip(potentials, places, strict=True))
+            behind, *sensed = (
+                start.law.pressure_of(p, height[i]) for p, i in zip(potentials, places, strict=True)
+            )
             goal = sensed[0] + own.margin if sensed else self.set_pressure(start, k)
             target = full * (goal - behind) / own.range + slope * ratio * present
-            return per, per * slope * ratio, per * (target - flow), *([-steep, steep][: len(places)])
+            return (
+                per,
+                per * slope * ratio,
+                per * (target - flow),
+                *([-steep, steep][: len(places)]),
+            )
 
         edge.row = newton
         return edge
 
     def set_pressure(self, start, k: int) -> float:
         """Set pressure of valve row k at the start [Pa]."""
-        return start.schedule_value(start.draft.tables.floats[self.data_of(start, k) + law.SET_SCHEDULE])
+        return start.schedule_value(
+            start.draft.tables.floats[self.data_of(start, k) + law.SET_SCHEDULE]
+        )
 
     def data_of(self, start, k: int) -> int:
         """Index of the numbers of valve row k in `floats`."""
@@ -232,14 +288,22 @@ class CompensatedRows(MachineRows, kind=""):
         if start.rest:
             return False
         before, share = start.valve_modes[k], min(self.shares(start, k))
-        after = {FULL: REGULATING if share < 1.0 - SMALL_SHARE else FULL,
-                 REGULATING: FULL if share > 1.0 + SMALL_SHARE else NONE if share < -SMALL_SHARE else REGULATING,
-                 NONE: REGULATING if share > SMALL_SHARE else NONE}[before]  # fmt: skip
+        after = {
+            FULL: REGULATING if share < 1.0 - SMALL_SHARE else FULL,
+            REGULATING: FULL
+            if share > 1.0 + SMALL_SHARE
+            else NONE
+            if share < -SMALL_SHARE
+            else REGULATING,
+            NONE: REGULATING if share > SMALL_SHARE else NONE,
+        }[before]
         start.valve_modes[k] = after
         return after != before
 
     def begin(self, start, part, row) -> list[str]:
-        k, floats, at = int(row["valve"]), start.draft.tables.floats, int(row["data"])
+        k = int(row["valve"])
+        floats = start.draft.tables.floats
+        at = int(row["data"])
         floats[at + law.SHARE], floats[at + law.SENSED_SHARE] = self.shares(start, k)
         if part.compensator.set_pressure is not None:
             floats[at + law.SET_PRESSURE] = self.set_pressure(start, k)

@@ -11,7 +11,8 @@ from fvsolve.parts.value import Number, Quantity, Text, UsualRange, between, non
 
 DISPLACEMENTS = UsualRange(1e-9, 1e-2, "0.006 cc/rev to 63 l/rev")  # [m3/rad]
 SPEEDS = UsualRange(0.1, 950.0, "1 rpm of motors of winches to 9000 rpm of pumps of aircraft")
-LAG = 0.05  # lag of a compensator without `setting_time` [s], of axial piston pumps of 28 to 100 cc/rev
+# lag of a compensator without `setting_time` [s], of axial piston pumps of 28 to 100 cc/rev
+LAG = 0.05
 
 
 class Compensator(Table):
@@ -30,13 +31,23 @@ class Compensator(Table):
             usual=UsualRange(2e5, 1e8, "of compensators"),
         ),
     ] = None
-    range: Annotated[float, Quantity(
-        "pressure_drop", positive, "pressure range below it in which the displacement falls to 0 [Pa]",
-        UsualRange(1e3, 1e8, "of compensators"),
-    )]  # fmt: skip
-    senses: Annotated[str | None, Text("place whose pressure plus `margin` is the set pressure (load sensing)")] = None
+    range: Annotated[
+        float,
+        Quantity(
+            "pressure_drop",
+            positive,
+            "pressure range below it in which the displacement falls to 0 [Pa]",
+            UsualRange(1e3, 1e8, "of compensators"),
+        ),
+    ]
+    senses: Annotated[
+        str | None, Text("place whose pressure plus `margin` is the set pressure (load sensing)")
+    ] = None
     margin: Annotated[
-        float | None, Quantity("pressure_drop", nonnegative, "pressure above that at `senses`, with `senses` [Pa]")
+        float | None,
+        Quantity(
+            "pressure_drop", nonnegative, "pressure above that at `senses`, with `senses` [Pa]"
+        ),
     ] = None
 
     @classmethod
@@ -52,9 +63,11 @@ class DisplacementMachine(TwoPort):
     """Base of displacement pumps and motors: keys of the volume per angle, of the shaft and of losses."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        ("ports", "speed"), ("volumetric_efficiency", "leakage"),
-        ("mechanical_efficiency", "viscous_friction"), ("mechanical_efficiency", "friction_torque"),
-    )  # fmt: skip
+        ("ports", "speed"),
+        ("volumetric_efficiency", "leakage"),
+        ("mechanical_efficiency", "viscous_friction"),
+        ("mechanical_efficiency", "friction_torque"),
+    )
     joins: ClassVar[dict[str, str]] = {**TwoPort.joins, "shaft": "rotational"}
     may_lack: ClassVar[tuple[str, ...]] = ("shaft",)
     network_ports: ClassVar[tuple[str, ...]] = ("shaft",)
@@ -62,43 +75,80 @@ class DisplacementMachine(TwoPort):
     main_quantities: ClassVar[tuple[str, ...]] = ("flow", "torque")
 
     shaft_port: Annotated[
-        dict[str, str] | None, Ports(("shaft",), "shaft or housing that it turns with, instead of `speed`")
+        dict[str, str] | None,
+        Ports(("shaft",), "shaft or housing that it turns with, instead of `speed`"),
     ] = Field(None, alias="ports")
-    speed: Annotated[Schedule | None, Scheduled(
-        "angular_velocity", about="angular velocity, if no shaft turns with it [rad/s]",
-        usual=UsualRange(-950.0, 950.0, "to 9000 rpm of pumps of aircraft"),
-    )] = None  # fmt: skip
+    speed: Annotated[
+        Schedule | None,
+        Scheduled(
+            "angular_velocity",
+            about="angular velocity, if no shaft turns with it [rad/s]",
+            usual=UsualRange(-950.0, 950.0, "to 9000 rpm of pumps of aircraft"),
+        ),
+    ] = None
     displacement: Annotated[
-        float, Quantity("displacement", positive, "volume per angle at full setting [m3/rad]", DISPLACEMENTS)
+        float,
+        Quantity(
+            "displacement", positive, "volume per angle at full setting [m3/rad]", DISPLACEMENTS
+        ),
     ]
     setting: Annotated[
-        Schedule, Scheduled("number", between(-1, 1), "displacement over `displacement`; negative over centre")
+        Schedule,
+        Scheduled(
+            "number", between(-1, 1), "displacement over `displacement`; negative over centre"
+        ),
     ] = Field(default_factory=lambda: constant(1.0))
-    setting_time: Annotated[float | None, Quantity(
-        "time", positive, f"time constant of the setting [s]; no delay, with `compensator` {LAG} if left out",
-        UsualRange(1e-4, 100.0, "servo drives to hand wheels"),
-    )] = None  # fmt: skip
-    volumetric_efficiency: Annotated[float | None, Number(
-        between(0, 1, open=True), "volumetric efficiency at `rated_pressure` and `rated_speed`, instead of `leakage`",
-    )] = None  # fmt: skip
-    mechanical_efficiency: Annotated[float | None, Number(
-        between(0, 1, open=True), "hydromechanical efficiency at the same point, whose losses are half viscous, half "
-        "dry friction",
-    )] = None  # fmt: skip
+    setting_time: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            f"time constant of the setting [s]; no delay, with `compensator` {LAG} if left out",
+            UsualRange(1e-4, 100.0, "servo drives to hand wheels"),
+        ),
+    ] = None
+    volumetric_efficiency: Annotated[
+        float | None,
+        Number(
+            between(0, 1, open=True),
+            "volumetric efficiency at `rated_pressure` and `rated_speed`, instead of `leakage`",
+        ),
+    ] = None
+    mechanical_efficiency: Annotated[
+        float | None,
+        Number(
+            between(0, 1, open=True),
+            "hydromechanical efficiency at the same point, whose losses are half viscous, half "
+            "dry friction",
+        ),
+    ] = None
     rated_pressure: Annotated[
         float | None,
-        Quantity("pressure_drop", positive, "pressure difference of the efficiencies [Pa]",
-                 UsualRange(1e4, 1e8, "cooling circuits to presses")),
-    ] = None  # fmt: skip
+        Quantity(
+            "pressure_drop",
+            positive,
+            "pressure difference of the efficiencies [Pa]",
+            UsualRange(1e4, 1e8, "cooling circuits to presses"),
+        ),
+    ] = None
     rated_speed: Annotated[
-        float | None, Quantity("angular_velocity", positive, "speed of the efficiencies [rad/s]", SPEEDS)
+        float | None,
+        Quantity("angular_velocity", positive, "speed of the efficiencies [rad/s]", SPEEDS),
     ] = None
     leakage: Annotated[
-        float | None, Quantity("leakage", nonnegative, "leakage flow per pressure difference [m3/s/Pa]; 0 if left out")
+        float | None,
+        Quantity(
+            "leakage", nonnegative, "leakage flow per pressure difference [m3/s/Pa]; 0 if left out"
+        ),
     ] = None
-    viscous_friction: Annotated[float | None, Quantity(
-        "rotational_damping", nonnegative, "friction torque per speed [N m s/rad]; 0 if left out",
-    )] = None  # fmt: skip
+    viscous_friction: Annotated[
+        float | None,
+        Quantity(
+            "rotational_damping",
+            nonnegative,
+            "friction torque per speed [N m s/rad]; 0 if left out",
+        ),
+    ] = None
     friction_torque: Annotated[
         float | None, Quantity("torque", nonnegative, "torque of dry friction [N m]; 0 if left out")
     ] = None
@@ -119,7 +169,9 @@ class DisplacementMachine(TwoPort):
         if "ports" not in given and "speed" not in given:
             text = 'its speed is missing; expected ports = { shaft = "..." } or, for example, speed = "1500 rpm"'
             faults.append(((), text))
-        efficient = [key for key in ("volumetric_efficiency", "mechanical_efficiency") if key in given]
+        efficient = [
+            key for key in ("volumetric_efficiency", "mechanical_efficiency") if key in given
+        ]
         for key in ("rated_pressure", "rated_speed"):
             if efficient and key not in given:
                 faults.append(((efficient[0],), f"needs the key `{key}`"))
@@ -132,17 +184,29 @@ class DisplacementMachine(TwoPort):
         node = around.nodes.get(self.shaft or "")
         given = getattr(node, "reference_potential", None)
         if given is not None and given.constant and given.first == 0.0:
-            yield ("ports", "shaft"), f"{self.shaft} is a housing at rest, so nothing turns; expected a shaft"
+            yield (
+                ("ports", "shaft"),
+                f"{self.shaft} is a housing at rest, so nothing turns; expected a shaft",
+            )
 
     @property
     def losses(self) -> tuple[float, float, float]:
         """(leakage [m3/s/Pa], viscous friction [N m s/rad], torque of dry friction [N m])."""
-        leakage, viscous, dry = self.leakage or 0.0, self.viscous_friction or 0.0, self.friction_torque or 0.0
+        leakage = self.leakage or 0.0
+        viscous = self.viscous_friction or 0.0
+        dry = self.friction_torque or 0.0
         if self.volumetric_efficiency is not None:
-            leakage = self.displacement * self.rated_speed * self.flow_loss(self.volumetric_efficiency)
+            leakage = (
+                self.displacement * self.rated_speed * self.flow_loss(self.volumetric_efficiency)
+            )
             leakage /= self.rated_pressure
         if self.mechanical_efficiency is not None:
-            dry = 0.5 * self.displacement * self.rated_pressure * self.torque_loss(self.mechanical_efficiency)
+            dry = (
+                0.5
+                * self.displacement
+                * self.rated_pressure
+                * self.torque_loss(self.mechanical_efficiency)
+            )
             viscous = dry / self.rated_speed
         return leakage, viscous, dry
 
@@ -166,7 +230,9 @@ class DisplacementPump(DisplacementMachine, kind="displacement-pump"):
 
     sensed_keys: ClassVar[tuple[str, ...]] = ("compensator.senses",)
 
-    compensator: Annotated[Compensator | None, Nested(Compensator, "pressure compensator, or load sensing")] = None
+    compensator: Annotated[
+        Compensator | None, Nested(Compensator, "pressure compensator, or load sensing")
+    ] = None
 
     def flow_loss(self, efficiency: float) -> float:
         return 1.0 - efficiency

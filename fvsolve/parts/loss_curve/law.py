@@ -40,7 +40,8 @@ def step(out, tables, k, g, m, drop, denser, wide):
     floats, at = tables.floats, tables.valves[k]["data"]
     count, flows = int(floats[at + COUNT]), at + FLOWS
     losses = flows + count
-    here, there = section(floats, flows, count, abs(m) / denser), section(floats, losses, count, abs(drop) / denser)
+    here = section(floats, flows, count, abs(m) / denser)
+    there = section(floats, losses, count, abs(drop) / denser)
     lost, slope = odd_line(floats, flows, losses, here, m / denser)
     rest = drop - denser * lost
     if here != there or (here > 0 and m * drop < 0.0):
@@ -54,5 +55,10 @@ def step(out, tables, k, g, m, drop, denser, wide):
 def slope(out, tables, k, g, drop):
     """d flow / d drop [kg/s/Pa] at the present flow."""
     floats, at = tables.floats, tables.valves[k]["data"]
-    flow, count, flows = out[tables.layout[0]["valve"] + k], int(floats[at + COUNT]), at + FLOWS
-    return 1.0 / odd_line(floats, flows, flows + count, section(floats, flows, count, abs(flow)), flow)[1]
+    flow = out[tables.layout[0]["valve"] + k]
+    count = int(floats[at + COUNT])
+    flows = at + FLOWS
+    return (
+        1.0
+        / odd_line(floats, flows, flows + count, section(floats, flows, count, abs(flow)), flow)[1]
+    )

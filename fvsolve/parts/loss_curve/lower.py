@@ -7,8 +7,10 @@ from fvsolve.core.assembly.lowering import Restriction
 from . import law
 
 LEAST_FLOW = 1e-6  # flow up to which a loss at no flow grows from 0, over the second flow
-LEAST_SLOPE = 1e-7  # rise of the loss over a section, over the loss, per flow over the last flow of the section
-SMALL_LOSS = 1e-6  # difference from the loss of the curve at the start that counts as none, over the loss
+# rise of the loss over a section, over the loss, per flow over the last flow of the section
+LEAST_SLOPE = 1e-7
+# difference from the loss of the curve at the start that counts as none, over the loss
+SMALL_LOSS = 1e-6
 
 
 class LossCurveRows(Restriction, kind="loss-curve"):
@@ -20,7 +22,8 @@ class LossCurveRows(Restriction, kind="loss-curve"):
         """Set the conductance M^2 over the drop at the last point, by which scales of flows are computed."""
         flow, loss = self.curve(draft, link)
         ends = (draft.case.places[end] for end in (link.from_, link.to))
-        row["chained"] = any(node.kind == "junction" for node in ends)  # the links there limit the rate of its flow
+        # the links there limit the rate of its flow
+        row["chained"] = any(node.kind == "junction" for node in ends)
         row["conductance"] = flow[-1] * flow[-1] / loss[-1]
 
     def numbers(self, draft, name, link) -> list[float]:
@@ -58,7 +61,9 @@ class LossCurveRows(Restriction, kind="loss-curve"):
         flows, losses = np.split(np.asarray(floats[at + law.FLOWS : at + law.FLOWS + 2 * count]), 2)
         last = (losses[-1] - losses[-2]) / (flows[-1] - flows[-2])
         size = abs(flow)
-        lost = ratio * np.copysign(np.interp(size, flows, losses) + last * max(size - flows[-1], 0.0), flow)
+        lost = ratio * np.copysign(
+            np.interp(size, flows, losses) + last * max(size - flows[-1], 0.0), flow
+        )
         if abs(lost - drop) > SMALL_LOSS * (SMALL_LOSS * losses[-1] + abs(lost)):
             row["open"] = 0.0
         elif start.case.law.linear:

@@ -25,11 +25,15 @@ class Losses(Value):
         check_table(given, 'for example { flow = ["0 l/s", "20 l/s"], head = ["0 m", "1.5 m"] }')
         stated = [key for key in DIMENSIONS if key in given]
         if len(stated) > 1:
-            raise ValueFault([((), "`head` and `drop` both give the losses; expected one of these keys")])
+            raise ValueFault(
+                [((), "`head` and `drop` both give the losses; expected one of these keys")]
+            )
         key = stated[0] if stated else "head"
         return points(given, key, DIMENSIONS[key], setting, faults_of=self.faults_of)
 
-    def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], loss: tuple[float, ...]) -> list:
+    def faults_of(
+        self, given: dict[str, Any], flow: tuple[float, ...], loss: tuple[float, ...]
+    ) -> list:
         """Faults of losses that fall as the flow rises, and of points without a flow or a loss."""
         key = "head" if "head" in given else "drop"
         faults = []
@@ -44,7 +48,9 @@ class Losses(Value):
         return faults
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [keys_json(keys_of(key, dimension)) for key, dimension in DIMENSIONS.items()]}
+        return {
+            "anyOf": [keys_json(keys_of(key, dimension)) for key, dimension in DIMENSIONS.items()]
+        }
 
 
 class LossCurve(TwoPort, kind="loss-curve"):
@@ -60,4 +66,7 @@ class LossCurve(TwoPort, kind="loss-curve"):
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.loss.quantity == "head" and around.gravity == 0.0:
-            yield ("loss", "head"), "a head has no pressure without gravity; expected `drop`, a pressure drop"
+            yield (
+                ("loss", "head"),
+                "a head has no pressure without gravity; expected `drop`, a pressure drop",
+            )

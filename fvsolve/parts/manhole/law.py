@@ -20,7 +20,9 @@ def rule(floats, at, setting, ahead, z, fall):
     h, drive = z - floats[at + CREST], min(fall, z - floats[at + CREST])
     if h <= 0.0:
         return 0.0, NONE
-    orifice = floats[at + ORIFICE] * (sqrt(drive) if drive >= LINEAR_FALL else drive / sqrt(LINEAR_FALL))
+    orifice = floats[at + ORIFICE] * (
+        sqrt(drive) if drive >= LINEAR_FALL else drive / sqrt(LINEAR_FALL)
+    )
     if ahead == (floats[at + STREET_FIRST] == 1.0):
         weir, regime = weir_flow(floats[at + WEIR], h, fall)
         if weir <= orifice:
@@ -29,15 +31,32 @@ def rule(floats, at, setting, ahead, z, fall):
 
 
 set = structures.set_structure
-flow = manhole_law_flow = specialise(structures.flow_template, "manhole_law_flow", RULE=rule, __name__=__name__)
-slopes = manhole_law_slopes = specialise(structures.slopes_template, "manhole_law_slopes", FLOW=flow, __name__=__name__)
-chord = manhole_law_chord = specialise(structures.chord_template, "manhole_law_chord", FLOW=flow, __name__=__name__)
+flow = manhole_law_flow = specialise(
+    structures.flow_template, "manhole_law_flow", RULE=rule, __name__=__name__
+)
+slopes = manhole_law_slopes = specialise(
+    structures.slopes_template, "manhole_law_slopes", FLOW=flow, __name__=__name__
+)
+chord = manhole_law_chord = specialise(
+    structures.chord_template, "manhole_law_chord", FLOW=flow, __name__=__name__
+)
 line = manhole_law_line = specialise(
-    structures.line_template, "manhole_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
+    structures.line_template,
+    "manhole_law_line",
+    FLOW=flow,
+    SLOPES=slopes,
+    CHORD=chord,
+    __name__=__name__,
 )
 step = manhole_law_step = specialise(
     structures.step_template, "manhole_law_step", FLOW=flow, LINE=line, __name__=__name__
 )
-lift = manhole_law_lift = specialise(structures.lift_template, "manhole_law_lift", SLOPES=slopes, __name__=__name__)
-slope = manhole_law_slope = specialise(structures.slope_template, "manhole_law_slope", SLOPES=slopes, __name__=__name__)
-value = manhole_law_value = specialise(structures.regime_template, "manhole_law_value", FLOW=flow, __name__=__name__)
+lift = manhole_law_lift = specialise(
+    structures.lift_template, "manhole_law_lift", SLOPES=slopes, __name__=__name__
+)
+slope = manhole_law_slope = specialise(
+    structures.slope_template, "manhole_law_slope", SLOPES=slopes, __name__=__name__
+)
+value = manhole_law_value = specialise(
+    structures.regime_template, "manhole_law_value", FLOW=flow, __name__=__name__
+)

@@ -21,5 +21,7 @@ class ManholeRows(StructureRows, kind="manhole"):
     def numbers(self, draft, name, part) -> list[float]:
         drop = weir_size(draft, part.perimeter, part.weir_coefficient)
         # the street is at the end `to` if only that end is a patch of a basin
-        from_basin, to_basin = (draft.case.places[end].kind.startswith("patch") for end in (part.from_, part.to))
+        from_basin, to_basin = (
+            draft.case.places[end].kind.startswith("patch") for end in (part.from_, part.to)
+        )
         return [part.crest, drop, self.size(draft, part), float(from_basin or not to_basin)]

@@ -5,7 +5,8 @@ from typing import Annotated
 from fvsolve.parts.value import Number, Quantity, UsualRange, anything, positive
 from fvsolve.parts.weir.part import HydraulicStructure
 
-AREAS, PERIMETERS = UsualRange(0.01, 4.0, "gullies to shafts"), UsualRange(0.3, 10.0, "gullies to shafts")
+AREAS = UsualRange(0.01, 4.0, "gullies to shafts")
+PERIMETERS = UsualRange(0.3, 10.0, "gullies to shafts")
 COEFFICIENTS = UsualRange(0.05, 2.1, "Rubinato et al. 2018, Itzi")
 
 
@@ -21,8 +22,16 @@ class Manhole(HydraulicStructure, kind="manhole"):
     Dissipated power: dp q [W].
     """
 
-    crest: Annotated[float, Quantity("length", anything, "height of the lid, the street there, above datum [m]")]
+    crest: Annotated[
+        float, Quantity("length", anything, "height of the lid, the street there, above datum [m]")
+    ]
     area: Annotated[float, Quantity("area", positive, "area A of the open lid [m2]", AREAS)]
-    perimeter: Annotated[float, Quantity("length", positive, "perimeter P over which water falls [m]", PERIMETERS)]
-    weir_coefficient: Annotated[float, Number(positive, "coefficient Cw of the weir", COEFFICIENTS)] = 0.54
-    orifice_coefficient: Annotated[float, Number(positive, "coefficient Co of the orifice", COEFFICIENTS)] = 0.167
+    perimeter: Annotated[
+        float, Quantity("length", positive, "perimeter P over which water falls [m]", PERIMETERS)
+    ]
+    weir_coefficient: Annotated[
+        float, Number(positive, "coefficient Cw of the weir", COEFFICIENTS)
+    ] = 0.54
+    orifice_coefficient: Annotated[
+        float, Number(positive, "coefficient Co of the orifice", COEFFICIENTS)
+    ] = 0.167

@@ -16,7 +16,8 @@ from fvsolve.jit import njit
 LEAST_DROP = 10.0  # drop above `least` below which the cubic applies [Pa]
 EVENT_COUNT = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less
 FREE, SHUT, PART, FULL = 0, 1, 2, 3  # rules; FREE: by the drop alone
-EVENT_MARGIN = 1e-3  # drop beyond `least` at which it opens or shuts, so that rounding does not [Pa]
+# drop beyond `least` at which it opens or shuts, so that rounding does not [Pa]
+EVENT_MARGIN = 1e-3
 FULL_MARGIN = 1e-9  # such a margin at full demand, over span
 NO_LIMIT = 1e300  # value of `most` without a limit
 
@@ -73,7 +74,13 @@ def emitter_slope(floats, at, g, drop, rule):
     full = sqrt(g * span)
     if above < LEAST_DROP:
         s = above / LEAST_DROP
-        slope = full * (LEAST_DROP / span) ** n * s * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s) / LEAST_DROP
+        slope = (
+            full
+            * (LEAST_DROP / span) ** n
+            * s
+            * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s)
+            / LEAST_DROP
+        )
     else:
         share = (above / span) ** n
         slope = full * n * share / above if share < most else 0.0
@@ -83,7 +90,9 @@ def emitter_slope(floats, at, g, drop, rule):
 @njit
 def cubic_root(n, share):
     """Root s in [0, 1] of s^2 ((3 - n) + (n - 2) s) = share, by Newton's method with bounds."""
-    low, high, s = 0.0, 1.0, sqrt(share)
+    low = 0.0
+    high = 1.0
+    s = sqrt(share)
     for _ in range(60):
         residual = s * s * ((3.0 - n) + (n - 2.0) * s) - share
         if residual > 0.0:
@@ -110,7 +119,9 @@ def emitter_drop(floats, at, g, flow, rule):
         return floats[at + 1]
     most, least = NO_LIMIT if rule == PART else floats[at + 3], (LEAST_DROP / span) ** n
     ratio = min(most, flow / sqrt(g * span))
-    above = LEAST_DROP * cubic_root(n, ratio / least) if ratio < least else span * ratio ** (1.0 / n)
+    above = (
+        LEAST_DROP * cubic_root(n, ratio / least) if ratio < least else span * ratio ** (1.0 / n)
+    )
     return floats[at + 1] + (0.5 * above if rule == FULL else above)
 
 
@@ -138,14 +149,26 @@ def bends(tables, k, drop, g):
 
     They are the margins until the outlet shuts or opens, and until it supplies its full demand or less.
     """
-    valve, floats, armed = tables.valves[k], tables.floats, tables.armed
+    valve = tables.valves[k]
+    floats = tables.floats
+    armed = tables.armed
     at, event = valve["data"], valve["event"]
-    above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
+    above = drop - floats[at + 1]
+    span = floats[at + 2]
+    most = floats[at + 3]
+    missing = 1.0
     if most < NO_LIMIT:
         missing = (
-            span * (most ** (1.0 / floats[at]) + (-FULL_MARGIN if armed[event + 2] > 0.0 else FULL_MARGIN)) - above
+            span
+            * (
+                most ** (1.0 / floats[at])
+                + (-FULL_MARGIN if armed[event + 2] > 0.0 else FULL_MARGIN)
+            )
+            - above
         )
-    event_pair(tables, g, event, above - EVENT_MARGIN if armed[event] > 0.0 else above + EVENT_MARGIN)
+    event_pair(
+        tables, g, event, above - EVENT_MARGIN if armed[event] > 0.0 else above + EVENT_MARGIN
+    )
     event_pair(tables, g, event + 2, missing)
 
 
@@ -155,7 +178,9 @@ def step(out, tables, k, g, m, drop, denser, wide):
 
     The volume flow follows the drop: the conductance g grows with the square of the relative density `denser`.
     """
-    return emitter_step(tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k))
+    return emitter_step(
+        tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k)
+    )
 
 
 @njit

@@ -13,7 +13,9 @@ __all__ = ["bends", "slope", "step"]
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
     """(a, s) of `emitter_step` for restriction k under its present rule; arguments as for `restriction_step`."""
-    return emitter_step(tables.floats, tables.valves[k]["data"], g * denser, m, drop, rule_of(tables, k))
+    return emitter_step(
+        tables.floats, tables.valves[k]["data"], g * denser, m, drop, rule_of(tables, k)
+    )
 
 
 @njit

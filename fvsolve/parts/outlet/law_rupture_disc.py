@@ -20,13 +20,18 @@ def has_burst(tables, device):
 def set(t, y, out, tables, device):
     """Write to `out` the conductance of the disc [kg2/s2/Pa], 0 until it has burst."""
     k = device["valve"]
-    out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] if has_burst(tables, device) else 0.0
+    out[tables.layout[0]["conductance"] + k] = (
+        tables.valves[k]["conductance"] if has_burst(tables, device) else 0.0
+    )
 
 
 @njit
 def events(t, y, out, tables, device, g):
     """Write the event function to g: burst pressure minus drop [Pa], or -1 after the burst."""
-    left = tables.floats[device["data"] + device["mode"] + BURST] - head_drop(tables, out, device["valve"])[1]
+    left = (
+        tables.floats[device["data"] + device["mode"] + BURST]
+        - head_drop(tables, out, device["valve"])[1]
+    )
     g[device["event"] + device["mode"]] = -1.0 if has_burst(tables, device) else left
 
 

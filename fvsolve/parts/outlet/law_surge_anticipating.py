@@ -12,18 +12,22 @@ of the valve.
 
 from fvsolve.jit import njit
 
-OPENING_TIME, HOLD, CLOSING_TIME, LOW, HIGH, TRIP, PLACE = 0, 1, 2, 3, 4, 5, 6  # numbers; PLACE: sensed node
+# numbers; PLACE: sensed node
+OPENING_TIME, HOLD, CLOSING_TIME, LOW, HIGH, TRIP, PLACE = 0, 1, 2, 3, 4, 5, 6
 SHUT, OPENING, OPEN, CLOSING, BY_HIGH, ARMED_LOW, TRIPPED = 0, 1, 2, 3, 4, 5, 6  # flags
 FLAGS = 7
 NEVER = 1e300  # setting left out [Pa], [s]
-PRESSURE_MARGIN = 10.0  # pressure beyond a setting that arms the low-pressure opening, or reopens a closing valve [Pa]
+# pressure beyond a setting that arms the low-pressure opening, or reopens a closing valve [Pa]
+PRESSURE_MARGIN = 10.0
 LEAST = 1e-300
 
 
 @njit
 def valve_stage(y, tables, device):
     """Stage of the valve: SHUT, OPENING, OPEN or CLOSING."""
-    armed, at, o = tables.armed, device["event"] + device["mode"], device["y"]
+    armed = tables.armed
+    at = device["event"] + device["mode"]
+    o = device["y"]
     for stage in range(BY_HIGH):
         if armed[at + stage] > 0.0:
             return stage
@@ -44,7 +48,10 @@ def move(t, y, dydt, out, tables, device):
     """Write the rates of the opening and of the time spent fully open to `dydt`."""
     if dydt.size == 0:
         return
-    floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], valve_stage(y, tables, device)
+    floats = tables.floats
+    at = device["data"] + device["mode"]
+    o = device["y"]
+    stage = valve_stage(y, tables, device)
     rise = 1.0 / floats[at + OPENING_TIME] if stage == OPENING else 0.0
     dydt[o] = -1.0 / floats[at + CLOSING_TIME] if stage == CLOSING else rise
     dydt[o + 1] = 1.0 if stage == OPEN else 0.0
@@ -56,7 +63,9 @@ def pilot_margins(t, y, out, tables, device):
 
     low, high, trip : until it opens by low pressure, by high pressure and at the trip
     """
-    floats, armed, layout = tables.floats, tables.armed, tables.layout[0]
+    floats = tables.floats
+    armed = tables.armed
+    layout = tables.layout[0]
     at, flags = device["data"] + device["mode"], device["event"] + device["mode"]
     i = int(floats[at + PLACE])
     p = tables.nodes[i]["pressure"] + out[layout["pressure"] + i]
@@ -76,8 +85,12 @@ def events(t, y, out, tables, device, g):
     Arming is the moment after the valve shut at which the pressure exceeds the low setting: from then on, a pressure
     below this setting opens the valve.
     """
-    floats, armed, o = tables.floats, tables.armed, device["y"]
-    at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], valve_stage(y, tables, device)
+    floats = tables.floats
+    armed = tables.armed
+    o = device["y"]
+    at = device["data"] + device["mode"]
+    flags = device["event"] + device["mode"]
+    stage = valve_stage(y, tables, device)
     low, high, trip, p = pilot_margins(t, y, out, tables, device)
     opening_margin = min(low, high, trip)
     by_high, ready = armed[flags + BY_HIGH] > 0.0, armed[flags + ARMED_LOW] > 0.0

@@ -21,7 +21,10 @@ class OutsideRows(Lowering, kind="outside"):
     ledger_name = "outside"
 
     def place(self, draft, name, node, row) -> None:
-        row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add_constant(draft.case.ambient_pressure)
+        row["kind"], row["schedule"] = (
+            rec.FIXED,
+            draft.schedules.add_constant(draft.case.ambient_pressure),
+        )
 
     def pressure_at_start(self, start, i, node, row) -> float:
         return start.schedule_value(row["schedule"])
@@ -62,7 +65,10 @@ class OutletRows(Restriction, kind="outlet"):
         """Fill the PROBE row of its flow, or of a pressure at the place from which it flows."""
         super().probe(draft, name, probe, row)
         if probe.quantity != "flow":
-            row["kind"], row["index"] = rec.PRESSURE, draft.node_index[draft.inside(draft.case.conduits[name].from_)]
+            row["kind"], row["index"] = (
+                rec.PRESSURE,
+                draft.node_index[draft.inside(draft.case.conduits[name].from_)],
+            )
 
 
 class RelievingRows(Device, kind=""):
@@ -83,7 +89,9 @@ class RelievingRows(Device, kind=""):
         row["one_way"] = rec.OUTWARD if self.mode > 0 else rec.BOTH_WAYS
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [0.5, 0.0, SPAN, law_outlet.NO_LIMIT][: self.mode] + self.own_numbers(draft, name, part)
+        return [0.5, 0.0, SPAN, law_outlet.NO_LIMIT][: self.mode] + self.own_numbers(
+            draft, name, part
+        )
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -139,7 +147,10 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
             text = f"{part.trip:g} s lies before the start at {draft.case.numerics.start:g} s"
             draft.fault(f"links.{name}.trip", f"{text}; expected a later time")
         low = -law_surge_anticipating.NEVER if part.low_set is None else part.low_set
-        high, trip = (law_surge_anticipating.NEVER if value is None else value for value in (part.high_set, part.trip))
+        high, trip = (
+            law_surge_anticipating.NEVER if value is None else value
+            for value in (part.high_set, part.trip)
+        )
         place = float(draft.node_index[part.sensed])
         return [part.opening_time, part.hold, part.closing_time, low, high, trip, place]
 
@@ -156,14 +167,20 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
             y[o] = 1.0
 
     def begin(self, start, part, row) -> list[str]:
-        name, node = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
-        p, high = float(node["pressure"]), part.high_set is not None and float(node["pressure"]) >= part.high_set
+        name = start.draft.valve_names[row["valve"]]
+        node = start.nodes[start.draft.node_index[part.sensed]]
+        p = float(node["pressure"])
+        high = part.high_set is not None and float(node["pressure"]) >= part.high_set
         amount = start.case.amount
         if part.low_set is not None and p < part.low_set:
-            text = (f"{name}: the pressure at {part.sensed} is {amount(p, 'pressure', 6)} at the start, below low_set, "
-                    f"{amount(part.low_set, 'pressure', 6)}: a low pressure opens the valve only after the pressure "
-                    "has exceeded low_set")  # fmt: skip
-            start.draft.warnings.append(Notice("start", f"links.{name}", text, "low_set", p, part.low_set))
+            text = (
+                f"{name}: the pressure at {part.sensed} is {amount(p, 'pressure', 6)} at the start, below low_set, "
+                f"{amount(part.low_set, 'pressure', 6)}: a low pressure opens the valve only after the pressure "
+                "has exceeded low_set"
+            )
+            start.draft.warnings.append(
+                Notice("start", f"links.{name}", text, "low_set", p, part.low_set)
+            )
         if not high:
             return []
         return [

@@ -46,7 +46,9 @@ class Outlet(TwoPort):
     demand: bool = False
 
 
-def outlet_to_ambient(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
+def outlet_to_ambient(
+    name: str, place: str, **law: Any
+) -> tuple[dict[str, Node], dict[str, Outlet]]:
     """(places, links), each by name, of an outlet `name` at a place: a node at ambient pressure, and the outlet.
 
     law : fields of `Outlet`
@@ -79,7 +81,9 @@ class Relieving(Sized, Link):
         if self.to is not None:
             return {}, {name: self}
         place = f"{name}.outside"
-        return {place: Outside.model_construct(level_of=self.from_)}, {name: self.model_copy(update={"to": place})}
+        return {place: Outside.model_construct(level_of=self.from_)}, {
+            name: self.model_copy(update={"to": place})
+        }
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.to is None and getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
@@ -93,9 +97,9 @@ class FromPlace(Link):
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
     from_: Annotated[str, Text("place from which it flows"), Field(alias="from")]
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of the flow")] = Field(
-        default_factory=lambda: constant(1.0)
-    )
+    opening: Annotated[
+        Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of the flow")
+    ] = Field(default_factory=lambda: constant(1.0))
 
     @property
     def ports(self) -> dict[str, str]:
@@ -115,19 +119,32 @@ class Leak(FromPlace, kind="leak"):
     law to zero flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
     """
 
-    coefficient: Annotated[float, Number(
-        positive, "flow in m3/s at a pressure drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"),
-    )]  # fmt: skip
+    coefficient: Annotated[
+        float,
+        Number(
+            positive,
+            "flow in m3/s at a pressure drop of 1 Pa",
+            UsualRange(1e-15, 0.1, "seeping to a main torn off"),
+        ),
+    ]
     exponent: Annotated[
-        float, Number(between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size")
+        float,
+        Number(
+            between(0, 3, open=True), "exponent of the pressure drop, 0.5 for a hole of fixed size"
+        ),
     ] = 0.5
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
-        law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
+        law = {
+            "flow": self.coefficient * 1e5**self.exponent,
+            "exponent": self.exponent,
+            "opening": self.opening,
+        }
         return outlet_to_ambient(name, self.from_, **law)
 
 
-HYDRANT_SPAN = 100.0  # pressure above its residual pressure at which a hydrant has its flow, 1 cm of head [Pa]
+# pressure above its residual pressure at which a hydrant has its flow, 1 cm of head [Pa]
+HYDRANT_SPAN = 100.0
 
 
 class Hydrant(FromPlace, kind="hydrant"):
@@ -140,13 +157,24 @@ class Hydrant(FromPlace, kind="hydrant"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "gauge_pressure": "gauge_pressure"}
 
-    flow: Annotated[float, Quantity("flow", positive, "flow that it draws, or its greatest flow [m3/s]")]
+    flow: Annotated[
+        float, Quantity("flow", positive, "flow that it draws, or its greatest flow [m3/s]")
+    ]
     residual_pressure: Annotated[
-        float | None, Quantity("pressure", about="least pressure that it leaves at its place [Pa]; ambient if left out")
+        float | None,
+        Quantity(
+            "pressure", about="least pressure that it leaves at its place [Pa]; ambient if left out"
+        ),
     ] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
-        law = {"flow": self.flow, "exponent": 0.5, "opening": self.opening, "most": 1.0, "span": HYDRANT_SPAN}
+        law = {
+            "flow": self.flow,
+            "exponent": 0.5,
+            "opening": self.opening,
+            "most": 1.0,
+            "span": HYDRANT_SPAN,
+        }
         return outlet_to_ambient(name, self.from_, **law, least=self.residual_pressure)
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -164,7 +192,10 @@ class RuptureDisc(Relieving, kind="rupture-disc"):
     """
 
     burst_pressure: Annotated[
-        float, Quantity("pressure_drop", positive, "pressure drop above which the disc bursts [Pa]", DROPS)
+        float,
+        Quantity(
+            "pressure_drop", positive, "pressure drop above which the disc bursts [Pa]", DROPS
+        ),
     ]
 
 
@@ -177,21 +208,41 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
     power: dp q [W].
     """
 
-    low_set: Annotated[float | None, Quantity(
-        "pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]",
-    )] = None  # fmt: skip
-    high_set: Annotated[float | None, Quantity(
-        "pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]",
-    )] = None  # fmt: skip
-    trip: Annotated[
-        float | None, Quantity("time", about="time at which the valve opens regardless of pressure [s]")
+    low_set: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure at `senses` below which the valve opens, gauge or absolute by its unit [Pa]",
+        ),
     ] = None
-    senses: Annotated[str | None, Text("place whose pressure opens the valve; `from` if left out")] = None
-    opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open [s]", STROKES)]
+    high_set: Annotated[
+        float | None,
+        Quantity(
+            "pressure",
+            about="pressure at `senses` above which the valve opens, gauge or absolute by its unit [Pa]",
+        ),
+    ] = None
+    trip: Annotated[
+        float | None,
+        Quantity("time", about="time at which the valve opens regardless of pressure [s]"),
+    ] = None
+    senses: Annotated[
+        str | None, Text("place whose pressure opens the valve; `from` if left out")
+    ] = None
+    opening_time: Annotated[
+        float, Quantity("time", positive, "time from shut to fully open [s]", STROKES)
+    ]
     hold: Annotated[
-        float, Quantity("time", nonnegative, "time for which the valve stays fully open after `low_set` or `trip` [s]")
+        float,
+        Quantity(
+            "time",
+            nonnegative,
+            "time for which the valve stays fully open after `low_set` or `trip` [s]",
+        ),
     ] = 0.0
-    closing_time: Annotated[float, Quantity("time", positive, "time from fully open to shut [s]", STROKES)]
+    closing_time: Annotated[
+        float, Quantity("time", positive, "time from fully open to shut [s]", STROKES)
+    ]
 
     @property
     def sensed(self) -> str:
@@ -202,15 +253,25 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if not {"low_set", "high_set", "trip"} & set(given):
-            faults.append(((), "nothing opens the valve; expected the key `low_set`, `high_set` or `trip`"))
+            faults.append(
+                ((), "nothing opens the valve; expected the key `low_set`, `high_set` or `trip`")
+            )
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         yield from super().faults(name, around)
-        if self.low_set is not None and self.high_set is not None and not self.low_set < self.high_set:
+        if (
+            self.low_set is not None
+            and self.high_set is not None
+            and not self.low_set < self.high_set
+        ):
             text = f"{self.high_set:.6g} Pa is not above low_set, {self.low_set:.6g} Pa"
             yield ("high_set",), f"{text}; expected a higher pressure"
-        places = [place for place, node in around.nodes.items() if getattr(node, "domain", "") == "hydraulic"]
+        places = [
+            place
+            for place, node in around.nodes.items()
+            if getattr(node, "domain", "") == "hydraulic"
+        ]
         if self.senses is not None and self.senses not in places:
             near = did_you_mean(self.senses, places)
             message = f"unknown place of the fluid {show(self.senses)}; expected one of {listing(places)}{near}"

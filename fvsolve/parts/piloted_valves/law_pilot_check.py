@@ -12,7 +12,8 @@ from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
 from fvsolve.parts.self_acting.law_check_valve import joins_junction
 
-CRACKING_PRESSURE, PILOT_RATIO, DROP, PILOT_EXCESS = 0, 1, 2, 3  # numbers; the last two at the start
+# numbers; the last two at the start
+CRACKING_PRESSURE, PILOT_RATIO, DROP, PILOT_EXCESS = 0, 1, 2, 3
 PRESSURE_MARGIN = 1e-3  # excess at which it opens, so that rounding does not [Pa]
 TYPICAL_DROP = 1e5  # drop whose flow scales the excess of the pilot [Pa]
 
@@ -30,12 +31,10 @@ def excesses(out, tables, device):
 
     The excess of the pilot is ratio (p_pilot - p_from) - (p_to - p_from + cracking pressure).
     """
-    floats, data, valve, at = (
-        tables.floats,
-        device["data"],
-        tables.valves[device["valve"]],
-        tables.layout[0]["pressure"],
-    )
+    floats = tables.floats
+    data = device["data"]
+    valve = tables.valves[device["valve"]]
+    at = tables.layout[0]["pressure"]
     before, behind = out[at + valve["from_node"]], out[at + valve["to_node"]]
     drop = floats[data + DROP] + (before - behind)
     pilot = floats[data + PILOT_RATIO] * (out[at + device["node"]] - before) + (before - behind)

@@ -10,7 +10,8 @@ from fvsolve.jit import njit
 
 DIFFERENCE = 0  # its number: pressure at A minus that at B at the start [Pa]
 FLOW_A, FLOW_B, FLOW_OUT, POSITION = 0, 1, 2, 3  # quantities
-PRESSURE_MARGIN = 1e-3  # difference of pressures at which it switches, so that rounding does not [Pa]
+# difference of pressures at which it switches, so that rounding does not [Pa]
+PRESSURE_MARGIN = 1e-3
 
 
 @njit
@@ -28,10 +29,19 @@ def events(t, y, out, tables, device, g):
 
     The sign of the margin is that of the port that is open.
     """
-    k, at, pressure = device["valve"], device["event"], tables.layout[0]["pressure"]
+    k = device["valve"]
+    at = device["event"]
+    pressure = tables.layout[0]["pressure"]
     a, b = tables.valves[k]["from_node"], tables.valves[k + 1]["from_node"]
-    difference = tables.floats[device["data"] + DIFFERENCE] + (out[pressure + a] - out[pressure + b])
-    event_pair(tables, g, at, difference + (-PRESSURE_MARGIN if tables.armed[at] > 0.0 else PRESSURE_MARGIN))
+    difference = tables.floats[device["data"] + DIFFERENCE] + (
+        out[pressure + a] - out[pressure + b]
+    )
+    event_pair(
+        tables,
+        g,
+        at,
+        difference + (-PRESSURE_MARGIN if tables.armed[at] > 0.0 else PRESSURE_MARGIN),
+    )
 
 
 @njit

@@ -44,8 +44,10 @@ class PilotedDisc(ReliefDisc, kind=""):
         ends = {int(valve[end]) for end in ("from_node", "to_node")}
         for column, row in zip(draft.column_names, draft.column_table, strict=True):
             if ends & {int(row[end]) for end in ("from_node", "to_node")}:
-                text = (f"{name}: joins the rigid column {column}: its lift and flow are not reliable near its seat; "
-                        "make the column a pipe, or put a chamber between them")  # fmt: skip
+                text = (
+                    f"{name}: joins the rigid column {column}: its lift and flow are not reliable near its seat; "
+                    "make the column a pipe, or put a chamber between them"
+                )
                 draft.warnings.append(Notice("range", f"links.{name}", text))
 
 
@@ -63,7 +65,11 @@ class CounterbalanceDisc(PilotedDisc, kind=""):
 
     def is_reversed(self, start, k, flow):
         before, behind = start.across(k)
-        return before - behind < -SMALL_PRESSURE if k in start.shut else super().is_reversed(start, k, flow)
+        return (
+            before - behind < -SMALL_PRESSURE
+            if k in start.shut
+            else super().is_reversed(start, k, flow)
+        )
 
     def next_mode(self, x, back, now):
         if back:
@@ -77,8 +83,12 @@ class CounterbalanceDisc(PilotedDisc, kind=""):
 class CounterbalanceRows(CounterbalanceDisc, kind="counterbalance"):
     """Conversion to table rows of counterbalance valves whose lift follows the pressures at once."""
 
-    law, mode, regular = law_relief_valve, law_relief_valve.FREE_BACK, True
-    events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
+    law = law_relief_valve
+    mode = law_relief_valve.FREE_BACK
+    regular = True
+    events = Relief.events
+    numbers = Relief.numbers
+    store_lift = Relief.store_lift
 
     def of(self, part) -> Device:
         return CounterbalanceDisc().moved_as(part) if part.has_dynamics else self
@@ -97,7 +107,8 @@ class CompensatorDisc(PilotedDisc, kind=""):
         return -part.set_drop - part.overpressure
 
     def edge(self, start, k):
-        start.valve_modes.setdefault(k, OPEN)  # a spool below its seat would pass a reversed flow forward
+        # a spool below its seat would pass a reversed flow forward
+        start.valve_modes.setdefault(k, OPEN)
         return super().edge(start, k)
 
     def flow_at(self, start, k, drop, lift):
@@ -119,8 +130,12 @@ class CompensatorDisc(PilotedDisc, kind=""):
 class CompensatorRows(CompensatorDisc, kind="pressure-compensator"):
     """Conversion to table rows of pressure compensators whose opening follows the pressures at once."""
 
-    law, mode, regular = law_relief_valve, 0, True
-    events, numbers, store_lift = Relief.events, Relief.numbers, Relief.store_lift
+    law = law_relief_valve
+    mode = 0
+    regular = True
+    events = Relief.events
+    numbers = Relief.numbers
+    store_lift = Relief.store_lift
 
     def of(self, part) -> Device:
         return CompensatorDisc().moved_as(part) if part.has_dynamics else self
@@ -135,7 +150,9 @@ class PilotCheckRows(Device, kind="pilot-check"):
     law, events_only = law_pilot_check, True
     quantities = ("opening",)
     events = ("shuts", "opens")
-    remedy = "raise the pilot pressure, or lower the pressure that its reverse flow builds up at `from`"
+    remedy = (
+        "raise the pilot pressure, or lower the pressure that its reverse flow builds up at `from`"
+    )
 
     def sensed(self, part):
         return ((part.pilot, 1.0),)
@@ -146,7 +163,9 @@ class PilotCheckRows(Device, kind="pilot-check"):
     def excesses(self, start, part, row) -> tuple[float, float]:
         """(drop minus cracking pressure, excess of the pilot) [Pa], see `law_pilot_check.excesses`."""
         valve = start.valves[row["valve"]]
-        before, behind, pilot = (start.pressure(int(i)) for i in (valve["from_node"], valve["to_node"], row["node"]))
+        before, behind, pilot = (
+            start.pressure(int(i)) for i in (valve["from_node"], valve["to_node"], row["node"])
+        )
         excess = part.pilot_ratio * (pilot - before) + before - behind - part.cracking_pressure
         return before - behind - part.cracking_pressure, excess
 
@@ -172,14 +191,19 @@ class PilotCheckRows(Device, kind="pilot-check"):
 class ShuttleRows(Device, kind="shuttle"):
     """Conversion to table rows of shuttle valves: two rows for each valve, from A to out and from B to out."""
 
-    rows, law, events_only = 2, law_shuttle, True
+    rows = 2
+    law = law_shuttle
+    events_only = True
     quantities = ("flow_A", "flow_B", "flow_out", "position")
     events = ("switches to B", "switches to A")
     remedy = "its own flow lowers the higher pressure below the lower; reduce it, or give A and B stiffer supplies"
 
     def fill(self, draft, name, link, rows) -> None:
         for port, row in zip("AB", rows, strict=True):
-            row["from_node"], row["to_node"] = draft.node_index[link.ports[port]], draft.node_index[link.ports["out"]]
+            row["from_node"], row["to_node"] = (
+                draft.node_index[link.ports[port]],
+                draft.node_index[link.ports["out"]],
+            )
             row["schedule"] = -1
             self.restriction(draft, name, link, row)
 

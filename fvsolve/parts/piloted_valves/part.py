@@ -5,12 +5,26 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.nodes_and_links import Link, Ports, TwoPort
 from fvsolve.parts.self_acting.part import DROPS, Disc, ReliefValve
-from fvsolve.parts.value import SHAPE, Number, Quantity, ReadContext, Text, UsualRange, Value, nonnegative, positive
+from fvsolve.parts.value import (
+    SHAPE,
+    Number,
+    Quantity,
+    ReadContext,
+    Text,
+    UsualRange,
+    Value,
+    nonnegative,
+    positive,
+)
 from fvsolve.parts.valve import Sized
 from fvsolve.units import show
 
 PILOT = Text("place whose pressure pilots the valve; the valve only senses it")
-RATIO = Number(positive, "area of the pilot over area of the seat", UsualRange(0.3, 20.0, "catalogues of cartridges"))
+RATIO = Number(
+    positive,
+    "area of the pilot over area of the seat",
+    UsualRange(0.3, 20.0, "catalogues of cartridges"),
+)
 SHARE = 0.05  # overpressure of a pressure compensator over set_drop, if left out
 
 
@@ -43,7 +57,10 @@ class PilotCheck(Sized, TwoPort, kind="pilot-check"):
     pilot: Annotated[str, PILOT]
     pilot_ratio: Annotated[float, RATIO]
     cracking_pressure: Annotated[
-        float, Quantity("pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS)
+        float,
+        Quantity(
+            "pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS
+        ),
     ] = 0.0
 
 
@@ -56,8 +73,9 @@ class Shuttle(Sized, Link, kind="shuttle"):
 
     joins: ClassVar[dict[str, str]] = dict.fromkeys(("A", "B", "out"), "hydraulic")
     quantities: ClassVar[dict[str, str]] = {
-        **{f"flow_{port}": "flow" for port in ("A", "B", "out")}, "position": "number"
-    }  # fmt: skip
+        **{f"flow_{port}": "flow" for port in ("A", "B", "out")},
+        "position": "number",
+    }
 
     ports: Annotated[dict[str, str], Ports(("A", "B", "out"))]
 
@@ -69,13 +87,26 @@ class SensedPair(Value):
     about: str = ""
     changes: str = SHAPE
     takes: ClassVar[str] = "[place before, place behind]"
-    schema: ClassVar[dict[str, Any]] = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+    schema: ClassVar[dict[str, Any]] = {
+        "type": "array",
+        "items": {"type": "string"},
+        "minItems": 2,
+        "maxItems": 2,
+    }
 
     def read(self, given: Any, setting: ReadContext) -> tuple[str, str]:
-        if not isinstance(given, (list, tuple)) or len(given) != 2 or not all(isinstance(name, str) for name in given):
-            raise ValueError(f"{show(given)} is not a list of two places; expected {self.takes}, names in quotes")
+        if (
+            not isinstance(given, (list, tuple))
+            or len(given) != 2
+            or not all(isinstance(name, str) for name in given)
+        ):
+            raise ValueError(
+                f"{show(given)} is not a list of two places; expected {self.takes}, names in quotes"
+            )
         if given[0] == given[1]:
-            raise ValueError(f"{show(given[0])} is named twice, so the drop is always 0; expected two places")
+            raise ValueError(
+                f"{show(given[0])} is named twice, so the drop is always 0; expected two places"
+            )
         return tuple(given)
 
 
@@ -91,14 +122,27 @@ class PressureCompensator(Disc, Sized, TwoPort, kind="pressure-compensator"):
     sensed_keys: ClassVar[tuple[str, ...]] = ("senses",)
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    senses: Annotated[tuple[str, str], SensedPair("places before and behind the metering orifice, only sensed")]
+    senses: Annotated[
+        tuple[str, str], SensedPair("places before and behind the metering orifice, only sensed")
+    ]
     set_drop: Annotated[
         float,
-        Quantity("pressure_drop", positive, "drop between the sensed places at which it begins to shut [Pa]", DROPS),
+        Quantity(
+            "pressure_drop",
+            positive,
+            "drop between the sensed places at which it begins to shut [Pa]",
+            DROPS,
+        ),
     ]
-    overpressure: Annotated[float | None, Quantity(
-        "pressure_drop", positive, f"drop above `set_drop` that shuts it [Pa]; {SHARE} set_drop if left out", DROPS,
-    )] = None  # fmt: skip
+    overpressure: Annotated[
+        float | None,
+        Quantity(
+            "pressure_drop",
+            positive,
+            f"drop above `set_drop` that shuts it [Pa]; {SHARE} set_drop if left out",
+            DROPS,
+        ),
+    ] = None
 
     def model_post_init(self, context: Any) -> None:
         super().model_post_init(context)

@@ -44,10 +44,18 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
     if material is None and "class" not in given and "lining" not in given:
         return given
     table, sources = {**given}, []
-    if name is not None and material is None:  # reported where the key is read; nothing can be derived from it
-        if isinstance(table.get("class"), str) and (text := unknown_class(table["class"])) is not None:
+    # reported where the key is read; nothing can be derived from it
+    if name is not None and material is None:
+        if (
+            isinstance(table.get("class"), str)
+            and (text := unknown_class(table["class"])) is not None
+        ):
             raise ValueFault([(("class",), text)])
-        return {key: value for key, value in with_substitutes(table).items() if key not in ("class", "nominal")}
+        return {
+            key: value
+            for key, value in with_substitutes(table).items()
+            if key not in ("class", "nominal")
+        }
     if not all(isinstance(table.get(key, ""), str) for key in ("class", "nominal")):
         return with_substitutes(table)  # reported where the keys are read
     if isinstance(table.get("class"), str):
@@ -74,7 +82,9 @@ def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
         table["wall"] = {WALL_KEYS[0]: 1e11, "thickness": 0.01, **given["wall"]}
     friction = given.get("friction")
     if isinstance(friction, dict) and DARCY[0] in KEYS_OF_MODEL.get(str(friction.get("model")), ()):
-        table["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
+        table["friction"] = (
+            friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
+        )
     return table
 
 
@@ -89,11 +99,15 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
         table["schedule"] = schedule[1]
         return
     if not isinstance(nominal, str):
-        raise ValueFault([(("class",), f'{show(name)} needs a nominal size; give for example nominal = "DN300"')])
+        raise ValueFault(
+            [(("class",), f'{show(name)} needs a nominal size; give for example nominal = "DN300"')]
+        )
     try:
         size = class_size(name, nominal, material)
     except ValueError as error:
-        raise ValueFault([(("nominal" if isinstance(error, UnknownSize) else "class",), str(error))]) from None
+        raise ValueFault(
+            [(("nominal" if isinstance(error, UnknownSize) else "class",), str(error))]
+        ) from None
     del table["class"], table["nominal"]
     _add_size(table, size.diameter, size.thickness)
     if size.pressure is not None:
@@ -147,8 +161,10 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
     if "wave_speed" in table or not isinstance(wall, dict):
         return
     if "thickness" not in wall:
-        text = (f'wall thickness of {material.name} is missing; give `nominal` together with `class` or `schedule`, '
-                'or wall = { thickness = "8 mm" }, or wave_speed')  # fmt: skip
+        text = (
+            f"wall thickness of {material.name} is missing; give `nominal` together with `class` or `schedule`, "
+            'or wall = { thickness = "8 mm" }, or wave_speed'
+        )
         raise ValueFault([(("material",), text)])
     table["wall"] = {**wall}
     factors = table.get("retardation")
@@ -156,7 +172,11 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
     for key in (*WALL_KEYS, *heat):
         if key not in wall and (figure := material.figures.get(key)) is not None:
             table["wall"][key] = figure.used
-            sources.append(f"{material.name}: {figure.description}" if key == WALL_KEYS[0] else figure.description)
+            sources.append(
+                f"{material.name}: {figure.description}"
+                if key == WALL_KEYS[0]
+                else figure.description
+            )
 
 
 def _add_roughness(table: dict[str, Any], sources: list[str], material: Material) -> None:
@@ -168,7 +188,11 @@ def _add_roughness(table: dict[str, Any], sources: list[str], material: Material
     if not isinstance(friction, dict) or "lining" in table or any(key in friction for key in DARCY):
         return
     model = friction.get("model")
-    if isinstance(model, str) and DARCY[0] in KEYS_OF_MODEL.get(model, ()) and "roughness" in material.figures:
+    if (
+        isinstance(model, str)
+        and DARCY[0] in KEYS_OF_MODEL.get(model, ())
+        and "roughness" in material.figures
+    ):
         figure = material.figures["roughness"]
         table["friction"] = {**friction, "roughness": figure.used}
         sources.append(figure.description)
@@ -192,7 +216,11 @@ def ductile() -> dict[int, tuple[float, dict[int, float]]]:
     """Ductile iron pipes: DN -> (outer diameter, class -> least wall) [mm]."""
     table, sizes = read_table("ductile_iron"), {}
     for size, (outer, *walls) in table["sizes"].items():
-        least = {pressure: wall for pressure, wall in zip(table["classes"], walls, strict=True) if wall == wall}
+        least = {
+            pressure: wall
+            for pressure, wall in zip(table["classes"], walls, strict=True)
+            if wall == wall
+        }
         sizes[int(size)] = float(outer), least
     return sizes
 
@@ -206,7 +234,9 @@ def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
     text = name.strip().upper().replace(" ", "")
     if match := IRON.fullmatch(text):
         if material != "ductile-iron":
-            raise ValueError(f'{name} is a class of ductile iron; expected material = "ductile-iron"')
+            raise ValueError(
+                f'{name} is a class of ductile iron; expected material = "ductile-iron"'
+            )
         return _ductile(match[1][0], int(match[2]), name, _nominal_size(nominal))
     if match := PLASTIC.fullmatch(text):
         return _plastic(match[1], float(match[2]), name, _nominal_size(nominal), material)
@@ -225,7 +255,9 @@ def unknown_class(name: str) -> str | None:
 def _nominal_size(nominal: str) -> float:
     match = re.fullmatch(r"D[NE]?\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
     if match is None:
-        raise UnknownSize(f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"')
+        raise UnknownSize(
+            f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"'
+        )
     return float(match[1])
 
 
@@ -244,7 +276,9 @@ def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
         source = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), at least 6 mm; {K_SOURCES}"
     elif number not in walls:
         available = [f"C{pressure}" for pressure in walls]
-        raise ValueError(f"no class {show(name)} of DN{size:g} in the catalogue; expected one of {listing(available)}")
+        raise ValueError(
+            f"no class {show(name)} of DN{size:g} in the catalogue; expected one of {listing(available)}"
+        )
     else:
         wall, allowable = walls[number] + spare, float(number)
         source = f"C{number} DN{size:g}: wall at least {walls[number]:g} mm, nominal wall {spare:g} mm more; {EN_545}"
@@ -254,14 +288,18 @@ def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
 def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> ClassSize:
     strength = MRS.get(material or "")
     if series == "PN" and strength is None:
-        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}; expected one of these "
-                         'materials, or a class such as "SDR11" and the key `allowable_pressure`')  # fmt: skip
+        raise ValueError(
+            f"the wall of {name} is known only for {listing(list(MRS))}; expected one of these "
+            'materials, or a class such as "SDR11" and the key `allowable_pressure`'
+        )
     ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
     if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
         text = f"{name} has SDR {ratio:g} (diameter over wall); expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
         raise ValueError(text)
     wall = size / ratio
-    allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))
+    allowable = (
+        None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))
+    )
     source = f"{name} of {size:g} mm outer diameter: wall d / SDR, SDR {ratio:.4g}"
     source += f"; {PE_SOURCES}" if strength else "; no source for its allowable pressure"
     return ClassSize(1e-3 * (size - 2.0 * wall), 1e-3 * wall, allowable, source)

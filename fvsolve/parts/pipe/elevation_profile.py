@@ -49,7 +49,11 @@ class Profile:
         cut = np.concatenate([[begin], d[inside], [end]])
         chainage, elevation = cut + self.chainage[0], self.at(cut)
         table = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
-        plan = None if self.plan is None else np.column_stack([np.interp(cut, d, axis) for axis in self.plan.T])
+        plan = (
+            None
+            if self.plan is None
+            else np.column_stack([np.interp(cut, d, axis) for axis in self.plan.T])
+        )
         return Profile(chainage, elevation, table, plan)
 
     def table(self) -> dict[str, Any]:
@@ -69,7 +73,9 @@ class ProfileValue(Value):
     """
 
     about = "elevation along the axis, linear between points; a straight line between the end nodes if left out"
-    takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file }` with these columns"
+    takes = (
+        "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file }` with these columns"
+    )
 
     def read(self, given: Any, setting: ReadContext) -> Profile:
         if isinstance(given, Profile):
@@ -77,12 +83,16 @@ class ProfileValue(Value):
         if not isinstance(given, dict):
             example = '{ chainage = [0, 900], elevation = [12, 31] }, or { file = "profile.csv" }'
             raise ValueError(f"{show(given)} is not a table; expected for example {example}")
-        columns, table = from_file(given, setting) if "file" in given else from_lists(given, setting)
+        columns, table = (
+            from_file(given, setting) if "file" in given else from_lists(given, setting)
+        )
         if len(columns) == 3:
             steps = np.sqrt(sum(np.diff(values) ** 2 for values in columns.values()))
             repeated = np.flatnonzero(steps <= 0.0)
             if repeated.size:
-                raise ValueError(f"points {repeated[0] + 1} and {repeated[0] + 2} coincide; expected different points")
+                raise ValueError(
+                    f"points {repeated[0] + 1} and {repeated[0] + 2} coincide; expected different points"
+                )
             plan = np.column_stack([columns["x"], columns["y"]])
             profile = Profile(np.concatenate([[0.0], np.cumsum(steps)]), columns["z"], table, plan)
         else:
@@ -106,14 +116,19 @@ def check_slope(profile: Profile) -> None:
         raise ValueError(f"{text}; expected chainages along the axis, not in plan")
 
 
-def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def from_lists(
+    given: dict[str, Any], setting: ReadContext
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """(columns, table): arrays of the points by key [m], read from lists of equal length, and the same lists in SI.
 
     setting : context for reading
     Raises ValueError if a list is missing (see `columns_among`), otherwise ValueFault with all faults.
     """
     keys = columns_among(list(given), "keys")
-    columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
+    columns = {}
+    faults = [
+        ((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys
+    ]
     for key in keys:
         try:
             columns[key] = Rows("length", rising=key == "chainage").read(given[key], setting)
@@ -131,7 +146,9 @@ def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, n
     }
 
 
-def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def from_file(
+    given: dict[str, Any], setting: ReadContext
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """(columns, table): arrays of the points by key [m], read from a CSV file by its header, and the table { file }.
 
     setting : context for reading. Raises ValueFault with the fault.
@@ -142,7 +159,9 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
     if unknown:
         raise ValueFault(unknown)
     if not isinstance(given["file"], str):
-        raise ValueFault([(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")])
+        raise ValueFault(
+            [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")]
+        )
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)
@@ -152,8 +171,11 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
         if len(columns[keys[0]]) < 2:
             raise ValueError(f"{path.name} has one point; expected at least two")
         if "chainage" in columns:
-            check_increasing(columns["chainage"].tolist(), [f"{value:g}" for value in columns["chainage"]],
-                         f"{path.name}: chainages")  # fmt: skip
+            check_increasing(
+                columns["chainage"].tolist(),
+                [f"{value:g}" for value in columns["chainage"]],
+                f"{path.name}: chainages",
+            )
     except ValueError as error:
         raise ValueFault([(("file",), str(error))]) from None
     return columns, {"file": copy_name(path, setting)}
@@ -167,4 +189,6 @@ def columns_among(names: list[str], source: str) -> tuple[str, ...]:
     for keys in COLUMN_SETS:
         if set(keys) <= set(names):
             return keys
-    raise ValueError(f"{source} are {show(', '.join(names))}; expected chainage and elevation, or {AXES}")
+    raise ValueError(
+        f"{source} are {show(', '.join(names))}; expected chainage and elevation, or {AXES}"
+    )

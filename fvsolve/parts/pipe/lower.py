@@ -43,20 +43,33 @@ class PipeRows(Lowering, kind="pipe"):
         elevation = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
         draft.meshes.append(
             PipeMesh(
-                name, link.from_, link.to, link.length, link.diameter, n, speed, x,
-                np.linspace(0.0, link.length, n + 1), elevation, link.profile, (float(z[0]), float(z[1])),
+                name,
+                link.from_,
+                link.to,
+                link.length,
+                link.diameter,
+                n,
+                speed,
+                x,
+                np.linspace(0.0, link.length, n + 1),
+                elevation,
+                link.profile,
+                (float(z[0]), float(z[1])),
             )
-        )  # fmt: skip
+        )
 
     def force(self, draft, name, row) -> None:
         """Fill the row of a probe for the force on a pipe; report a fault for a delay line or a pipe on a body."""
         row["kind"] = rec.PIPE_FORCE
         pipe = draft.pipe_table[row["index"]]
         if pipe["cells"] == 0:
-            draft.fault(f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"')
+            draft.fault(
+                f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"'
+            )
         elif pipe["forcing"] >= 0:
             draft.fault(
-                f"links.{name}", "a pipe on a body has no force probe; use the forces of the joints of the body"
+                f"links.{name}",
+                "a pipe on a body has no force probe; use the forces of the joints of the body",
             )
 
     def probe(self, draft, name, probe, row) -> None:

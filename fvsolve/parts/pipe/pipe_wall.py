@@ -31,11 +31,24 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import parse, show
 
-SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0, "specific_heat": 1.0}
-UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3",
-         "specific_heat": " J/kg/K"}  # fmt: skip
-HEAT_KEYS = ("density", "specific_heat")  # keys of a wall and a lining from which the heat that they store follows
-WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
+SI = {
+    "youngs_modulus": 1e9,
+    "poisson_ratio": 1.0,
+    "roughness": 1e-3,
+    "density": 1.0,
+    "specific_heat": 1.0,
+}
+UNITS = {
+    "youngs_modulus": " GPa",
+    "poisson_ratio": "",
+    "roughness": " mm",
+    "density": " kg/m3",
+    "specific_heat": " J/kg/K",
+}
+# keys of a wall and a lining from which the heat that they store follows
+HEAT_KEYS = ("density", "specific_heat")
+# pipe materials without a source for their figures
+WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")
 
 
 @dataclass(frozen=True)
@@ -123,7 +136,9 @@ class PositiveList(Value):
 
     def read(self, given: Any, setting: ReadContext) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is not a list of numbers; expected one number for each creep element")
+            raise ValueError(
+                f"{show(given)} is not a list of numbers; expected one number for each creep element"
+            )
         values = tuple(float(parse(raw, self.dimension)) for raw in given)
         for raw, value in zip(given, values, strict=True):
             positive.check(value, raw)
@@ -133,7 +148,10 @@ class PositiveList(Value):
         return {"type": "array", "items": {"type": ["number", "string"]}}
 
 
-CREEP_KEYS = {"compliance": (PositiveList("compliance"), NEEDED), "time": (PositiveList("time"), NEEDED)}
+CREEP_KEYS = {
+    "compliance": (PositiveList("compliance"), NEEDED),
+    "time": (PositiveList("time"), NEEDED),
+}
 
 
 class Elements(Value):
@@ -164,10 +182,16 @@ MODULI = UsualRange(1e5, 1.2e12, "soft rubber to diamond")
 THICKNESS = UsualRange(1e-6, 2.0, "foils to lined rock")
 THIN_WALL = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
 DENSITY = Quantity(
-    "density", positive, "density, for `retardation` [kg/m3]", UsualRange(500.0, 2.3e4, "wood to tungsten")
+    "density",
+    positive,
+    "density, for `retardation` [kg/m3]",
+    UsualRange(500.0, 2.3e4, "wood to tungsten"),
 )
 SPECIFIC_HEAT = Quantity(
-    "specific_heat", positive, "specific heat, for `retardation` [J/kg/K]", UsualRange(100.0, 3e3, "lead to plastics")
+    "specific_heat",
+    positive,
+    "specific heat, for `retardation` [J/kg/K]",
+    UsualRange(100.0, 3e3, "lead to plastics"),
 )
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
@@ -183,9 +207,12 @@ class Wall(Table):
     youngs_modulus: Annotated[
         float, Quantity("modulus", positive, "Young's modulus of the wall [Pa]", MODULI, BY_CELLS)
     ]
-    thickness: Annotated[float, Quantity("length", positive, "wall thickness [m]", THICKNESS, BY_CELLS)]
+    thickness: Annotated[
+        float, Quantity("length", positive, "wall thickness [m]", THICKNESS, BY_CELLS)
+    ]
     poisson_ratio: Annotated[
-        float | None, Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=BY_CELLS)
+        float | None,
+        Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=BY_CELLS),
     ] = None
     creep: Annotated[Creep | None, Elements()] = None
     density: Annotated[float | None, DENSITY] = None
@@ -201,7 +228,9 @@ class Lining(Table):
     youngs_modulus: Annotated[
         float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, BY_CELLS)
     ]
-    thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, BY_CELLS)]
+    thickness: Annotated[
+        float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, BY_CELLS)
+    ]
     density: Annotated[float | None, DENSITY] = None
     specific_heat: Annotated[float | None, SPECIFIC_HEAT] = None
 
@@ -224,8 +253,10 @@ class MaterialName(Value):
         wall = "leave `material` out, and give wall = { youngs_modulus, thickness }"
         if given in WITHOUT_SOURCE:
             raise ValueError(f"the catalogue has no data of {given}; {wall}")
-        raise ValueError(f"unknown material {show(given)}{did_you_mean(given, self.names)}; expected "
-                         f"{', '.join(self.names)}; for any other material {wall}")  # fmt: skip
+        raise ValueError(
+            f"unknown material {show(given)}{did_you_mean(given, self.names)}; expected "
+            f"{', '.join(self.names)}; for any other material {wall}"
+        )
 
     @property
     def takes(self) -> str:
@@ -246,7 +277,9 @@ class WallOrRigid(Value):
         if isinstance(given, Wall) or given == "rigid":
             return given
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is not a wall; expected "rigid" or {{ youngs_modulus, thickness }}')
+            raise ValueError(
+                f'{show(given)} is not a wall; expected "rigid" or {{ youngs_modulus, thickness }}'
+            )
         return Wall.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
@@ -269,7 +302,9 @@ class Restraint(Value):
         if isinstance(given, str):
             if given in RESTRAINTS:
                 return given
-            raise ValueError(f"unknown restraint {show(given)}; expected one of {', '.join(RESTRAINTS)}, or a number")
+            raise ValueError(
+                f"unknown restraint {show(given)}; expected one of {', '.join(RESTRAINTS)}, or a number"
+            )
         value = parse(given, "number")
         positive.check(value, given)
         return value
@@ -283,13 +318,17 @@ class RetardationFactor(Value):
 
     changes = PROFILE
     takes = '1 or more, or `"wall"`'
-    schema: ClassVar[dict[str, Any]] = {"anyOf": [{"const": OF_WALL}, {"type": "number", "minimum": 1}]}
+    schema: ClassVar[dict[str, Any]] = {
+        "anyOf": [{"const": OF_WALL}, {"type": "number", "minimum": 1}]
+    }
 
     def read(self, given: Any, setting: ReadContext) -> str | float:
         if given == OF_WALL:
             return OF_WALL
         if isinstance(given, str):
-            raise ValueError(f'{show(given)} is not a number; expected a number of at least 1, or "{OF_WALL}"')
+            raise ValueError(
+                f'{show(given)} is not a number; expected a number of at least 1, or "{OF_WALL}"'
+            )
         value = parse(given, "number")
         Range(1.0).check(value, given)
         return value
@@ -327,7 +366,8 @@ def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
         return ()
     factor = restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / wall.thickness
     return tuple(
-        (factor * compliance, time) for compliance, time in zip(wall.creep.compliance, wall.creep.time, strict=True)
+        (factor * compliance, time)
+        for compliance, time in zip(wall.creep.compliance, wall.creep.time, strict=True)
     )
 
 
@@ -370,11 +410,21 @@ def retardation_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
             missing = [name for name in HEAT_KEYS if getattr(layer, name, None) is None]
             if not isinstance(layer, (Wall, Lining)):
                 text = '"wall" needs wall = { youngs_modulus, thickness, density, specific_heat }, or a material'
-                yield ("retardation", scalar), f"{text} with a wall thickness; or give the factor as a number"
+                yield (
+                    ("retardation", scalar),
+                    f"{text} with a wall thickness; or give the factor as a number",
+                )
             elif missing:
-                source = f" (the catalogue has no value for {pipe.material})" if pipe.material and key == "wall" else ""
+                source = (
+                    f" (the catalogue has no value for {pipe.material})"
+                    if pipe.material and key == "wall"
+                    else ""
+                )
                 keys = " and ".join(f"{key}.{name}" for name in missing)
-                yield ("retardation", scalar), f'"wall" needs {keys}{source}; or give the factor as a number'
+                yield (
+                    ("retardation", scalar),
+                    f'"wall" needs {keys}{source}; or give the factor as a number',
+                )
 
 
 def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
@@ -384,8 +434,13 @@ def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
         return
     thick_joints = pipe.restraint == "joints" and wall.thickness * THIN_WALL > pipe.diameter
     if wall.poisson_ratio is None and (pipe.restraint in ("upstream", "anchored") or thick_joints):
-        reason = f"the catalogue has no value for {pipe.material}" if pipe.material else "none is given"
+        reason = (
+            f"the catalogue has no value for {pipe.material}" if pipe.material else "none is given"
+        )
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text
     if wall.creep is not None and pipe.lining is not None:
-        yield ("wall", "creep"), "is not available for a lined wall; keep only one of the keys `creep` and `lining`"
+        yield (
+            ("wall", "creep"),
+            "is not available for a lined wall; keep only one of the keys `creep` and `lining`",
+        )

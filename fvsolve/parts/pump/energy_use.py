@@ -11,22 +11,35 @@ from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import PROFILE, Number, between, nonnegative
 
 DAY, KWH = 86400.0, 3.6e6  # [s], [J]
-STATES = ("running_time", "efficiency_time", "specific_energy_time", "energy", "cost")  # of a pump, see `law_energy`
-TOTAL_POWER = "total_electric_power"  # of a pump and all pumps after it in the file; only its extremes are recorded
+# of a pump, see `law_energy`
+STATES = ("running_time", "efficiency_time", "specific_energy_time", "energy", "cost")
+# of a pump and all pumps after it in the file; only its extremes are recorded
+TOTAL_POWER = "total_electric_power"
 
 
 class EnergyUse(Table):
     """Table `[energy]`: the electric energy of every pump is added up, with its cost. Prices are in any currency."""
 
-    price: Annotated[Schedule, Scheduled(
-        "number", about="price of electric energy per kWh, for pumps without `price`"
-    )] = Field(default_factory=lambda: constant(0.0))  # fmt: skip
-    overall_efficiency: Annotated[float, Number(
-        between(0, 1, open=True), "hydraulic power over electric power, for pumps without `overall_efficiency`", PROFILE
-    )] = EFFICIENCY  # fmt: skip
-    demand_charge: Annotated[float, Number(
-        nonnegative, "charge per kW of the greatest electric power of all pumps together, for the whole run", PROFILE
-    )] = 0.0  # fmt: skip
+    price: Annotated[
+        Schedule,
+        Scheduled("number", about="price of electric energy per kWh, for pumps without `price`"),
+    ] = Field(default_factory=lambda: constant(0.0))
+    overall_efficiency: Annotated[
+        float,
+        Number(
+            between(0, 1, open=True),
+            "hydraulic power over electric power, for pumps without `overall_efficiency`",
+            PROFILE,
+        ),
+    ] = EFFICIENCY
+    demand_charge: Annotated[
+        float,
+        Number(
+            nonnegative,
+            "charge per kW of the greatest electric power of all pumps together, for the whole run",
+            PROFILE,
+        ),
+    ] = 0.0
 
 
 def pumps_of(links: dict[str, Any]) -> dict[str, Any]:
@@ -45,7 +58,10 @@ def price_faults(links: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]
     """Yield the faults (key path, message) of prices of pumps in a case without `[energy]`."""
     for name, pump in pumps_of(links).items():
         if pump.price is not None:
-            yield ("links", name, "price"), "has no effect without the table [energy]; add it, it may be empty"
+            yield (
+                ("links", name, "price"),
+                "has no effect without the table [energy]; add it, it may be empty",
+            )
 
 
 def energy_numbers(draft, name: str, part, rest: float) -> list[float]:
@@ -56,7 +72,9 @@ def energy_numbers(draft, name: str, part, rest: float) -> list[float]:
         given = EFFICIENCY if energy is None else energy.overall_efficiency
     price, place = part.price or (None if energy is None else energy.price), names.index(name) + 1
     following = draft.device_names.index(names[place]) if place < len(names) else -1
-    points = [0, given] if isinstance(given, float) else [len(given.flow), *given.flow, *given.value]
+    points = (
+        [0, given] if isinstance(given, float) else [len(given.flow), *given.flow, *given.value]
+    )
     return [-1 if price is None else draft.schedules.add(price), rest, following, *points]
 
 
@@ -86,24 +104,58 @@ def energy_use(model, y, watched: dict[str, tuple[float, ...]], duration: float)
         rows[name] = {
             "running_share": time / duration if duration > 0.0 else None,
             **dict(zip(("efficiency", "specific_energy", "mean_power"), means, strict=True)),
-            "peak_power": watched[f"links.{name}.electric_power"][2], "energy": energy, "cost": cost,
+            "peak_power": watched[f"links.{name}.electric_power"][2],
+            "energy": energy,
+            "cost": cost,
             "cost_per_day": cost / days if days > 0.0 else None,
-        }  # fmt: skip
+        }
     peak = watched[f"links.{names[0]}.{TOTAL_POWER}"][2]
-    cost, charge = sum(row["cost"] for row in rows.values()), case.energy.demand_charge * peak / 1000.0
-    total = {"energy": sum(row["energy"] for row in rows.values()), "peak_power": peak, "cost": cost,
-             "cost_per_day": cost / days if days > 0.0 else None, "demand_charge": charge}  # fmt: skip
+    cost = sum(row["cost"] for row in rows.values())
+    charge = case.energy.demand_charge * peak / 1000.0
+    total = {
+        "energy": sum(row["energy"] for row in rows.values()),
+        "peak_power": peak,
+        "cost": cost,
+        "cost_per_day": cost / days if days > 0.0 else None,
+        "demand_charge": charge,
+    }
     return {"pumps": rows, "total": total}
 
 
-HEADS = ("pump", "running", "efficiency", "per volume", "mean power", "peak power", "energy", "cost", "cost per day")
+HEADS = (
+    "pump",
+    "running",
+    "efficiency",
+    "per volume",
+    "mean power",
+    "peak power",
+    "energy",
+    "cost",
+    "cost per day",
+)
 UNITS = ("", "%", "%", "kWh/m3", "kW", "kW", "kWh", "", "")
 
 
 def table_rows(use: dict[str, Any]) -> list[list[Any]]:
     """Rows of a table with `HEADS` in `UNITS`, the last for all pumps together; use : result of `energy_use`"""
-    factors = {"running_share": 100.0, "efficiency": 100.0, "specific_energy": 1.0 / KWH, "mean_power": 1e-3,
-               "peak_power": 1e-3, "energy": 1.0 / KWH, "cost": 1.0, "cost_per_day": 1.0}  # fmt: skip
+    factors = {
+        "running_share": 100.0,
+        "efficiency": 100.0,
+        "specific_energy": 1.0 / KWH,
+        "mean_power": 1e-3,
+        "peak_power": 1e-3,
+        "energy": 1.0 / KWH,
+        "cost": 1.0,
+        "cost_per_day": 1.0,
+    }
     named = [*use["pumps"].items(), ("all", use["total"])]
-    return [[name, *(None if row.get(key) is None else row[key] * factor for key, factor in factors.items())]
-            for name, row in named]  # fmt: skip
+    return [
+        [
+            name,
+            *(
+                None if row.get(key) is None else row[key] * factor
+                for key, factor in factors.items()
+            ),
+        ]
+        for name, row in named
+    ]

@@ -61,12 +61,14 @@ def quadrants(speed: float) -> Quadrants:
     if share in (0.0, 1.0):
         return Quadrants(*ends[int(share)], NAMES[k + int(share)])
     head, torque = (
-        tuple((1.0 - share) * a + share * b for a, b in zip(*pair, strict=True)) for pair in zip(*ends, strict=True)
+        tuple((1.0 - share) * a + share * b for a, b in zip(*pair, strict=True))
+        for pair in zip(*ends, strict=True)
     )
     return Quadrants(head, torque, f"{NAMES[k]} and {NAMES[k + 1]}")
 
 
-ROUNDING = 1e-6  # allowed difference of first and last value of a Suter table, over the greatest value
+# allowed difference of first and last value of a Suter table, over the greatest value
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,12 @@ class CurvePoints:
 
 
 def points(
-    given: dict[str, Any], word: str, dimension: str, setting: ReadContext, range=nonnegative, faults_of=lambda *_: []
+    given: dict[str, Any],
+    word: str,
+    dimension: str,
+    setting: ReadContext,
+    range=nonnegative,
+    faults_of=lambda *_: [],
 ) -> CurvePoints:
     """Read a table { flow, WORD } with points over the flow.
 
@@ -99,7 +106,9 @@ def points(
     Raises ValueFault if flows do not rise, lengths differ, or `faults_of` finds faults.
     """
     further = functools.partial(faults_of, given)
-    return CurvePoints(*read_lists(given, keys_of(word, dimension, range), setting, "flows", further), word)
+    return CurvePoints(
+        *read_lists(given, keys_of(word, dimension, range), setting, "flows", further), word
+    )
 
 
 def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Value, Any]]:
@@ -123,12 +132,17 @@ class HeadCurve(Value):
             return CurvePoints(coefficients=coefficients)
         return points(given, "head", "head", setting, nonnegative, self.faults_of)
 
-    def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
+    def faults_of(
+        self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]
+    ) -> list:
         """Faults of a single point without positive flow and head, or of heads that do not fall as the flow rises."""
         faults = []
         if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
             faults.append(
-                ((), "a single point must have a flow and a head above 0; correct the point, or give two or more")
+                (
+                    (),
+                    "a single point must have a flow and a head above 0; correct the point, or give two or more",
+                )
             )
         for k, (before, after) in enumerate(zip(head, head[1:], strict=False)):
             if not after < before:
@@ -140,8 +154,15 @@ class HeadCurve(Value):
         """Raise ValueFault if the head of a polynomial does not fall from above 0 to 0, or rises at a lower flow."""
         end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
-            raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
-                                              "[60.0, 0.0, -900.0], a head of 60 m - 900 Q^2, Q in m3/s")])  # fmt: skip
+            raise ValueFault(
+                [
+                    (
+                        ("coefficients",),
+                        "the head must start above 0 and fall to 0 at some flow; for example "
+                        "[60.0, 0.0, -900.0], a head of 60 m - 900 Q^2, Q in m3/s",
+                    )
+                ]
+            )
         slope = np.polynomial.polynomial.polyder(coefficients)
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
@@ -155,8 +176,16 @@ class HeadCurve(Value):
 
 def zero_head_flow(coefficients: tuple[float, ...]) -> float | None:
     """Least positive flow [m3/s] at which a polynomial of the flow has the head 0; None for no such flow."""
-    roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
-    real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]
+    roots = (
+        np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b"))
+        if any(coefficients)
+        else []
+    )
+    real = [
+        float(root.real)
+        for root in roots
+        if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0
+    ]
     return min(real, default=None)
 
 
@@ -174,8 +203,12 @@ class Efficiency(Value):
             return given
         if isinstance(given, dict):
             curve = points(given, "efficiency", "number", setting, between(0, 1))
-            if not any(q > 0.0 and eta > 0.0 for q, eta in zip(curve.flow, curve.value, strict=True)):
-                raise ValueFault([(("efficiency",), "no value above 0 at a flow above 0; expected at least one")])
+            if not any(
+                q > 0.0 and eta > 0.0 for q, eta in zip(curve.flow, curve.value, strict=True)
+            ):
+                raise ValueFault(
+                    [(("efficiency",), "no value above 0 at a flow above 0; expected at least one")]
+                )
             return curve
         return self.number.read(given, setting)
 
@@ -218,7 +251,10 @@ class SuterTable:
     def table(self) -> dict[str, Any]:
         """Suter table as a table of a case file."""
         table = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in table.items()}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in table.items()
+        }
 
 
 class Suter(Value):
@@ -242,20 +278,34 @@ class Suter(Value):
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
             raise ValueFault(
-                [(("table",), "already gives head and torque; remove `table`, or remove `head` and `torque`")]
+                [
+                    (
+                        ("table",),
+                        "already gives head and torque; remove `table`, or remove `head` and `torque`",
+                    )
+                ]
             )
         if table is not None:
             values["head"], values["torque"] = suter_tables()[table]
-        head, torque, faults = values["head"], values["torque"], []
+        head = values["head"]
+        torque = values["torque"]
+        faults = []
         if len(head) != len(torque):
             faults.append(
-                (("torque",), f"has length {len(torque)}, but `head` has length {len(head)}; expected equal lengths")
+                (
+                    ("torque",),
+                    f"has length {len(torque)}, but `head` has length {len(head)}; expected equal lengths",
+                )
             )
         if not head and not torque:
-            raise ValueFault([((), f"expected `table`, or `head` and `torque`; tables are {', '.join(NAMES)}")])
+            raise ValueFault(
+                [((), f"expected `table`, or `head` and `torque`; tables are {', '.join(NAMES)}")]
+            )
         for key, series in (("head", head), ("torque", torque)):
             if len(series) < 9:
-                faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))
+                faults.append(
+                    ((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi")
+                )
             elif abs(series[0] - series[-1]) > ROUNDING * max(map(abs, series)):
                 text = (
                     f"ends at {series[-1]:g} and begins at {series[0]:g}; expected equal values, because "

@@ -45,7 +45,9 @@ def piecewise(floats, at, count, x):
     k = 1
     while k < count - 1 and x > floats[at + k]:
         k += 1
-    slope = (floats[at + count + k] - floats[at + count + k - 1]) / (floats[at + k] - floats[at + k - 1])
+    slope = (floats[at + count + k] - floats[at + count + k - 1]) / (
+        floats[at + k] - floats[at + k - 1]
+    )
     return floats[at + count + k] + slope * (x - floats[at + k]), slope
 
 
@@ -77,7 +79,8 @@ def suter_value(floats, at, count, speed, flow):
     floats[at:] : `count` values of W at equal intervals of x = pi + atan2(flow, speed) from 0 to 2 pi
     speed, flow : relative to rated values
     """
-    square, place = speed * speed + flow * flow, (pi + atan2(flow, speed)) / (2.0 * pi) * (count - 1)
+    square = speed * speed + flow * flow
+    place = (pi + atan2(flow, speed)) / (2.0 * pi) * (count - 1)
     k = min(int(place), count - 2)
     rise = floats[at + k + 1] - floats[at + k]
     value = floats[at + k] + (place - k) * rise
@@ -90,7 +93,9 @@ def is_off_curve(floats, at, speed, flow):
 
     floats[at:] : parameters of the curve; speed : relative speed; flow : [m3/s]
     """
-    return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
+    return floats[at + JOIN] > 0.0 and not (
+        speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST]
+    )
 
 
 @njit
@@ -102,7 +107,10 @@ def joined_value(floats, join, correction_at, speed, flow):
     speed, flow : relative to rated values
     """
     value, slope = suter_value(floats, correction_at + 1, int(floats[join + VALUES]), speed, flow)
-    angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
+    angle = atan2(flow, speed)
+    edge = floats[join + EDGE]
+    fade = 0.0
+    steep = 0.0
     if edge <= angle < 0.5 * pi:
         steep = -floats[correction_at] / (0.5 * pi - edge)
         fade = steep * (angle - 0.5 * pi)
@@ -122,7 +130,9 @@ def curve_head(floats, at, speed, flow):
         return head * value, head / rated * slope
     if floats[at + LAW] == SUTER:
         head, rated = floats[at + OWN], floats[at + OWN + 1]
-        value, slope = suter_value(floats, at + OWN + 2, int(floats[at + COUNT]), speed, flow / rated)
+        value, slope = suter_value(
+            floats, at + OWN + 2, int(floats[at + COUNT]), speed, flow / rated
+        )
         return head * value, head / rated * slope
     n, tail = max(speed, 0.0), floats[at + TAIL]
     first, last = n * floats[at + FIRST], n * floats[at + LAST]
@@ -134,7 +144,9 @@ def curve_head(floats, at, speed, flow):
         return head, slope
     if first > 0.0 and flow < -first:  # the line only smooths the curve near no flow
         return head - 2.0 * slope * first + tail * flow * flow, 2.0 * tail * flow
-    return head + slope * (flow - first) + tail * min(flow, 0.0) ** 2, slope - 2.0 * tail * abs(min(flow, 0.0))
+    return head + slope * (flow - first) + tail * min(flow, 0.0) ** 2, slope - 2.0 * tail * abs(
+        min(flow, 0.0)
+    )
 
 
 @njit
@@ -143,7 +155,9 @@ def curve_flow(floats, at, speed, head, flow):
 
     floats[at:] : parameters of its head curve; flow : start value [m3/s]
     """
-    low, high, scale = -1e300, 1e300, floats[at + SCALE]
+    low = -1e300
+    high = 1e300
+    scale = floats[at + SCALE]
     for _ in range(200):
         value, slope = curve_head(floats, at, speed, flow)
         if abs(value - head) <= 4e-16 * (abs(value) + abs(head)):
@@ -153,7 +167,11 @@ def curve_flow(floats, at, speed, head, flow):
         else:
             high = flow
         reach = 4.0 * (abs(flow) + scale)
-        step = max(-reach, min(reach, (value - head) / -slope)) if slope < 0.0 else (reach if value > head else -reach)
+        step = (
+            max(-reach, min(reach, (value - head) / -slope))
+            if slope < 0.0
+            else (reach if value > head else -reach)
+        )
         next_flow = flow + step
         if min(abs(step), high - low) <= 2e-16 * (abs(flow) + 1e-6 * scale):
             return next_flow
@@ -190,11 +208,23 @@ def curve_step(floats, at, speed, rho, weight, g, m, drop):
 # torques, then the points of P (flows, then powers) or WB. With a joined table, these follow P: rated torque,
 # correction of WB at the last flow, and WB.
 (
-    MODE, CHECK, TRIP, START_SPEED, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, TORQUE_COUNT, HAS_SHAFT_POWER,
-    ENERGY, OWN_NUMBERS,
-) = range(13)  # fmt: skip
+    MODE,
+    CHECK,
+    TRIP,
+    START_SPEED,
+    INERTIA,
+    OFFSET,
+    TORQUE,
+    RATED,
+    COUNT_OR_TORQUE,
+    TORQUE_COUNT,
+    HAS_SHAFT_POWER,
+    ENERGY,
+    OWN_NUMBERS,
+) = range(13)
 HELD_SPEED, TRIPPING, TORQUE_DRIVEN = 0, 1, 2  # modes
-MAX_TORQUE_SLOPE = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
+# bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
+MAX_TORQUE_SLOPE = 8.0
 BAR, FLOW_ROUNDING = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
 OUTSIDE = 1e-6  # tolerance of the range of the curve, over its flow scale
 
@@ -218,7 +248,9 @@ def pump_speed(t, y, tables, device):
 @njit
 def set(t, y, out, tables, device):
     """Write to `out` the relative speed of the pump and its conductance, 0 while its check valve is shut."""
-    layout, k, floats = tables.layout[0], device["valve"], tables.floats
+    layout = tables.layout[0]
+    k = device["valve"]
+    floats = tables.floats
     shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
     out[layout["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
@@ -250,11 +282,20 @@ def fluid_torque(floats, at, curve, n, q, dense):
     table = at + OWN_NUMBERS + 2 * int(floats[at + TORQUE_COUNT])
     if floats[curve + LAW] == SUTER:
         rated = dense * floats[at + COUNT_OR_TORQUE]
-        return rated * suter_value(floats, table, int(floats[curve + COUNT]), n, q / floats[curve + OWN + 1])[0]
+        return (
+            rated
+            * suter_value(
+                floats, table, int(floats[curve + COUNT]), n, q / floats[curve + OWN + 1]
+            )[0]
+        )
     count = int(floats[at + COUNT_OR_TORQUE])
     if is_off_curve(floats, curve, n, q):
         join, own = curve + int(floats[curve + JOIN]), table + 2 * count
-        return dense * floats[own] * joined_value(floats, join, own + 1, n, q / floats[join + RATED_FLOW])[0]
+        return (
+            dense
+            * floats[own]
+            * joined_value(floats, join, own + 1, n, q / floats[join + RATED_FLOW])[0]
+        )
     if n <= 0.0:
         return 0.0
     place = max(floats[table], min(floats[table + count - 1], q / n))
@@ -269,7 +310,9 @@ def move(t, y, dydt, out, tables, device):
     first = 0 if mode == HELD_SPEED else 1
     if dydt.size > 0 and device["states"] > first:
         per, e, q = electric_energy(out, tables, device)
-        price = schedule_value(tables, int(floats[at + int(floats[at + ENERGY]) + law_energy.PRICE]), t)
+        price = schedule_value(
+            tables, int(floats[at + int(floats[at + ENERGY]) + law_energy.PRICE]), t
+        )
         law_energy.rates(per, e, q, price, dydt, device["y"] + first)
     if mode == HELD_SPEED:
         return
@@ -284,7 +327,11 @@ def move(t, y, dydt, out, tables, device):
         return
     push = -torque
     if mode == TORQUE_DRIVEN:
-        push = floats[at + OFFSET] - (torque - floats[at + TORQUE]) + given_torque(t, tables, device, True)
+        push = (
+            floats[at + OFFSET]
+            - (torque - floats[at + TORQUE])
+            + given_torque(t, tables, device, True)
+        )
     dydt[device["y"]] = push / floats[at + INERTIA]
 
 
@@ -301,13 +348,19 @@ def given_torque(t, tables, device, change):
 @njit
 def shaft_rate(out, tables, device, torque):
     """Upper bound of the rate [1/s] at which the fluid brakes a free shaft; torque : torque of the fluid [N m]"""
-    floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
+    floats = tables.floats
+    at = device["data"]
+    curve = tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
     if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
         rated = floats[at + COUNT_OR_TORQUE]
         if floats[curve + JOIN] > 0.0:
             rated = floats[at + OWN_NUMBERS + 2 * (int(floats[at + TORQUE_COUNT]) + int(rated))]
-        return MAX_TORQUE_SLOPE * abs(rated / floats[at + INERTIA]) * (abs(n) + abs(q / floats[curve + SCALE]))
+        return (
+            MAX_TORQUE_SLOPE
+            * abs(rated / floats[at + INERTIA])
+            * (abs(n) + abs(q / floats[curve + SCALE]))
+        )
     return 3.0 * abs(torque / (n * floats[at + INERTIA])) if n > 0.0 else 0.0
 
 
@@ -336,7 +389,9 @@ def stored(y, tables, device):
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
     n = y[device["y"]]
-    return 0.5 * floats[at + INERTIA] * floats[at + RATED] * n * (2.0 * floats[at + START_SPEED] + n)
+    return (
+        0.5 * floats[at + INERTIA] * floats[at + RATED] * n * (2.0 * floats[at + START_SPEED] + n)
+    )
 
 
 @njit
@@ -355,7 +410,9 @@ def events(t, y, out, tables, device, g):
     While the valve is open, it is the flow plus `reversal_margin` [kg/s]. While the valve is shut, it is the drop
     minus that at which the valve opens [Pa]. Both functions are 1 for a pump without check valve.
     """
-    layout, k, at = tables.layout[0], device["valve"], device["event"]
+    layout = tables.layout[0]
+    k = device["valve"]
+    at = device["event"]
     valve, floats = tables.valves[k], tables.floats
     g[at], g[at + 1] = 1.0, 1.0
     if floats[device["data"] + CHECK] == 0.0:
@@ -405,7 +462,9 @@ def electric_energy(out, tables, device):
     floats, at = tables.floats, device["data"] + int(tables.floats[device["data"] + ENERGY])
     n, q, rho = pump_point(out, tables, device)
     head = curve_head(floats, tables.valves[device["valve"]]["data"], n, q)[0]
-    per, e = law_energy.energy_per_volume(floats, at, n, q, head, rho * tables.settings[0]["gravity"])
+    per, e = law_energy.energy_per_volume(
+        floats, at, n, q, head, rho * tables.settings[0]["gravity"]
+    )
     return per, e, abs(q)
 
 
@@ -421,9 +480,9 @@ def outside(out, tables, device):
     if floats[curve + LAW] == SUTER:
         return 0
     n, q, _ = pump_point(out, tables, device)
-    slack, last, begun = (
-        OUTSIDE * floats[curve + SCALE], floats[curve + LAST], tables.valves[device["valve"]]["drive"],
-    )  # fmt: skip
+    slack = OUTSIDE * floats[curve + SCALE]
+    last = floats[curve + LAST]
+    begun = tables.valves[device["valve"]]["drive"]
     if -slack <= q <= max(n, 0.0) * last + slack:
         return 0
     if floats[curve + JOIN] > 0.0:
@@ -459,4 +518,6 @@ def pump_step(tables, out, k, rho, g, m, drop):
     g, m, drop : as for `curve_step`
     """
     at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
-    return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)
+    return curve_step(
+        tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop
+    )

@@ -25,9 +25,12 @@ from fvsolve.parts.pump.lower_shaft import (
 )
 
 SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
-MAX_VELOCITY = 15.0  # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
-MIN_VELOCITY = 0.01  # velocity below which a notice is given: 1/100 of usual mains; a wrong unit gives 1/1000
-INERTIA_RATIO = 30.0  # allowed ratio to the usual inertia: flywheels give 10, a wrong unit gives 1000
+# velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
+MAX_VELOCITY = 15.0
+# velocity below which a notice is given: 1/100 of usual mains; a wrong unit gives 1/1000
+MIN_VELOCITY = 0.01
+# allowed ratio to the usual inertia: flywheels give 10, a wrong unit gives 1000
+INERTIA_RATIO = 30.0
 NO_FLOW = 1e-7  # flow below which a pump of constant power has stalled [m3/s]
 ROUNDING = 1e-9
 LEAST_SHARE = 0.02  # least efficiency at the rated flow
@@ -40,14 +43,18 @@ def reversed_pump(start, name: str, part, valve) -> list[Notice]:
     heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
     fixed = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
     lowest = (
-        fixed[j] and not fixed[i] and heads[j] < heads[fixed].max() - SPEED_TOLERANCE and heads[j] == heads[fixed].min()
+        fixed[j]
+        and not fixed[i]
+        and heads[j] < heads[fixed].max() - SPEED_TOLERANCE
+        and heads[j] == heads[fixed].min()
     )
     if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + SPEED_TOLERANCE or lowest):
         return []
     target = f"where the head is {start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
     target = "which has the lowest water level" if lowest else target
     text = (
-        f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its direction (`from` is the suction side)"
+        f"{name}: it pumps from {part.from_} to {part.to}, {target}; check its "
+        "direction (`from` is the suction side)"
     )
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
 
@@ -58,8 +65,10 @@ def stalled_power(start, name: str, part, valve) -> list[Notice]:
     if part.power is None or start.rest or valve["open"] <= 0.0 or not abs(flow) < NO_FLOW:
         return []
     head = start.case.amount(-float(valve["drop"]) / start.weight, "head", span=True)
-    text = (f"{name}: constant power without flow determines no head; its head here, {head}, and the pressures behind "
-            "it have no meaning; give `curve` instead of `power`, or make it a valve with opening = 0")  # fmt: skip
+    text = (
+        f"{name}: constant power without flow determines no head; its head here, {head}, and the pressures behind "
+        "it have no meaning; give `curve` instead of `power`, or make it a valve with opening = 0"
+    )
     return [Notice("range", f"links.{name}", text, "power", flow, NO_FLOW)]
 
 
@@ -68,8 +77,10 @@ def estimated_inertia(draft, name: str, part) -> list[Notice]:
     if part.trip is None or part.inertia is not None:
         return []
     value = inertia(part, draft.fluid.density * draft.case.gravity)
-    text = (f"{name}: its inertia is estimated from power and speed: {value:.4g} kg m2 for impeller, water and motor; "
-            "the surge depends on this value; give the key `inertia` from the manufacturer")  # fmt: skip
+    text = (
+        f"{name}: its inertia is estimated from power and speed: {value:.4g} kg m2 for impeller, water and motor; "
+        "the surge depends on this value; give the key `inertia` from the manufacturer"
+    )
     return [Notice("range", f"links.{name}", text, "inertia", value)]
 
 
@@ -121,12 +132,18 @@ def unusual_flow(draft, name: str, part) -> list[Notice]:
     if least <= MAX_VELOCITY and most >= MIN_VELOCITY:
         return []
     if least > MAX_VELOCITY:
-        speed, limit, extreme = least, MAX_VELOCITY, "widest"
+        speed = least
+        limit = MAX_VELOCITY
+        extreme = "widest"
         suggestion = next(
-            (f'"{flow:.4g} {unit}"' for unit, size in UNITS if speed * size <= MAX_VELOCITY), "another unit"
+            (f'"{flow:.4g} {unit}"' for unit, size in UNITS if speed * size <= MAX_VELOCITY),
+            "another unit",
         )
     else:
-        speed, limit, extreme, suggestion = most, MIN_VELOCITY, "narrowest", "another unit"
+        speed = most
+        limit = MIN_VELOCITY
+        extreme = "narrowest"
+        suggestion = "another unit"
     rated, velocity = draft.case.amount(flow, "flow"), draft.case.amount(speed, "velocity")
     text = f"{name}: its rated flow of {rated} is {velocity} in the {extreme} adjacent pipe; did you mean {suggestion}?"
     key = "suter" if part.suter is not None else "curve"
@@ -135,7 +152,8 @@ def unusual_flow(draft, name: str, part) -> list[Notice]:
 
 SMALL_SHARE = 1e-6  # flow at which a pump counts as not running, over its rated flow
 SMALL_FLOW = 1e-9  # reverse flow regarded as rounding, over the flow scale of the model
-SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific speeds that the published tables cover
+# range of specific speeds that the published tables cover
+SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0
 
 
 class PumpRows(ShaftLowering, Device, kind="pump"):
@@ -164,16 +182,21 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         rated, weight = part.rated_speed or 1.0, draft.fluid.density * draft.case.gravity
         numbers, own = self.drive_numbers(draft, name, part), shaft_points(part, weight)
         numbers |= {
-            law.CHECK: part.check_valve, law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated,
-            law.COUNT_OR_TORQUE: own[0], law.HAS_SHAFT_POWER: self.dissipates(part),
-        }  # fmt: skip
+            law.CHECK: part.check_valve,
+            law.INERTIA: (inertia(part, weight) or np.inf) * rated,
+            law.RATED: rated,
+            law.COUNT_OR_TORQUE: own[0],
+            law.HAS_SHAFT_POWER: self.dissipates(part),
+        }
         given = self.torque_schedules(draft, name)
         numbers[law.ENERGY] = law.OWN_NUMBERS + len(given) + len(own) - 1
         rest = SMALL_SHARE * rated_point(part, weight)[0]
         return numbers_of(numbers, given, [*own[1:], *energy_numbers(draft, name, part, rest)])
 
     def states_of(self, draft, name, part):
-        return super().states_of(draft, name, part) + (STATES if draft.case.energy is not None else ())
+        return super().states_of(draft, name, part) + (
+            STATES if draft.case.energy is not None else ()
+        )
 
     def integrals(self, row) -> int:
         return len(STATES) if row["states"] >= len(STATES) else 0
@@ -190,12 +213,21 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         return [int(floats[row["data"] + int(floats[row["data"] + law.ENERGY]) + law_energy.PRICE])]
 
     def dissipates(self, part) -> bool:
-        return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
+        return (
+            not part.inertia
+            is part.trip
+            is part.efficiency
+            is part.shaft_power
+            is part.suter
+            is None
+        )
 
     def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
         if not self.has_free_shaft(model, row):
             return []
-        return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}]
+        return [
+            {int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}
+        ]
 
     def above(self, model, part, row) -> float:
         speed = float(model.tables.valves[row["valve"]]["drive"])
@@ -212,16 +244,24 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
-            text = (f"{name}: from {moment} on its flow is beyond the last flow of its curve, where its head "
-                    "follows a parabola; for a Suter table there give rated_speed, without "
-                    'curve_extrapolation = "parabola"')  # fmt: skip
+            text = (
+                f"{name}: from {moment} on its flow is beyond the last flow of its curve, where its head "
+                "follows a parabola; for a Suter table there give rated_speed, without "
+                'curve_extrapolation = "parabola"'
+            )
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
-        source = table.words if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED else f"{table.words}, the nearest"
-        text = (f"{name}: the pump leaves its curve at {moment}; outside the curve, head and torque follow the "
-                f"Suter table {source}, joined to the curve and chosen by the specific speed of the pump, "
-                f"{speed:.4g} (rpm, m3/s, m); "
-                "for a pump of several stages or inlets give the key `suter`")  # fmt: skip
+        source = (
+            table.words
+            if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED
+            else f"{table.words}, the nearest"
+        )
+        text = (
+            f"{name}: the pump leaves its curve at {moment}; outside the curve, head and torque follow the "
+            f"Suter table {source}, joined to the curve and chosen by the specific speed of the pump, "
+            f"{speed:.4g} (rpm, m3/s, m); "
+            "for a pump of several stages or inlets give the key `suter`"
+        )
         return Notice("range", f"links.{name}", text, "curve_extrapolation", speed)
 
     def edge(self, start, k: int):
@@ -234,12 +274,16 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         if start.rest:
             row["open"] = 0.0
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        floats, at, g = start.draft.tables.floats, int(row["data"]), float(row["conductance"])
+        floats = start.draft.tables.floats
+        at = int(row["data"])
+        g = float(row["conductance"])
         rho, gravity = start.density_at(i), start.case.gravity
         ratio = rho / start.draft.fluid.density
 
         def newton(flow, present):
-            a, s = law.curve_step(floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio))
+            a, s = law.curve_step(
+                floats, at, speed, rho, rho * gravity, g, float(flow), float(present * ratio)
+            )
             return 1.0 / s, ratio, a / s
 
         first = rho * floats[at + law.SCALE] * speed
@@ -252,7 +296,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         """Pressure rise [Pa] of a pump at a mass flow [kg/s] in the steady start; row : its row in the valve table"""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
-        return float(rho * start.case.gravity * law.curve_head(floats, at, speed, float(flow) / rho)[0])
+        return float(
+            rho * start.case.gravity * law.curve_head(floats, at, speed, float(flow) / rho)[0]
+        )
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -272,7 +318,9 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
 
     def begin(self, start, part, row) -> list[str]:
         k, draft = int(row["valve"]), start.draft
-        valve, name, moving = start.valves[k], draft.valve_names[k], []
+        valve = start.valves[k]
+        name = draft.valve_names[k]
+        moving = []
         ratio = start.density_at(int(valve["from_node"])) / draft.fluid.density
         if valve["open"] > 0.0:
             drop = -self.lift(start, valve, float(valve["flow"]))
@@ -285,15 +333,19 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
             text = f"pump {name}: its flow at the start is not on its characteristic at the relative speed "
             moving.append(f"{text}{valve['drive']:.4g}")
         draft.warnings += [
-            *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part),
+            *reversed_pump(start, name, part, valve),
+            *unusual_flow(draft, name, part),
             *stalled_power(start, name, part, valve),
-            *estimated_inertia(draft, name, part), *rated_point_notes(draft, name, part),
-        ]  # fmt: skip
+            *estimated_inertia(draft, name, part),
+            *rated_point_notes(draft, name, part),
+        ]
         return moving + self.set_free_shaft(start, part, row, valve)
 
     def fluid_torque(self, start, row, valve) -> float:
         floats, rho = start.draft.tables.floats, start.density_at(int(valve["from_node"]))
-        speed, flow, dense = float(valve["drive"]), float(valve["flow"]) / rho, rho / start.draft.fluid.density
+        speed = float(valve["drive"])
+        flow = float(valve["flow"]) / rho
+        dense = rho / start.draft.fluid.density
         return law.fluid_torque(floats, int(row["data"]), int(valve["data"]), speed, flow, dense)
 
 

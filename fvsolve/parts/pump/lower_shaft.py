@@ -42,7 +42,9 @@ def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[flo
     at = np.linspace(-math.pi, math.pi, len(values))
     correction = last * math.cos(edge) ** 2 - float(np.interp(edge, at, values))
     reverse = (-0.5 * math.pi <= at) & (at < ROUNDING)
-    return correction, values + reverse * (shut_off - np.interp(0.0, at, values)) * (1.0 + at / (0.5 * math.pi))
+    return correction, values + reverse * (shut_off - np.interp(0.0, at, values)) * (
+        1.0 + at / (0.5 * math.pi)
+    )
 
 
 def monotone_head(values: np.ndarray) -> np.ndarray:
@@ -75,7 +77,8 @@ def specific_speed(part, flow: float, head: float) -> float:
     return part.rated_speed * 30.0 / math.pi * math.sqrt(flow) / head**0.75
 
 
-LEAST_FLOW = 1e-5  # flow over the last flow, below which a curve that is flat at no flow is replaced by a line
+# flow over the last flow, below which a curve that is flat at no flow is replaced by a line
+LEAST_FLOW = 1e-5
 HIGHEST, LOWEST = 1000.0, 0.1  # range of heads of the curve of a constant-power pump [m]
 
 
@@ -83,7 +86,19 @@ def curve_numbers(part, weight: float) -> list[float]:
     """Parameters of the head curve of a pump, in the order that `law` states; weight : rho g [N/m3]"""
     if part.suter is not None:
         flow, head = rated_point(part, weight)
-        return [law.SUTER, len(part.suter.head), 0.0, 0.0, 0.0, 0.0, flow, 0.0, head, flow, *part.suter.head]
+        return [
+            law.SUTER,
+            len(part.suter.head),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            flow,
+            0.0,
+            head,
+            flow,
+            *part.suter.head,
+        ]
     kind, count, first, last, own = base_law(part, weight)
     numbers = [kind, count, first, last, 0.0, 0.0, last, 0.0, *own]
     head, slope = law.base_head(np.array(numbers), 0, float(last))
@@ -106,7 +121,11 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
     curve = part.curve
     if curve.coefficients:
         last = zero_head_flow(curve.coefficients)
-        first = LEAST_FLOW * last if len(curve.coefficients) < 2 or curve.coefficients[1] == 0.0 else 0.0
+        first = (
+            LEAST_FLOW * last
+            if len(curve.coefficients) < 2 or curve.coefficients[1] == 0.0
+            else 0.0
+        )
         return law.POLYNOMIAL, len(curve.coefficients), first, last, list(curve.coefficients)
     if (fit := power_law(curve)) is None:
         return law.POINTS, len(curve.flow), 0.0, curve.flow[-1], [*curve.flow, *curve.value]
@@ -154,7 +173,8 @@ def rated_point(part, weight: float) -> tuple[float, float]:
     return float(flows[best]), float(heads[best])
 
 
-SAMPLE_COUNT = 65  # number of points of a power by a Suter table over the angle, and also over the flow
+# number of points of a power by a Suter table over the angle, and also over the flow
+SAMPLE_COUNT = 65
 
 
 def shaft_points(part, weight: float) -> list[float]:
@@ -182,14 +202,18 @@ def shaft_points(part, weight: float) -> list[float]:
     return [len(flows), *flows, *powers, torque, lack, *values]
 
 
-def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+def table_power(
+    table, numbers, flow: float, head: float, last: float
+) -> tuple[np.ndarray, np.ndarray]:
     """(flows [m3/s], shaft powers over the rated power) of a head curve, by the values WB of a Suter table.
 
     The power is nowhere below that at the rated efficiency.
     numbers : parameters of the head curve; flow, head : rated point [m3/s], [m]; last : last flow of the curve [m3/s]
     """
     flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), SAMPLE_COUNT)[:-1])
-    flows = np.unique([*flows, *np.linspace(0.0, last, SAMPLE_COUNT), *([flow] if last > flow else [])])
+    flows = np.unique(
+        [*flows, *np.linspace(0.0, last, SAMPLE_COUNT), *([flow] if last > flow else [])]
+    )
     lifts = np.array([law.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
     at = np.linspace(-math.pi, math.pi, len(table.torque))
     by_table = (1.0 + (flows / flow) ** 2) * np.interp(np.arctan2(flows, flow), at, table.torque)
@@ -198,10 +222,16 @@ def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[
 
 def rated_efficiency(part) -> float:
     """Efficiency of a pump at its rated point; EFFICIENCY if it is not stated, or stated as a curve."""
-    return EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
+    return (
+        EFFICIENCY
+        if part.efficiency is None or isinstance(part.efficiency, CurvePoints)
+        else part.efficiency
+    )
 
 
-def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequence[float], Sequence[float]]:
+def shaft_power(
+    part, weight: float, flow: float, rated: float
+) -> tuple[Sequence[float], Sequence[float]]:
     """(flows [m3/s], powers at the shaft [W]) of a pump at relative speed 1, at least two of each.
 
     flow, rated : flow [m3/s] and shaft power [W] at the rated point; weight : rho g [N/m3]
@@ -226,7 +256,11 @@ def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
     At no flow, the power is H times the ratio of power to head at the next point.
     """
     numbers = np.array(curve_numbers(part, weight))
-    points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
+    points = [
+        (q, e)
+        for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True)
+        if q > 0.0 and e > 0.0
+    ]
     flows = [q for q, _ in points]
     powers = [weight * q * law.curve_head(numbers, 0, 1.0, float(q))[0] / e for q, e in points]
     shut_off = weight * law.curve_head(numbers, 0, 1.0, 0.0)[0] * flows[0] / points[0][1]
@@ -276,7 +310,11 @@ class ShaftLowering:
     fluid_torque_sign = -1.0  # of the probe `torque`, as a torque that turns the shaft forward
 
     def states_of(self, draft, name, part) -> tuple[str, ...]:
-        free = part.trip is not None or torques_on(draft.case, name) or f"{name}.shaft" in draft.case.network_places
+        free = (
+            part.trip is not None
+            or torques_on(draft.case, name)
+            or f"{name}.shaft" in draft.case.network_places
+        )
         return ("speed",) if free else ()
 
     def network_elements(self, case, name, part) -> tuple[list[Element], list]:
@@ -286,11 +324,24 @@ class ShaftLowering:
             return [], []
         rated = part.rated_speed if getattr(part, "rated_speed", None) is not None else 1.0
         return [
-            Element(CAPACITY, f"{place}.shaft", place, (shaft, None), part.inertia or 1.0, f"{name}.speed",
-                    state_of=("device", name), unit=rated),
-            Element(FLOW, f"{place}.fluid", place, (None, shaft),
-                    reads=(codes.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign))),
-        ], []  # fmt: skip
+            Element(
+                CAPACITY,
+                f"{place}.shaft",
+                place,
+                (shaft, None),
+                part.inertia or 1.0,
+                f"{name}.speed",
+                state_of=("device", name),
+                unit=rated,
+            ),
+            Element(
+                FLOW,
+                f"{place}.fluid",
+                place,
+                (None, shaft),
+                reads=(codes.DEVICE_INPUT, (name, "torque", self.fluid_torque_sign)),
+            ),
+        ], []
 
     def speed_input(self, model, name, sort) -> dict[str, Input]:
         """Input "speed"; none for a shaft that torques drive from the start: nothing reads its schedule."""
@@ -312,15 +363,25 @@ class ShaftLowering:
         torques = torques_on(draft.case, name)
         free = torques or f"{name}.shaft" in draft.case.network_places
         mode = law.TORQUE_DRIVEN if free else law.HELD_SPEED if part.trip is None else law.TRIPPING
-        draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
-        return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
+        draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(
+            part.speed
+        )
+        return {
+            law.MODE: mode,
+            law.TRIP: self.trip(draft, name, part),
+            law.TORQUE_COUNT: len(torques),
+        }
 
     def torque_schedules(self, draft, name) -> list[float]:
         """Flat list of pairs for the given torques on the shaft: index of the schedule, value at the start.
 
         The values are 0 here and are set in `set_free_shaft`.
         """
-        return [x for torque in torques_on(draft.case, name) for x in (draft.schedules.add(torque.torque), 0.0)]
+        return [
+            x
+            for torque in torques_on(draft.case, name)
+            for x in (draft.schedules.add(torque.torque), 0.0)
+        ]
 
     def trip(self, draft, name, part) -> int:
         """Index of a schedule that is 0 before the trip and 1 from then on; -1 without a trip.
@@ -332,8 +393,13 @@ class ShaftLowering:
         kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
         if part.trip < start:
             trip, begin = (draft.case.amount(moment, "time", 6) for moment in (part.trip, start))
-            draft.fault(f"links.{name}.trip", f"{trip} lies before the start at {begin}; expected a later time")
-        index = draft.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
+            draft.fault(
+                f"links.{name}.trip",
+                f"{trip} lies before the start at {begin}; expected a later time",
+            )
+        index = draft.schedules.add(
+            Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0))
+        )
         draft.schedules.breaks[part.trip] = kinks.get(part.trip, False)
         return index
 
@@ -352,7 +418,9 @@ class ShaftLowering:
         It is the speed at the trip or, for a shaft that given torques drive, at the start. For such a shaft the given
         torques, the torque of the fluid and the unbalanced torque at the start are stored too.
         """
-        draft, floats, at = start.draft, start.draft.tables.floats, int(row["data"])
+        draft = start.draft
+        floats = start.draft.tables.floats
+        at = int(row["data"])
         name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
             trip = float(part.trip)
@@ -364,20 +432,34 @@ class ShaftLowering:
         for k in range(int(floats[at + law.TORQUE_COUNT])):
             value = start.schedule_value(floats[first + 2 * k])
             floats[first + 2 * k + 1], total = value, total + value
-        rest = total - braking if abs(total - braking) > ROUNDING_SHARE * (abs(total) + abs(braking)) else 0.0
+        rest = (
+            total - braking
+            if abs(total - braking) > ROUNDING_SHARE * (abs(total) + abs(braking))
+            else 0.0
+        )
         speed = float(valve["drive"])
-        floats[at + law.START_SPEED], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, braking, rest
+        floats[at + law.START_SPEED], floats[at + law.TORQUE], floats[at + law.OFFSET] = (
+            speed,
+            braking,
+            rest,
+        )
         if f"{name}.shaft" in draft.case.network_places:
             return []
         rise = rest / part.inertia
-        return [f"{part.kind} {name}: its shaft accelerates by {rise:.4g} rad/s2"] if rest != 0.0 else []
+        return (
+            [f"{part.kind} {name}: its shaft accelerates by {rise:.4g} rad/s2"]
+            if rest != 0.0
+            else []
+        )
 
 
 def torques_on(case, name: str) -> list:
     """Torque links of a case on the shaft of a pump or turbine that no other part joins."""
     if f"{name}.shaft" in case.network_places:
         return []  # they are sources of the network
-    return [link for link in case.links.values() if link.kind == "torque" and link.to == f"{name}.shaft"]
+    return [
+        link for link in case.links.values() if link.kind == "torque" and link.to == f"{name}.shaft"
+    ]
 
 
 def numbers_of(by_index: dict[int, float], given: list[float], own: list[float]) -> list[float]:

@@ -5,7 +5,14 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.parts.nodes_and_links import TwoPort
-from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
+from fvsolve.parts.pump.head_curve import (
+    CurvePoints,
+    Efficiency,
+    HeadCurve,
+    ShaftPower,
+    Suter,
+    SuterTable,
+)
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import PROFILE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
 
@@ -29,45 +36,78 @@ class Pump(TwoPort, kind="pump"):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("curve", "power", "suter"),)
     owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
     quantities: ClassVar[dict[str, str]] = {
-        "flow": "flow", "head": "head", "speed": "number", "torque": "torque", "power": "power",
+        "flow": "flow",
+        "head": "head",
+        "speed": "number",
+        "torque": "torque",
+        "power": "power",
         "electric_power": "power",
-    }  # fmt: skip
+    }
 
     curve: Annotated[CurvePoints | None, HeadCurve()] = None
-    power: Annotated[float | None, Quantity("power", positive, "constant hydraulic power given to the fluid [W]")] = (
-        None
-    )
-    suter: Annotated[SuterTable | None, Suter()] = None
-    curve_extrapolation: Annotated[str | None, Choice(
-        "law", ("suter", "parabola"),
-        "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
-        "`rated_speed`) or parabola",
-    )] = None  # fmt: skip
-    speed: Annotated[Schedule, Scheduled(
-        "number", nonnegative, "relative speed, 1 at the speed of the curve",
-        UsualRange(0.0, 2.5, "of the rated speed"),
-    )] = Field(default_factory=lambda: constant(1.0))  # fmt: skip
-    rated_speed: Annotated[
-        float | None, Quantity("angular_velocity", positive, "speed at relative speed 1 [rad/s]", SPEEDS, PROFILE)
+    power: Annotated[
+        float | None, Quantity("power", positive, "constant hydraulic power given to the fluid [W]")
     ] = None
-    inertia: Annotated[float | None, Quantity(
-        "inertia", positive,
-        "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
-        changes=PROFILE,
-    )] = None  # fmt: skip
+    suter: Annotated[SuterTable | None, Suter()] = None
+    curve_extrapolation: Annotated[
+        str | None,
+        Choice(
+            "law",
+            ("suter", "parabola"),
+            "head outside the flows of `curve`: suter (a table by specific speed, joined to the curve; default with "
+            "`rated_speed`) or parabola",
+        ),
+    ] = None
+    speed: Annotated[
+        Schedule,
+        Scheduled(
+            "number",
+            nonnegative,
+            "relative speed, 1 at the speed of the curve",
+            UsualRange(0.0, 2.5, "of the rated speed"),
+        ),
+    ] = Field(default_factory=lambda: constant(1.0))
+    rated_speed: Annotated[
+        float | None,
+        Quantity(
+            "angular_velocity", positive, "speed at relative speed 1 [rad/s]", SPEEDS, PROFILE
+        ),
+    ] = None
+    inertia: Annotated[
+        float | None,
+        Quantity(
+            "inertia",
+            positive,
+            "inertia of all rotating masses and water in the pump, with `rated_speed` [kg m2]; estimated if left out",
+            changes=PROFILE,
+        ),
+    ] = None
     trip: Annotated[
-        float | None, Quantity("time", about="time at which the motor is switched off, requires `rated_speed` [s]")
+        float | None,
+        Quantity(
+            "time", about="time at which the motor is switched off, requires `rated_speed` [s]"
+        ),
     ] = None
     efficiency: Annotated[Any, Efficiency()] = None
     shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None
-    overall_efficiency: Annotated[Any, Efficiency(
-        "hydraulic power over electric power (wire to water), at every flow, or over flow at relative speed 1; that of "
-        "`[energy]` if left out"
-    )] = None  # fmt: skip
-    price: Annotated[Schedule | None, Scheduled(
-        "number", about="price of its electric energy per kWh, with `[energy]`; that of `[energy]` if left out"
-    )] = None  # fmt: skip
-    check_valve: Annotated[bool, Flag("ideal check valve: no flow from `to` to `from`, no loss", PROFILE)] = False
+    overall_efficiency: Annotated[
+        Any,
+        Efficiency(
+            "hydraulic power over electric power (wire to water), at every flow, "
+            "or over flow at relative speed 1; that of "
+            "`[energy]` if left out"
+        ),
+    ] = None
+    price: Annotated[
+        Schedule | None,
+        Scheduled(
+            "number",
+            about="price of its electric energy per kWh, with `[energy]`; that of `[energy]` if left out",
+        ),
+    ] = None
+    check_valve: Annotated[
+        bool, Flag("ideal check valve: no flow from `to` to `from`, no loss", PROFILE)
+    ] = False
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -76,21 +116,35 @@ class Pump(TwoPort, kind="pump"):
             text = "cannot follow a control if the machine trips, because the speed at the trip is then unknown"
             faults.append((("speed",), f"{text}; expected a schedule, or no `trip`"))
         if "trip" in given and "inertia" not in given and "rated_speed" not in given:
-            faults.append((("trip",), 'needs rated_speed, for example "1480 rpm", and the inertia of all rotating '
-                                      "masses, which is otherwise estimated; to stop the pump at once, set speed to 0 "
-                                      "by a schedule"))  # fmt: skip
+            faults.append(
+                (
+                    ("trip",),
+                    'needs rated_speed, for example "1480 rpm", and the inertia of all rotating '
+                    "masses, which is otherwise estimated; to stop the pump at once, set speed to 0 "
+                    "by a schedule",
+                )
+            )
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
         if "curve_extrapolation" in given and "curve" not in given:
             text = "applies outside the flows of a curve; give the key `curve`, or remove this key"
             faults.append((("curve_extrapolation",), text))
-        if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
+        if (
+            given.get("curve_extrapolation") == "suter"
+            and "curve" in given
+            and "rated_speed" not in given
+        ):
             faults.append(
-                (("curve_extrapolation",), 'needs rated_speed, for example "1480 rpm", for the specific speed')
+                (
+                    ("curve_extrapolation",),
+                    'needs rated_speed, for example "1480 rpm", for the specific speed',
+                )
             )
         if "suter" in given and isinstance(given.get("efficiency"), dict):
             text = "`suter` already gives the torque; expected a number, the efficiency at the rated point"
             faults.append((("efficiency",), text))
         if "suter" in given and "shaft_power" in given:
-            faults.append((("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out"))
+            faults.append(
+                (("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out")
+            )
         return faults

@@ -12,7 +12,8 @@ from fvsolve.core.kernels.dtypes import FRICTION_ROUGH
 from fvsolve.core.kernels.steady_friction import drag, drag_slope
 from fvsolve.jit import njit
 
-DRAG = ("friction", "loss", "rough", "roughness", "reynolds")  # columns of a pipe, its first numbers
+# columns of a pipe, its first numbers
+DRAG = ("friction", "loss", "rough", "roughness", "reynolds")
 KIND, LOSS, ROUGH, ROUGHNESS, REYNOLDS, PER, LEAST = range(7)  # PER : L / A [1/m]; LEAST : [kg/s]
 NEAR = 1e-3  # share of the drop below which the tangent replaces the chord
 SWEEPS = 50
@@ -21,10 +22,13 @@ SWEEPS = 50
 @njit
 def loss_and_slope(floats, at, flow):
     """(drop [Pa], d drop / d flow [Pa s/kg]) of a mass flow [kg/s] at the reference density."""
-    kind, loss, rough = int(floats[at + KIND]), floats[at + LOSS], floats[at + ROUGH]
-    roughness, reynolds, per, least = (
-        floats[at + ROUGHNESS], floats[at + REYNOLDS], floats[at + PER], floats[at + LEAST],
-    )  # fmt: skip
+    kind = int(floats[at + KIND])
+    loss = floats[at + LOSS]
+    rough = floats[at + ROUGH]
+    roughness = floats[at + ROUGHNESS]
+    reynolds = floats[at + REYNOLDS]
+    per = floats[at + PER]
+    least = floats[at + LEAST]
     if kind == FRICTION_ROUGH or abs(flow) >= least:
         slope = drag_slope(kind, loss, rough, roughness, reynolds, flow)
         return per * drag(kind, loss, rough, roughness, reynolds, flow), per * slope

@@ -33,7 +33,8 @@ class QuasiSteadyPipeRows(Restriction, kind="quasi-steady-pipe"):
         """Numbers of a pipe, see `law`; fault : function (place, text) for a missing viscosity"""
         area, friction = math.pi / 4.0 * link.diameter**2, dict.fromkeys(law.DRAG, 0.0)
         draft.hydraulics.friction(name, link, friction, fault)
-        viscosity = draft.fluid.viscosity or 1e-6 * draft.fluid.density  # water's: it only bounds the slope at no flow
+        # water's: it only bounds the slope at no flow
+        viscosity = draft.fluid.viscosity or 1e-6 * draft.fluid.density
         least = LAMINAR_REYNOLDS * math.pi / 4.0 * link.diameter * viscosity
         return [*(float(friction[key]) for key in law.DRAG), link.length / area, least]
 

@@ -25,7 +25,8 @@ class QuasiSteadyPipe(Pipe, pipe_model=QUASI_STEADY):
     )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from (found for found in super().unusual() if found[0] != ("diameter",))  # short pipes stand for losses
+        # short pipes stand for losses
+        yield from (found for found in super().unusual() if found[0] != ("diameter",))
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         yield from super().faults(name, around)
@@ -39,7 +40,10 @@ class QuasiSteadyPipe(Pipe, pipe_model=QUASI_STEADY):
             yield ("friction", "model"), f"{text}; expected {follows}, or `factor`"
         elif self.minor_loss == 0.0 and (model == "none" or law.factor == 0.0):
             text = "is missing: the flow of a quasi-steady pipe follows its losses, and this pipe has none"
-            yield ("friction",), f'{text}; give `friction` or `minor_loss`, or use type = "rigid-column"'
+            yield (
+                ("friction",),
+                f'{text}; give `friction` or `minor_loss`, or use type = "rigid-column"',
+            )
         if self.initial_flow is not None:
             text = "a quasi-steady pipe has no flow of its own, its flow follows the pressures; leave this key out"
             yield ("initial_flow",), text

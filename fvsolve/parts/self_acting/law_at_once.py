@@ -31,7 +31,9 @@ def held_value(t, tables, device):
 @njit
 def set(t, y, out, tables, device):
     """Write the conductance of the open valve to `out`, 0 while it is shut, and the value that it holds, if any."""
-    k, armed, layout = device["valve"], tables.armed, tables.layout[0]
+    k = device["valve"]
+    armed = tables.armed
+    layout = tables.layout[0]
     shut, full = armed[device["event"] + SHUT] > 0.0, armed[device["event"] + FULL] > 0.0
     out[layout["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
     holds = not shut and not full and tables.valves[k]["hold"] >= 0
@@ -41,7 +43,9 @@ def set(t, y, out, tables, device):
 @njit
 def control_error(t, out, tables, device):
     """Control error [Pa] or [kg/s], positive if the valve must open."""
-    valve, layout, value = tables.valves[device["valve"]], tables.layout[0], held_value(t, tables, device)
+    valve = tables.valves[device["valve"]]
+    layout = tables.layout[0]
+    value = held_value(t, tables, device)
     if device["mode"] == FLOW_CONTROL:
         return value - out[layout["valve"] + device["valve"]]
     if device["mode"] == REDUCING:
@@ -65,9 +69,15 @@ def events(t, y, out, tables, device, g):
     drop and the control error, less MARGIN [Pa]. The second is the flow that the valve could pass in addition [kg/s];
     while it is fully open, the control error with the opposite sign, less a margin.
     """
-    k, at, armed = device["valve"], device["event"], tables.armed
+    k = device["valve"]
+    at = device["event"]
+    armed = tables.armed
     error, drop = control_error(t, out, tables, device), head_drop(tables, out, k)[1]
-    margin = FLOW_MARGIN * abs(error + out[tables.layout[0]["valve"] + k]) if device["mode"] == FLOW_CONTROL else MARGIN
+    margin = (
+        FLOW_MARGIN * abs(error + out[tables.layout[0]["valve"] + k])
+        if device["mode"] == FLOW_CONTROL
+        else MARGIN
+    )
     back, full = out[tables.layout[0]["valve"] + k], spare_flow(out, tables, k, MARGIN)
     if back == 0.0:
         back = drop + MARGIN
@@ -93,4 +103,8 @@ def value(t, y, out, tables, device, quantity):
         return 0.0
     flow = out[layout["valve"] + k]
     most = flow + spare_flow(out, tables, k, 0.0)
-    return min(max(flow / most, 0.0), 1.0) if out[layout["drive"] + k] < NOT_HELD and most > 0.0 else 1.0
+    return (
+        min(max(flow / most, 0.0), 1.0)
+        if out[layout["drive"] + k] < NOT_HELD and most > 0.0
+        else 1.0
+    )

@@ -10,7 +10,8 @@ from fvsolve.core.kernels.restrictions import head_drop
 from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
 
-PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
+# excess over the cracking pressure at which it opens, so that rounding does not [Pa]
+PRESSURE_MARGIN = 1.0
 
 
 @njit
@@ -24,7 +25,9 @@ def set(t, y, out, tables, device):
 def joins_junction(tables, device):
     """True if a junction lies at one end of the valve: other parts may then stop the flow while the valve is open."""
     valve, nodes = tables.valves[device["valve"]], tables.nodes
-    return nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
+    return (
+        nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
+    )
 
 
 @njit

@@ -26,13 +26,22 @@ from fvsolve.jit import njit
 
 RELIEF, CHECK, SENSED, FREE_BACK = 0, 1, 2, 3  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys
-LIFT, TARGET, LIFTING_PRESSURE, SPAN, TIME_CONSTANT, ANGULAR_FREQUENCY, DAMPING = 0, 1, 2, 3, 4, 5, 6
-STOP_MARGIN = 1e-10  # drive away from a stop, over the span, at which the disc leaves it; above rounding
-SETTLE_MARGIN = 0.5 * STOP_MARGIN  # share of the span by which it comes to rest earlier than it leaves
+LIFT = 0
+TARGET = 1
+LIFTING_PRESSURE = 2
+SPAN = 3
+TIME_CONSTANT = 4
+ANGULAR_FREQUENCY = 5
+DAMPING = 6
+# drive away from a stop, over the span, at which the disc leaves it; above rounding
+STOP_MARGIN = 1e-10
+# share of the span by which it comes to rest earlier than it leaves
+SETTLE_MARGIN = 0.5 * STOP_MARGIN
 DIRECTION_TIME = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
 ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
 BACK_MARGIN = 1e-3  # reverse drop that starts reverse flow through a seated disc [Pa]
-FORWARD_MARGIN = 1e-10  # flow over that at a drop of the span from which a reversed flow is forward again
+# flow over that at a drop of the span from which a reversed flow is forward again
+FORWARD_MARGIN = 1e-10
 SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
@@ -71,7 +80,11 @@ def disc_drive_at(y, tables, device, before, drop):
     """
     floats, data = tables.floats, device["data"]
     lifting = before if device["mode"] != CHECK else drop - floats[data + LIFTING_PRESSURE]
-    return (floats[data + TARGET] - floats[data + LIFT]) + lifting / floats[data + SPAN] - y[device["y"]]
+    return (
+        (floats[data + TARGET] - floats[data + LIFT])
+        + lifting / floats[data + SPAN]
+        - y[device["y"]]
+    )
 
 
 @njit
@@ -81,7 +94,10 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
     before, behind : pressures at the ends minus those at the start [Pa]; drop : drop across the valve [Pa]
     ahead : True if the upstream pressure causes the change of the drop, False if the downstream pressure does
     """
-    floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
+    data = device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
         return 0.0, 0.0
     if device["states"] == 2:
@@ -95,7 +111,9 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
 def lift_rate_slope(tables, device):
     """Derivative [1/s/Pa] of the rate of the lift dx/dt by the lifting pressure; 0 unless the disc has a lag."""
     floats, data = tables.floats, device["data"]
-    return 1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
+    return (
+        1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
+    )
 
 
 @njit
@@ -105,10 +123,17 @@ def move(t, y, dydt, out, tables, device):
     While the disc closes on a rigid column, out[CLOSING] is raised to -x'/x, with the lift x. A column that flows back
     slams the disc, with x ~ (time left)^(1/3), and a time step must not pass that instant.
     """
-    floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
+    o = device["y"]
     drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME_CONSTANT], floats[device["data"] + ANGULAR_FREQUENCY]
-    own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
+    own = (
+        1.0 / time
+        if device["states"] == 1
+        else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
+    )
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], own if stopped else disc_rate_limit(y, out, tables, device, own))
     if dydt.size == 0:
@@ -117,7 +142,11 @@ def move(t, y, dydt, out, tables, device):
         dydt[o] = 0.0 if stopped else drive / time
     else:
         dydt[o] = 0.0 if stopped else y[o + 1]
-        dydt[o + 1] = 0.0 if stopped else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+        dydt[o + 1] = (
+            0.0
+            if stopped
+            else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+        )
     valve, nodes = tables.valves[device["valve"]], tables.nodes
     on_column = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
     if on_column and dydt[o] < 0.0 and not controls_column(tables, device["valve"]):
@@ -130,7 +159,9 @@ def disc_rate_limit(y, out, tables, device, own):
 
     Where a rigid column sets the flow, the derivative of the drop dP by the lift x is -2 dP / x.
     """
-    k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
+    k = device["valve"]
+    speed = own / tables.floats[device["data"] + SPAN]
+    nodes = tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
     if controls_column(tables, k):
         return own
@@ -141,7 +172,12 @@ def disc_rate_limit(y, out, tables, device, own):
     if device["mode"] == CHECK:
         rate += loop_rate(out, tables, k, behind, speed)
     if nodes[before]["gates"] >= 0 or (nodes[behind]["gates"] >= 0 and device["mode"] != RELIEF):
-        rate += 2.0 * speed * abs(head_drop(tables, out, k)[1]) / max(disc_lift(y, tables, device), 1e-300)
+        rate += (
+            2.0
+            * speed
+            * abs(head_drop(tables, out, k)[1])
+            / max(disc_lift(y, tables, device), 1e-300)
+        )
     return rate if device["states"] == 1 else sqrt(own * rate)
 
 
@@ -156,14 +192,19 @@ def events(t, y, out, tables, device, g):
     function is the flow [kg/s], less a margin while it is reversed, or for a disc on its seat the drop plus BACK_MARGIN
     [Pa].
     """
-    armed, at, o = tables.armed, device["event"], device["y"]
+    armed = tables.armed
+    at = device["event"]
+    o = device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - STOP_MARGIN, drive - STOP_MARGIN
     if device["states"] == 1:
-        down = STOP_MARGIN if armed[at + 4] > 0.0 else -SETTLE_MARGIN  # the column delays it, unlike on the seat
+        # the column delays it, unlike on the seat
+        down = STOP_MARGIN if armed[at + 4] > 0.0 else -SETTLE_MARGIN
         onward, speed = (drive + down, drive + SETTLE_MARGIN), drive
     else:
-        speed = y[o + 1] / tables.floats[device["data"] + ANGULAR_FREQUENCY] + DIRECTION_TIME * drive
+        speed = (
+            y[o + 1] / tables.floats[device["data"] + ANGULAR_FREQUENCY] + DIRECTION_TIME * drive
+        )
         onward = speed, speed
     if armed[at] == 0.0:
         stop = max(1.0 - x, -onward[1])
@@ -172,7 +213,15 @@ def events(t, y, out, tables, device, g):
     event_pair(tables, g, at, stop)
     event_pair(tables, g, at + 2, seat)
     if device["controls_column"] >= 0:
-        control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, lift_rate_slope(tables, device))
+        control_events(
+            out,
+            tables,
+            device,
+            g,
+            x,
+            1.0 if armed[at + 2] > 0.0 else 0.0,
+            lift_rate_slope(tables, device),
+        )
     else:
         event_pair(tables, g, at + 4, 1.0)
     if device["mode"] == FREE_BACK:

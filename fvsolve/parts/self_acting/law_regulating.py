@@ -11,12 +11,19 @@ from math import sqrt
 from fvsolve.core.kernels.dtypes import RATE, RATE_UNWANTED
 from fvsolve.core.kernels.restrictions import head_drop
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.self_acting_valves import control_events, controls_column, event_pair, loop_rate
+from fvsolve.core.kernels.self_acting_valves import (
+    control_events,
+    controls_column,
+    event_pair,
+    loop_rate,
+)
 from fvsolve.jit import njit
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
-OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
-STOP_MARGIN = 1e-10  # error over the band below which it stays at a stop, so that rounding does not move it
+# numbers of a device: three at the start, then its keys
+OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4
+# error over the band below which it stays at a stop, so that rounding does not move it
+STOP_MARGIN = 1e-10
 SETTLE_MARGIN = 0.5 * STOP_MARGIN  # margin by which it reaches a stop earlier than it leaves it
 ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
 RETURN_LIFT = 0.5  # fraction of the control lift below which it controls its column again
@@ -37,7 +44,9 @@ def set(t, y, out, tables, device):
     """
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
     back = tables.armed[device["event"]] > 0.0
-    out[tables.layout[0]["conductance"] + k] = 0.0 if back else tables.valves[k]["conductance"] * x * x
+    out[tables.layout[0]["conductance"] + k] = (
+        0.0 if back else tables.valves[k]["conductance"] * x * x
+    )
 
 
 @njit
@@ -48,10 +57,14 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
     ahead : True if the upstream pressure causes the change of the drop, False if the downstream pressure does; the
     derivative is 0 if the valve senses the other pressure
     """
-    floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
+    data = device["data"]
     if armed[at + 2] > 0.0 or armed[at + 4] > 0.0:
         return 0.0, 0.0
-    change, slope = schedule_value(tables, device["schedule"], t) - floats[data + SET], 1.0 / stroke(tables, device)
+    change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
+    slope = 1.0 / stroke(tables, device)
     reduces = device["mode"] == REDUCING
     error = change - behind if reduces else before - change
     return (floats[data + ERROR] + error) * slope, slope if ahead != reduces else 0.0
@@ -69,7 +82,9 @@ def regulator_error(t, out, tables, device):
 
     The error is the set value minus the sensed value, with the opposite sign for a pressure-sustaining valve.
     """
-    layout, floats, data = tables.layout[0], tables.floats, device["data"]
+    layout = tables.layout[0]
+    floats = tables.floats
+    data = device["data"]
     valve = tables.valves[device["valve"]]
     change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
     if device["mode"] == FLOW_CONTROL:
@@ -103,10 +118,16 @@ def regulator_rate(y, out, tables, device):
     drop = abs(head_drop(tables, out, k)[1])
     if device["mode"] == FLOW_CONTROL:
         return speed * sqrt(tables.valves[k]["conductance"] * drop)
-    end = tables.valves[k]["to_node"] if device["mode"] == REDUCING else tables.valves[k]["from_node"]
+    end = (
+        tables.valves[k]["to_node"] if device["mode"] == REDUCING else tables.valves[k]["from_node"]
+    )
     if tables.nodes[end]["gates"] < 0:
         return loop_rate(out, tables, k, end, speed)
-    return 0.0 if controls_column(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
+    return (
+        0.0
+        if controls_column(tables, k)
+        else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
+    )
 
 
 @njit
@@ -121,7 +142,9 @@ def events(t, y, out, tables, device, g):
     the distance.
     """
     layout, armed = tables.layout[0], tables.armed
-    at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
+    at = device["event"]
+    x = regulator_opening(y, tables, device)
+    error = regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
     if device["mode"] != FLOW_CONTROL:
         back = out[layout["valve"] + device["valve"]]
@@ -133,12 +156,20 @@ def events(t, y, out, tables, device, g):
     if armed[at + 2] == 0.0:
         full = max(full + SETTLE_MARGIN, 1.0 - x)
     if armed[at + 4] == 0.0:  # a controlled column delays it, unlike on the seat
-        seat = max(error + (STOP_MARGIN if controls_column(tables, device["valve"]) else -SETTLE_MARGIN), x)
+        seat = max(
+            error + (STOP_MARGIN if controls_column(tables, device["valve"]) else -SETTLE_MARGIN), x
+        )
     event_pair(tables, g, at, back)
     event_pair(tables, g, at + 2, full)
     event_pair(tables, g, at + 4, seat)
     control_events(
-        out, tables, device, g, x, RETURN_LIFT if device["mode"] != FLOW_CONTROL else 0.0, 1.0 / stroke(tables, device)
+        out,
+        tables,
+        device,
+        g,
+        x,
+        RETURN_LIFT if device["mode"] != FLOW_CONTROL else 0.0,
+        1.0 / stroke(tables, device),
     )
 
 

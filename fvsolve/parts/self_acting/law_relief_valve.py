@@ -22,7 +22,8 @@ from fvsolve.core.kernels.self_acting_valves import event_pair, sensed_pressure
 from fvsolve.jit import njit
 
 FREE_BACK = 1  # mode
-RELUCTANCE = 1e-10  # margin at events of the lift, and of a flow over that at a drop of the span, against rounding
+# margin at events of the lift, and of a flow over that at a drop of the span, against rounding
+RELUCTANCE = 1e-10
 ALMOST_SHUT = 1e-6  # lift below which its flow may be rounding
 BACK_MARGIN = 1e-3  # reverse drop that opens a shut valve to reverse flow [Pa]
 
@@ -50,7 +51,9 @@ def events(t, y, out, tables, device, g):
     Between shut and fully open the valve always becomes partly open first. After a jump, a direct change to the
     opposite stop might contradict the law of that stop. In mode FREE_BACK a reversed flow counts as fully open.
     """
-    armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
+    armed = tables.armed
+    at = device["event"]
+    x = pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
     if armed[at] > 0.0:
         left, missing = x - RELUCTANCE, 1.0
@@ -73,7 +76,8 @@ def forward_flow(tables, out, device, x):
     For a shut valve, or without flow, it is the drop plus BACK_MARGIN, over the span. x : lift
     """
     k, span = device["valve"], tables.floats[device["data"] + 1]
-    flow, opening = out[tables.layout[0]["valve"] + k], 1.0 if tables.armed[device["event"] + 2] > 0.0 else x
+    flow = out[tables.layout[0]["valve"] + k]
+    opening = 1.0 if tables.armed[device["event"] + 2] > 0.0 else x
     if flow == 0.0 and tables.armed[device["event"] + 2] > 0.0:
         return 0.0
     if flow == 0.0 or opening <= ALMOST_SHUT:
@@ -105,7 +109,9 @@ def slope(out, tables, k, g, drop):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
     x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition, drop)
-    return x * flow_slope(g, transition, drop) + max(full, 0.0) * end_weight(tables, k) * lift_rise(tables, k)
+    return x * flow_slope(g, transition, drop) + max(full, 0.0) * end_weight(tables, k) * lift_rise(
+        tables, k
+    )
 
 
 @njit
@@ -115,7 +121,10 @@ def end_weight(tables, k):
     device = tables.devices[valve["device"]]
     if device["node"] < 0:
         return 1.0
-    for node, own in ((device["node"], device["node_weight"]), (device["second"], device["second_weight"])):
+    for node, own in (
+        (device["node"], device["node_weight"]),
+        (device["second"], device["second_weight"]),
+    ):
         weight += own if node == valve["from_node"] else 0.0
         weight -= own if node == valve["to_node"] else 0.0
     return max(weight, 0.0)
@@ -128,7 +137,9 @@ def lift(out, tables, k, g, drop, denser, wide):
     Arguments as for `restriction_step`.
     """
     dense = g * denser
-    return lifting_slope(tables, out, k, flow_at_drop(dense, transition_of(tables.valves[k], dense), drop), wide)
+    return lifting_slope(
+        tables, out, k, flow_at_drop(dense, transition_of(tables.valves[k], dense), drop), wide
+    )
 
 
 @njit

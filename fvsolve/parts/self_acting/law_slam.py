@@ -9,7 +9,8 @@ from fvsolve.core.kernels.restrictions import head_drop
 from fvsolve.jit import njit
 from fvsolve.parts.self_acting.law_check_valve import PRESSURE_MARGIN, joins_junction
 
-REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
+# flags; the last: the deceleration exceeds the curve
+REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3
 # Numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
 CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = 0, 1, 2
 UNKNOWN = -1
@@ -54,16 +55,24 @@ def events(t, y, out, tables, device, g):
     plus PRESSURE_MARGIN [Pa].
     The last function is the last deceleration of the curve minus that at the reversal [m/s2].
     """
-    k, at, data, o, present = (
-        device["valve"], device["event"], device["data"], device["y"], valve_mode(y, tables, device),
-    )  # fmt: skip
+    k = device["valve"]
+    at = device["event"]
+    data = device["data"]
+    o = device["y"]
+    present = valve_mode(y, tables, device)
     flow = out[tables.layout[0]["valve"] + k]
     v = flow / tables.floats[data + UNIT_FLOW]
     for mode in range(BEYOND_CURVE):
         g[at + mode] = 1.0
     if present == SHUT:
         set_mode_events(
-            g, at, SHUT, OPEN, tables.floats[data + CRACKING_PRESSURE] + PRESSURE_MARGIN - head_drop(tables, out, k)[1]
+            g,
+            at,
+            SHUT,
+            OPEN,
+            tables.floats[data + CRACKING_PRESSURE]
+            + PRESSURE_MARGIN
+            - head_drop(tables, out, k)[1],
         )
     elif present == REVERSED:
         if v < FORWARD_VELOCITY:
@@ -72,7 +81,11 @@ def events(t, y, out, tables, device, g):
         else:
             set_mode_events(g, at, REVERSED, OPEN, FORWARD_VELOCITY - v)
     else:
-        margin = head_drop(tables, out, k)[1] + PRESSURE_MARGIN if flow == 0.0 and joins_junction(tables, device) else v
+        margin = (
+            head_drop(tables, out, k)[1] + PRESSURE_MARGIN
+            if flow == 0.0 and joins_junction(tables, device)
+            else v
+        )
         set_mode_events(g, at, OPEN, REVERSED if present == OPEN else SHUT, margin)
     g[at + BEYOND_CURVE] = tables.floats[data + LAST_RATE] - y[o + 1]
 

@@ -10,12 +10,20 @@ from fvsolve.core.kernels.dtypes import NOT_HELD
 from fvsolve.core.kernels.restrictions import LEAST, flow_at_drop, flow_slope, transition_of
 from fvsolve.core.steady import Edge
 from fvsolve.errors import Notice
-from fvsolve.parts.self_acting import law_at_once, law_check_valve, law_disc, law_regulating, law_relief_valve, law_slam
+from fvsolve.parts.self_acting import (
+    law_at_once,
+    law_check_valve,
+    law_disc,
+    law_regulating,
+    law_relief_valve,
+    law_slam,
+)
 from fvsolve.parts.self_acting.law_disc import CHECK, RELIEF
 from fvsolve.parts.tolerances import is_head_above
 
 LIFTING, OPEN = "lifting", "open"  # modes of a valve; shut valves are in `start.shut`
-SEAT_DEPTH = 1e-12  # lift below the seat of a disc that has slammed, so that rounding does not open it
+# lift below the seat of a disc that has slammed, so that rounding does not open it
+SEAT_DEPTH = 1e-12
 SMALL_LIFT = 1e-9  # lift that counts as rounding
 # control of a column (the last two) is not reported
 STOP_EVENTS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")
@@ -34,13 +42,22 @@ class LiftedValve(Device, kind=""):
 
     def moved_as(self, part) -> Device:
         """Conversion with the states of the disc of a part: it follows with a first-order lag, or it has inertia."""
-        return self.varied(states=("opening",) if part.natural_frequency is None else ("opening", "speed"))
+        return self.varied(
+            states=("opening",) if part.natural_frequency is None else ("opening", "speed")
+        )
 
     def numbers(self, draft, name, part) -> list[float]:
         """Parameters of the disc in the order of `law_disc`: three values at the start, then its keys."""
         frequency = part.natural_frequency or 0.0
-        return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
-                part.damping_ratio or 0.0]  # fmt: skip
+        return [
+            0.0,
+            0.0,
+            0.0,
+            part.overpressure,
+            part.time_constant or 0.0,
+            2.0 * math.pi * frequency,
+            part.damping_ratio or 0.0,
+        ]
 
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
@@ -48,7 +65,8 @@ class LiftedValve(Device, kind=""):
     def apply_event(self, run_data, row, t, y, scale) -> None:
         tables = run_data.model.tables
         stop, seat = (run_data.armed[row["event"] + k] > 0.0 for k in (0, 2))
-        if self.states and seat and law_disc.disc_lift(y, tables, row) > 0.0:  # the disc has slammed
+        # the disc has slammed
+        if self.states and seat and law_disc.disc_lift(y, tables, row) > 0.0:
             y[row["y"]] = -tables.floats[row["data"] + law_disc.LIFT] - SEAT_DEPTH
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
@@ -66,7 +84,13 @@ class LiftedValve(Device, kind=""):
         if k in start.shut or start.valve_modes.setdefault(k, LIFTING) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
-        return Edge(i, j, self.row(start, k), 0.0, sensed_nodes=tuple(node for node, _ in self.sensed_at(start, k)))
+        return Edge(
+            i,
+            j,
+            self.row(start, k),
+            0.0,
+            sensed_nodes=tuple(node for node, _ in self.sensed_at(start, k)),
+        )
 
     def sensed_at(self, start, k: int) -> list[tuple[int, float]]:
         """Nodes whose pressure lifts valve k, each with its weight in the lifting pressure."""
@@ -83,7 +107,11 @@ class LiftedValve(Device, kind=""):
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
         transition = transition_of(start.valves[k], g)
         full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
-        steep = flow_slope(g, transition, drop) if transition > 0.0 else 0.5 * g / max(abs(full), LEAST * math.sqrt(g))
+        steep = (
+            flow_slope(g, transition, drop)
+            if transition > 0.0
+            else 0.5 * g / max(abs(full), LEAST * math.sqrt(g))
+        )
         return x * full, x * steep, max(full, 0.0)
 
     def revise_state(self, start, part, row) -> bool:
@@ -111,7 +139,13 @@ class LiftedValve(Device, kind=""):
             return LIFTING if x > SMALL_LIFT else now
         if x < -SMALL_LIFT:
             return "shut"
-        return OPEN if now == LIFTING and x > 1.0 else LIFTING if now == OPEN and x < 1.0 - SMALL_LIFT else now
+        return (
+            OPEN
+            if now == LIFTING and x > 1.0
+            else LIFTING
+            if now == OPEN and x < 1.0 - SMALL_LIFT
+            else now
+        )
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
@@ -121,12 +155,19 @@ class LiftedValve(Device, kind=""):
             x = 0.0
         elif not lifts:
             x = 1.0
-        elif start.valve_flows()[k] <= 0.0:  # the flow determines no lift, the lifting pressure does
-            x = min(max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0)
+        elif start.valve_flows()[k] <= 0.0:
+            # the flow determines no lift, the lifting pressure does
+            x = min(
+                max(self.lifting_pressure(start, k) / self.part(start, k).overpressure, 0.0), 1.0
+            )
         else:
             x = opening_of(start, k)
-        self.store_lift(start, row, x, x if lifts else self.lifting_pressure(start, k) / part.overpressure)
-        valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
+        self.store_lift(
+            start, row, x, x if lifts else self.lifting_pressure(start, k) / part.overpressure
+        )
+        valve["open"] = (
+            valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
+        )
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
         start.draft.tables.floats[row["data"] + 2] = start.valve_law(k)[1]
@@ -175,10 +216,13 @@ class CheckDisc(LiftedValve, kind=""):
         """Add a notice if the disc and other valves join the same rigid column, which the disc then cannot control."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
-            nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
+            nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1
+            for end in ("from_node", "to_node")
         ):
-            text = (f"{name}: its disc and other valves join the same rigid column: its lift and flow are not reliable "
-                    "once it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
+            text = (
+                f"{name}: its disc and other valves join the same rigid column: its lift and flow are not reliable "
+                "once it leaves its seat; make the column a pipe, or put a chamber between them"
+            )
             start.draft.warnings.append(Notice("range", f"links.{name}", text))
 
     def next_mode(self, x, back, now):
@@ -228,11 +272,20 @@ class SlamCurveRows(CheckValveRows, kind=""):
 
     law = law_slam
     states = ("slam_velocity", "deceleration")
-    events = ("flow reverses", "shuts", "flow is forward again", "flow reverses faster than its curve covers")
+    events = (
+        "flow reverses",
+        "shuts",
+        "flow is forward again",
+        "flow reverses faster than its curve covers",
+    )
     remedy = "give the curve of the check valve a greater reverse_velocity"
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [part.cracking_pressure, draft.fluid.density * part.bore_area, part.deceleration.rate[-1]]
+        return [
+            part.cracking_pressure,
+            draft.fluid.density * part.bore_area,
+            part.deceleration.rate[-1],
+        ]
 
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
@@ -241,12 +294,16 @@ class SlamCurveRows(CheckValveRows, kind=""):
         return {}
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
-        o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
+        o = row["y"]
+        at = row["event"]
+        curve = run_data.model.case.conduits[self.name(run_data, row)].deceleration
         if run_data.armed[at + law_slam.REVERSED] == 0.0:
             y[o] = y[o + 1] = 0.0
         elif y[o] == 0.0:
             y[o + 1] = self.deceleration(run_data, row, t, y)
-            y[o] = max(float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.SMALLEST)
+            y[o] = max(
+                float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.SMALLEST
+            )
 
     def name(self, run_data, row) -> str:
         return run_data.model.valve_names[row["valve"]]
@@ -254,9 +311,17 @@ class SlamCurveRows(CheckValveRows, kind=""):
     def deceleration(self, run_data, row, t: float, y) -> float:
         """Deceleration [m/s2] of the flow in the bore at a state, by a backward difference in time; at least 0."""
         model, k = run_data.model, int(run_data.model.layout["valve"] + row["valve"])
-        dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
+        dydt = np.zeros(y.size)
+        now = model.new_out()
+        before = model.new_out()
         model.functions.rhs(t, y, dydt, now, run_data.handle)
-        model.functions.rhs(t - DIFFERENCE_TIME, y - DIFFERENCE_TIME * dydt, np.zeros(y.size), before, run_data.handle)
+        model.functions.rhs(
+            t - DIFFERENCE_TIME,
+            y - DIFFERENCE_TIME * dydt,
+            np.zeros(y.size),
+            before,
+            run_data.handle,
+        )
         full = model.tables.floats[row["data"] + law_slam.UNIT_FLOW]
         return max(float(before[k] - now[k]) / (DIFFERENCE_TIME * full), 0.0)
 
@@ -271,7 +336,9 @@ class ReliefDisc(LiftedValve, kind=""):
         return part.set_pressure
 
     def lifting_pressure(self, start, k):
-        return self.lifted_by(start, k, *(start.answer.potential[i] for i, _ in self.sensed_at(start, k)))
+        return self.lifted_by(
+            start, k, *(start.answer.potential[i] for i, _ in self.sensed_at(start, k))
+        )
 
     def lifted_by(self, start, k: int, *potentials: float) -> float:
         """Lifting pressure of valve k minus its opening pressure [Pa], at given potentials of the sensed nodes [Pa]."""
@@ -283,13 +350,21 @@ class ReliefDisc(LiftedValve, kind=""):
         return pressure - self.opening_pressure(start, self.part(start, k))
 
     def row(self, start, k: int):
-        span, weights = self.part(start, k).overpressure, [weight for _, weight in self.sensed_at(start, k)]
+        span = self.part(start, k).overpressure
+        weights = [weight for _, weight in self.sensed_at(start, k)]
 
         def newton(flow, drop, *potentials):
-            target, slope, rise = self.flow_at(start, k, drop, self.lifted_by(start, k, *potentials) / span)
+            target, slope, rise = self.flow_at(
+                start, k, drop, self.lifted_by(start, k, *potentials) / span
+            )
             rise /= span
             size = max(slope + rise, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (target - flow) / size, *(weight * rise / size for weight in weights)
+            return (
+                1.0 / size,
+                slope / size,
+                (target - flow) / size,
+                *(weight * rise / size for weight in weights),
+            )
 
         return newton
 
@@ -318,7 +393,8 @@ class Relief(ReliefDisc, kind="relief-valve"):
 
 SMALL_FLOW = 1e-9  # flow regarded as rounding, over the flow scale of the model
 SMALL_PRESSURE = 1e-3  # pressure regarded as rounding [Pa]
-ACTIVE = "active"  # mode of a regulating valve; OPEN and a valve in `start.shut` are open and closed in EPANET
+# mode of a regulating valve; OPEN and a valve in `start.shut` are open and closed in EPANET
+ACTIVE = "active"
 
 
 class SteadyValve(NamedTuple):
@@ -350,11 +426,21 @@ class Regulator(Device, kind=""):
     law, controlling_event = law_regulating, 6
     states = ("opening",)
     quantities = ("opening",)
-    events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
-              "leaves its seat", "", "")  # fmt: skip
+    events = (
+        "shuts against reversed flow",
+        "opens again",
+        "is fully open",
+        "leaves full opening",
+        "is shut",
+        "leaves its seat",
+        "",
+        "",
+    )
     remedy = "give the regulating valve a longer time_constant"
-    key, end, verb = "set_pressure", "", ""  # key of the set value, end at which it is sensed, verb for messages
-    at_once: ClassVar[type["Regulator"] | None] = None  # conversion of valves with the time constant 0
+    # key of the set value, end at which it is sensed, verb for messages
+    key, end, verb = "set_pressure", "", ""
+    # conversion of valves with the time constant 0
+    at_once: ClassVar[type["Regulator"] | None] = None
 
     def of(self, part) -> Device:
         return self if part.time_constant > 0.0 or self.at_once is None else self.at_once()
@@ -375,16 +461,20 @@ class Regulator(Device, kind=""):
         pumped = any(link.kind == "pump" for link in case.links.values())
         if pumped or any(node.kind not in ("reservoir", "tank", "junction") for node in nodes):
             return  # pressure comes from elsewhere too
-        weight, place = draft.fluid.density * case.gravity, getattr(part, "to" if self.end == "to" else "from_")
+        weight = draft.fluid.density * case.gravity
+        place = getattr(part, "to" if self.end == "to" else "from_")
         best, source = max(head_of(case, weight, other) for other in case.nodes)
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
         if is_head_above(head, best):
             amount = case.amount
-            text = (f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
-                    f"source: {source} has {amount(best, 'head')}")  # fmt: skip
+            text = (
+                f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
+                f"source: {source} has {amount(best, 'head')}"
+            )
             draft.fault(
-                f"links.{name}.set_pressure", f"{text}; the valve would never {self.verb}; expected a lower pressure"
+                f"links.{name}.set_pressure",
+                f"{text}; the valve would never {self.verb}; expected a lower pressure",
             )
 
     def inputs(self, model, name, part):
@@ -429,10 +519,28 @@ class Regulator(Device, kind=""):
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         goal = self.target(start, k)
         if not self.end:
-            return Edge(i, j, None if start.rest else lambda flow, drop: (1.0, 0.0, goal - flow), drop=lambda flow: 0.0)
+            return Edge(
+                i,
+                j,
+                None if start.rest else lambda flow, drop: (1.0, 0.0, goal - flow),
+                drop=lambda flow: 0.0,
+            )
         if start.rest:
-            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, held_potential=(self.regulated_node(start, k), goal))
-        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, held_potential=(self.regulated_node(start, k), goal))
+            return Edge(
+                i,
+                j,
+                None,
+                0.0,
+                drop=lambda flow: 0.0,
+                held_potential=(self.regulated_node(start, k), goal),
+            )
+        return Edge(
+            i,
+            j,
+            lambda flow, drop: (0.0, 0.0, 0.0),
+            0.0,
+            held_potential=(self.regulated_node(start, k), goal),
+        )
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -445,7 +553,9 @@ class Regulator(Device, kind=""):
         if after == ACTIVE and (k in start.uncontrolled or not self.is_controllable(start, k)):
             after = "shut"
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
-        start.valve_modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.valve_modes[k]
+        start.valve_modes[k] = (
+            OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.valve_modes[k]
+        )
         return after != before
 
     def next_mode(self, here: SteadyValve, now: str) -> str:
@@ -457,7 +567,9 @@ class Regulator(Device, kind=""):
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
-        valve, floats, at = start.valves[k], start.draft.tables.floats, int(row["data"])
+        valve = start.valves[k]
+        floats = start.draft.tables.floats
+        at = int(row["data"])
         shut, active = k in start.shut, self.steady_mode(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:
@@ -482,9 +594,12 @@ class Regulator(Device, kind=""):
     def refuse(self, start, k: int) -> None:
         """Report a fault: no opening of valve k keeps the sensed quantity at its set value."""
         name = start.draft.valve_names[k]
-        start.draft.fault(f"links.{name}.{self.key}", f"no steady state: no opening of the valve gives {self.key}, for "
-                          "example because a given demand alone determines the flow through the valve; change "
-                          f'{self.key} or the demand, or use initial = "rest"')  # fmt: skip
+        start.draft.fault(
+            f"links.{name}.{self.key}",
+            f"no steady state: no opening of the valve gives {self.key}, for "
+            "example because a given demand alone determines the flow through the valve; change "
+            f'{self.key} or the demand, or use initial = "rest"',
+        )
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
@@ -494,12 +609,20 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
     it higher.
     """
 
-    mode, end, verb = law_regulating.REDUCING, "to", "reduce the pressure"
+    mode = law_regulating.REDUCING
+    end = "to"
+    verb = "reduce the pressure"
 
     def next_mode(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
         if now == "shut" and here.p_to < low:
-            return ACTIVE if here.p_from >= high else OPEN if here.p_from > here.p_to + SMALL_PRESSURE else now
+            return (
+                ACTIVE
+                if here.p_from >= high
+                else OPEN
+                if here.p_from > here.p_to + SMALL_PRESSURE
+                else now
+            )
         if now != "shut" and here.reversed:
             return "shut"
         if now == ACTIVE:
@@ -514,7 +637,9 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
     the set value.
     """
 
-    mode, end, verb = law_regulating.SUSTAINING, "from", "open"
+    mode = law_regulating.SUSTAINING
+    end = "from"
+    verb = "open"
 
     def shut_reason(self, start, k):
         node = list(start.case.places)[self.regulated_node(start, k)]
@@ -542,7 +667,11 @@ class FlowControlRows(Regulator, kind="flow-control"):
     def next_mode(self, here, now):
         if now == ACTIVE:
             drop, small = here.p_from - here.p_to, SMALL_FLOW * here.start.flow_scale
-            return OPEN if drop < here.loss - SMALL_PRESSURE or here.flow < here.target - small else now
+            return (
+                OPEN
+                if drop < here.loss - SMALL_PRESSURE or here.flow < here.target - small
+                else now
+            )
         if now == "shut":  # it holds nothing back but what is beyond its set flow
             return OPEN
         return ACTIVE if here.flow > here.target + SMALL_FLOW * here.start.flow_scale else now
@@ -551,7 +680,11 @@ class FlowControlRows(Regulator, kind="flow-control"):
 class AtOnce:
     """Changes to the conversion of a control valve with the time constant 0: it has no state."""
 
-    law, events_only, controlling_event, states, at_once = law_at_once, True, -1, (), None
+    law = law_at_once
+    events_only = True
+    controlling_event = -1
+    states = ()
+    at_once = None
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening")
     remedy = "give the regulating valve a time_constant"
 
@@ -563,7 +696,9 @@ class AtOnce:
 
     def begin(self, start, part, row) -> list[str]:
         k, draft = int(row["valve"]), start.draft
-        valve, at, shut = start.valves[k], int(row["data"]), k in start.shut
+        valve = start.valves[k]
+        at = int(row["data"])
+        shut = k in start.shut
         active, error = not shut and self.steady_mode(start, k) == ACTIVE, self.error(start, k)
         if active and abs(error) > start.set_point_tolerance(self.end):
             self.refuse(start, k)
@@ -577,8 +712,10 @@ class AtOnce:
 
     def flags_at_start(self, start, part, row) -> dict[int, bool]:
         k, at = int(row["valve"]), int(row["event"])
-        return {at + law_at_once.SHUT: k in start.shut,
-                at + law_at_once.FULL: k not in start.shut and self.steady_mode(start, k) == OPEN}  # fmt: skip
+        return {
+            at + law_at_once.SHUT: k in start.shut,
+            at + law_at_once.FULL: k not in start.shut and self.steady_mode(start, k) == OPEN,
+        }
 
 
 class ReducingAtOnce(AtOnce, PressureReducingRows, kind=""):

@@ -31,17 +31,33 @@ class Disc(Table):
     time_constant dx/dt = target - x, or x'' = w^2 (target - x) - 2 damping_ratio w x' with w = 2 pi natural_frequency.
     """
 
-    time_constant: Annotated[float | None, Quantity(
-        "time", positive, "time constant of the disc, damping over stiffness [s]; no delay if left out",
-        UsualRange(1e-6, 300.0, "poppets to damped flaps"), VALUE,
-    )] = None  # fmt: skip
-    natural_frequency: Annotated[float | None, Quantity(
-        "frequency", positive, "undamped natural frequency of the disc, instead of `time_constant` [Hz]",
-        UsualRange(1e-2, 2e4, "flaps to poppets"), VALUE,
-    )] = None  # fmt: skip
+    time_constant: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            "time constant of the disc, damping over stiffness [s]; no delay if left out",
+            UsualRange(1e-6, 300.0, "poppets to damped flaps"),
+            VALUE,
+        ),
+    ] = None
+    natural_frequency: Annotated[
+        float | None,
+        Quantity(
+            "frequency",
+            positive,
+            "undamped natural frequency of the disc, instead of `time_constant` [Hz]",
+            UsualRange(1e-2, 2e4, "flaps to poppets"),
+            VALUE,
+        ),
+    ] = None
     damping_ratio: Annotated[
         float | None,
-        Number(nonnegative, "damping ratio of the disc, with `natural_frequency`; 1 is critical", changes=VALUE),
+        Number(
+            nonnegative,
+            "damping ratio of the disc, with `natural_frequency`; 1 is critical",
+            changes=VALUE,
+        ),
     ] = None
 
     @property
@@ -51,9 +67,13 @@ class Disc(Table):
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
-        faults = super().key_faults(given) + exclusive_key_faults(given, ("time_constant", "natural_frequency"))
+        faults = super().key_faults(given) + exclusive_key_faults(
+            given, ("time_constant", "natural_frequency")
+        )
         if "natural_frequency" in given and "damping_ratio" not in given:
-            faults.append((("natural_frequency",), "needs the key `damping_ratio`, for example 0.3"))
+            faults.append(
+                (("natural_frequency",), "needs the key `damping_ratio`, for example 0.3")
+            )
         if "damping_ratio" in given and "natural_frequency" not in given:
             faults.append((("damping_ratio",), "needs the key `natural_frequency`"))
         return faults
@@ -104,13 +124,20 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     cracking_pressure: Annotated[
-        float, Quantity("pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS)
+        float,
+        Quantity(
+            "pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS
+        ),
     ] = 0.0
-    overpressure: Annotated[float | None, Quantity(
-        "pressure_drop", positive,
-        "drop above `cracking_pressure` that opens the valve fully, with time_constant or natural_frequency [Pa]",
-        DROPS,
-    )] = None  # fmt: skip
+    overpressure: Annotated[
+        float | None,
+        Quantity(
+            "pressure_drop",
+            positive,
+            "drop above `cracking_pressure` that opens the valve fully, with time_constant or natural_frequency [Pa]",
+            DROPS,
+        ),
+    ] = None
     deceleration: Annotated[Any, SlamCurveTable()] = None
 
     @property
@@ -124,10 +151,15 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         moves = "time_constant" in given or "natural_frequency" in given
         if moves and "overpressure" not in given:
             faults.append(
-                ((), "overpressure is missing: the drop above `cracking_pressure` that holds the valve fully open")
+                (
+                    (),
+                    "overpressure is missing: the drop above `cracking_pressure` that holds the valve fully open",
+                )
             )
         if "overpressure" in given and not moves:
-            faults.append((("overpressure",), "needs the key `time_constant` or `natural_frequency`"))
+            faults.append(
+                (("overpressure",), "needs the key `time_constant` or `natural_frequency`")
+            )
         if "deceleration" in given and moves:
             text = (
                 "is not valid with `time_constant` or `natural_frequency`, which also define how the valve shuts; "
@@ -153,19 +185,31 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    set_pressure: Annotated[float, Quantity(
-        "pressure", about="pressure at `from` above which the valve opens, gauge or absolute by its unit [Pa]",
-    )]  # fmt: skip
-    overpressure: Annotated[float, Quantity(
-        "pressure_drop", positive, "pressure above `set_pressure` at which the valve is fully open [Pa]", DROPS,
-    )]  # fmt: skip
+    set_pressure: Annotated[
+        float,
+        Quantity(
+            "pressure",
+            about="pressure at `from` above which the valve opens, gauge or absolute by its unit [Pa]",
+        ),
+    ]
+    overpressure: Annotated[
+        float,
+        Quantity(
+            "pressure_drop",
+            positive,
+            "pressure above `set_pressure` at which the valve is fully open [Pa]",
+            DROPS,
+        ),
+    ]
 
 
 STROKES = UsualRange(1e-4, 1e5, "servo valves to motor drives")
 BAND = Quantity(
-    "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant [Pa]",
+    "pressure_drop",
+    positive,
+    "pressure error that moves the valve over its stroke in one time constant [Pa]",
     UsualRange(20.0, 1e8, "millimetres of water to servo valves"),
-)  # fmt: skip
+)
 
 
 class Regulating(Sized, TwoPort):
@@ -173,11 +217,18 @@ class Regulating(Sized, TwoPort):
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    time_constant: Annotated[float, Quantity(
-        "time", nonnegative,
-        "time in which an error of one `band` (or of `set_flow`) opens the shut valve [s]; 0: it acts at once, between "
-        "pipes without waves", STROKES, SHAPE,
-    )]  # fmt: skip
+    time_constant: Annotated[
+        float,
+        Quantity(
+            "time",
+            nonnegative,
+            "time in which an error of one `band` (or of `set_flow`) opens the shut "
+            "valve [s]; 0: it acts at once, between "
+            "pipes without waves",
+            STROKES,
+            SHAPE,
+        ),
+    ]
 
 
 class PressureReducing(Regulating, kind="pressure-reducing"):
@@ -210,4 +261,6 @@ class FlowControl(Regulating, kind="flow-control"):
     [W].
     """
 
-    set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow, at the reference density [m3/s]")]
+    set_flow: Annotated[
+        Schedule, Scheduled("flow", positive, "greatest flow, at the reference density [m3/s]")
+    ]

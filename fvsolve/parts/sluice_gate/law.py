@@ -79,13 +79,32 @@ def rule(floats, at, setting, ahead, z, fall):
 
 
 set = structures.set_structure
-flow = gate_law_flow = specialise(structures.flow_template, "gate_law_flow", RULE=rule, __name__=__name__)
-slopes = gate_law_slopes = specialise(structures.slopes_template, "gate_law_slopes", FLOW=flow, __name__=__name__)
-chord = gate_law_chord = specialise(structures.chord_template, "gate_law_chord", FLOW=flow, __name__=__name__)
-line = gate_law_line = specialise(
-    structures.line_template, "gate_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
+flow = gate_law_flow = specialise(
+    structures.flow_template, "gate_law_flow", RULE=rule, __name__=__name__
 )
-step = gate_law_step = specialise(structures.step_template, "gate_law_step", FLOW=flow, LINE=line, __name__=__name__)
-lift = gate_law_lift = specialise(structures.lift_template, "gate_law_lift", SLOPES=slopes, __name__=__name__)
-slope = gate_law_slope = specialise(structures.slope_template, "gate_law_slope", SLOPES=slopes, __name__=__name__)
-value = gate_law_value = specialise(structures.regime_template, "gate_law_value", FLOW=flow, __name__=__name__)
+slopes = gate_law_slopes = specialise(
+    structures.slopes_template, "gate_law_slopes", FLOW=flow, __name__=__name__
+)
+chord = gate_law_chord = specialise(
+    structures.chord_template, "gate_law_chord", FLOW=flow, __name__=__name__
+)
+line = gate_law_line = specialise(
+    structures.line_template,
+    "gate_law_line",
+    FLOW=flow,
+    SLOPES=slopes,
+    CHORD=chord,
+    __name__=__name__,
+)
+step = gate_law_step = specialise(
+    structures.step_template, "gate_law_step", FLOW=flow, LINE=line, __name__=__name__
+)
+lift = gate_law_lift = specialise(
+    structures.lift_template, "gate_law_lift", SLOPES=slopes, __name__=__name__
+)
+slope = gate_law_slope = specialise(
+    structures.slope_template, "gate_law_slope", SLOPES=slopes, __name__=__name__
+)
+value = gate_law_value = specialise(
+    structures.regime_template, "gate_law_value", FLOW=flow, __name__=__name__
+)

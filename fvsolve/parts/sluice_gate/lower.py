@@ -7,13 +7,17 @@ from fvsolve.parts.weir.part import COEFFICIENTS
 
 from . import law
 
-FAR_ABOVE = 3.0  # opening over the depth at the start above which a gate is hardly meant to touch the water
+# opening over the depth at the start above which a gate is hardly meant to touch the water
+FAR_ABOVE = 3.0
 
 
 class SluiceGateRows(StructureRows, kind="sluice-gate"):
     """Conversion to table rows of sluice gates."""
 
-    law, setting, setting_input, bottom_key = law, "opening", GATE_OPENING, "sill"
+    law = law
+    setting = "opening"
+    setting_input = GATE_OPENING
+    bottom_key = "sill"
 
     def bottoms(self, part) -> tuple[float, float]:
         return part.sill, part.sill
@@ -25,10 +29,14 @@ class SluiceGateRows(StructureRows, kind="sluice-gate"):
         least = opening.value.min() if opening.kind not in ("control", "formula") else 0.0
         if depth > 0.0 and least > depth * (1.0 if known else FAR_ABOVE):
             name, amount = start.draft.valve_names[row["valve"]], start.case.amount
-            text = (f"{name}: the opening of {amount(float(least), 'length')} above the sill is above the water there, "
-                    f"{amount(depth, 'length')} deep {'at most' if known else 'at the start'}, so that the gate is a "
-                    "weir; `opening` counts from the sill")  # fmt: skip
-            start.draft.warnings.append(Notice("range", f"links.{name}", text, "opening", float(least), depth))
+            text = (
+                f"{name}: the opening of {amount(float(least), 'length')} above the sill is above the water there, "
+                f"{amount(depth, 'length')} deep {'at most' if known else 'at the start'}, so that the gate is a "
+                "weir; `opening` counts from the sill"
+            )
+            start.draft.warnings.append(
+                Notice("range", f"links.{name}", text, "opening", float(least), depth)
+            )
         return super().begin(start, part, row)
 
     @staticmethod
@@ -39,7 +47,9 @@ class SluiceGateRows(StructureRows, kind="sluice-gate"):
             return max(float(node.head.value.max()) for node in ends), True
         valve = start.valves[row["valve"]]
         ambient = start.law.potential_of(start.case.ambient_pressure, 0.0)
-        potential = max(float(start.answer.potential[valve[end]]) for end in ("from_node", "to_node"))
+        potential = max(
+            float(start.answer.potential[valve[end]]) for end in ("from_node", "to_node")
+        )
         return (potential - ambient) / start.weight, False
 
     def size(self, draft, part) -> float:

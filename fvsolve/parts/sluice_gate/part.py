@@ -5,7 +5,16 @@ from typing import Annotated
 from pydantic import Field
 
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.value import PROFILE, Choice, Number, Quantity, anything, between, nonnegative, positive
+from fvsolve.parts.value import (
+    PROFILE,
+    Choice,
+    Number,
+    Quantity,
+    anything,
+    between,
+    nonnegative,
+    positive,
+)
 from fvsolve.parts.weir.part import COEFFICIENTS, WIDTHS, HydraulicStructure
 
 
@@ -18,11 +27,23 @@ class SluiceGate(HydraulicStructure, kind="sluice-gate"):
     Dissipated power: dp q [W].
     """
 
-    width: Annotated[float, Quantity("length", positive, "width of the opening across the flow [m]", WIDTHS)]
+    width: Annotated[
+        float, Quantity("length", positive, "width of the opening across the flow [m]", WIDTHS)
+    ]
     sill: Annotated[float, Quantity("length", anything, "height of the sill above datum [m]")]
-    opening: Annotated[Schedule, Scheduled("length", nonnegative, "height of the opening above the sill [m]")]
-    contraction: Annotated[float, Number(between(0, 1, open=True), "depth of the jet over the opening, Cc")] = 0.61
+    opening: Annotated[
+        Schedule, Scheduled("length", nonnegative, "height of the opening above the sill [m]")
+    ]
+    contraction: Annotated[
+        float, Number(between(0, 1, open=True), "depth of the jet over the opening, Cc")
+    ] = 0.61
     weir_kind: Annotated[
-        str, Choice("kind of crest", tuple(COEFFICIENTS), "kind of the weir that limits the flow of a raised gate",
-                    changes=PROFILE), Field(alias="kind"),
-    ] = "broad"  # fmt: skip
+        str,
+        Choice(
+            "kind of crest",
+            tuple(COEFFICIENTS),
+            "kind of the weir that limits the flow of a raised gate",
+            changes=PROFILE,
+        ),
+        Field(alias="kind"),
+    ] = "broad"

@@ -16,7 +16,9 @@ def quantity_of(quantity, numbers, data, flux, distance, side):
 
     numbers, data : array with the numbers of the part, and their offset; side : sign of the distance
     """
-    core, per_gap, gap = numbers[data + CORE], numbers[data + PER_GAP], side * distance
+    core = numbers[data + CORE]
+    per_gap = numbers[data + PER_GAP]
+    gap = side * distance
     square = numbers[data + SATURATION] * flux * flux
     if quantity == CURRENT:
         return (core * (1.0 + square) + per_gap * gap) * flux / numbers[data + TURNS]
@@ -68,5 +70,7 @@ def stored(y, tables, device):
     """Change of the stored energy since the start [J]."""
     numbers, data = tables.floats, device["data"]
     start = numbers[data + CLOSED] - numbers[data + POSITION]
-    before = quantity_of(ENERGY, numbers, data, numbers[data + FLUX], start, 1.0 if start >= 0.0 else -1.0)
+    before = quantity_of(
+        ENERGY, numbers, data, numbers[data + FLUX], start, 1.0 if start >= 0.0 else -1.0
+    )
     return value(0.0, y, y, tables, device, ENERGY) - before

@@ -26,9 +26,19 @@ class SolenoidRows(Device, kind="solenoid"):
         place = f"links.{name}"
         p, n = (node_or_reference(case, part.ports[port]) for port in "pn")
         armature = part.ports["armature"]
-        found = [Element(FLOW, place, place, (p, n), state=f"{name}.flux", initial=part.initial_flux,
-                         state_of=("device", name), unit=1.0 / part.turns,
-                         reads=(codes.DEVICE_INPUT, (name, "current", 1.0)))]  # fmt: skip
+        found = [
+            Element(
+                FLOW,
+                place,
+                place,
+                (p, n),
+                state=f"{name}.flux",
+                initial=part.initial_flux,
+                state_of=("device", name),
+                unit=1.0 / part.turns,
+                reads=(codes.DEVICE_INPUT, (name, "current", 1.0)),
+            )
+        ]
         if case.nodes[armature].kind == "mass":
             reads = codes.DEVICE_INPUT, (name, "force", 1.0)
             found.append(Element(FLOW, f"{place}.force", place, (None, armature), reads=reads))
@@ -37,24 +47,41 @@ class SolenoidRows(Device, kind="solenoid"):
     def numbers(self, draft, name, part) -> list[float]:
         saturation = 0.0 if part.saturation_flux is None else part.saturation_flux**-2
         per_gap = 1.0 / (MU_0 * part.pole_area)
-        return [part.turns, part.core_reluctance, saturation, per_gap, part.closed_position, 0.0, 0.0, 0.0]
+        return [
+            part.turns,
+            part.core_reluctance,
+            saturation,
+            per_gap,
+            part.closed_position,
+            0.0,
+            0.0,
+            0.0,
+        ]
 
     def scales(self, draft, name, part) -> list[float]:
         return [SMALL_FLUX_DENSITY * part.pole_area * part.turns]
 
     def begin(self, start, part, row) -> list[str]:
-        armature, numbers = coordinate_of(start.draft, part.ports["armature"]), start.draft.tables.floats
+        armature = coordinate_of(start.draft, part.ports["armature"])
+        numbers = start.draft.tables.floats
         row["travel"] = armature.y
-        numbers[row["data"] + law.POSITION], numbers[row["data"] + law.SPEED] = armature.position, armature.velocity
+        numbers[row["data"] + law.POSITION], numbers[row["data"] + law.SPEED] = (
+            armature.position,
+            armature.velocity,
+        )
         start.draft.start_flags[int(row["event"])] = self.distance(start, part) >= 0.0
         return []
 
     def distance(self, start, part) -> float:
         """Distance from the armature to its closed position at the start [m]."""
-        return float(part.closed_position - coordinate_of(start.draft, part.ports["armature"]).position)
+        return float(
+            part.closed_position - coordinate_of(start.draft, part.ports["armature"]).position
+        )
 
     def source_at_start(self, start, part, row, quantity: str, flow: float) -> float:
-        numbers, at, distance = start.draft.tables.floats, int(row["data"]), self.distance(start, part)
+        numbers = start.draft.tables.floats
+        at = int(row["data"])
+        distance = self.distance(start, part)
         side = 1.0 if distance >= 0.0 else -1.0
         flux = part.initial_flux
         if flux is None:  # from (slope + cubic Phi^2) Phi = turns times current

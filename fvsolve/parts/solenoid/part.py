@@ -17,21 +17,53 @@ class Solenoid(Link, kind="solenoid"):
     """
 
     in_network: ClassVar[bool] = True
-    joins: ClassVar[dict[str, str]] = {"p": "electrical", "n": "electrical", "armature": "translational"}
-    quantities: ClassVar[dict[str, str]] = {"current": "current", "flux": "magnetic_flux", "force": "force"}
+    joins: ClassVar[dict[str, str]] = {
+        "p": "electrical",
+        "n": "electrical",
+        "armature": "translational",
+    }
+    quantities: ClassVar[dict[str, str]] = {
+        "current": "current",
+        "flux": "magnetic_flux",
+        "force": "force",
+    }
     main_quantities: ClassVar[tuple[str, ...]] = ("current", "force")
 
-    ports: Annotated[dict[str, str], Ports(("p", "n", "armature"), "terminals p and n, and the mass of the armature")]
-    turns: Annotated[float, Number(positive, "turns N of the coil", UsualRange(1.0, 1e6, "busbars to relays"))]
-    pole_area: Annotated[float, Quantity(
-        "area", positive, "area of the air gap [m2]", UsualRange(1e-8, 1.0, "watches to lifting magnets"),
-    )]  # fmt: skip
-    closed_position: Annotated[float, Quantity("position", about="position of the armature without air gap [m]")]
-    core_reluctance: Annotated[float, Quantity("reluctance", positive, "reluctance of core and armature [1/H]")]
-    saturation_flux: Annotated[float | None, Quantity(
-        "magnetic_flux", positive, "flux at which the reluctance of the core is twice `core_reluctance`; "
-        "no saturation if left out [Wb]",
-    )] = None  # fmt: skip
-    initial_flux: Annotated[float | None, Quantity(
-        "magnetic_flux", about="flux at the start; that of the current in equilibrium if left out [Wb]",
-    )] = None  # fmt: skip
+    ports: Annotated[
+        dict[str, str],
+        Ports(("p", "n", "armature"), "terminals p and n, and the mass of the armature"),
+    ]
+    turns: Annotated[
+        float, Number(positive, "turns N of the coil", UsualRange(1.0, 1e6, "busbars to relays"))
+    ]
+    pole_area: Annotated[
+        float,
+        Quantity(
+            "area",
+            positive,
+            "area of the air gap [m2]",
+            UsualRange(1e-8, 1.0, "watches to lifting magnets"),
+        ),
+    ]
+    closed_position: Annotated[
+        float, Quantity("position", about="position of the armature without air gap [m]")
+    ]
+    core_reluctance: Annotated[
+        float, Quantity("reluctance", positive, "reluctance of core and armature [1/H]")
+    ]
+    saturation_flux: Annotated[
+        float | None,
+        Quantity(
+            "magnetic_flux",
+            positive,
+            "flux at which the reluctance of the core is twice `core_reluctance`; "
+            "no saturation if left out [Wb]",
+        ),
+    ] = None
+    initial_flux: Annotated[
+        float | None,
+        Quantity(
+            "magnetic_flux",
+            about="flux at the start; that of the current in equilibrium if left out [Wb]",
+        ),
+    ] = None

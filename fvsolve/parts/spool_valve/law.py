@@ -15,17 +15,32 @@ from fvsolve.core.kernels.self_acting_valves import event_pair
 from fvsolve.jit import njit
 
 # indices into its numbers; each edge has a, b and the flag of its position, then follow these positions
-START, LEAST, ANGULAR_FREQUENCY, DAMPING, FASTEST, HALF_WIDTH, DEAD_BAND, EDGES, POSITIONS, FIRST_EDGE = range(10)
+(
+    START,
+    LEAST,
+    ANGULAR_FREQUENCY,
+    DAMPING,
+    FASTEST,
+    HALF_WIDTH,
+    DEAD_BAND,
+    EDGES,
+    POSITIONS,
+    FIRST_EDGE,
+) = range(10)
 UPPER, LOWER, FORWARD, BACKWARD, RISE, FALL, ABOVE, BELOW, EDGE = range(0, 18, 2)  # flags
-STOP_MARGIN = 1e-10  # drive away from a stop or from the greatest speed at which the spool leaves it; above rounding
+# drive away from a stop or from the greatest speed at which the spool leaves it; above rounding
+STOP_MARGIN = 1e-10
 DIRECTION_TIME = 1e-6  # time over 1 / w that the speed is extrapolated for the direction of motion
-MARGIN = 1e-12  # distance beyond a kink at which its flag changes, so that rounding does not change it
+# distance beyond a kink at which its flag changes, so that rounding does not change it
+MARGIN = 1e-12
 
 
 @njit
 def spool_command(t, tables, device):
     """Position that the command asks for, after the dead band."""
-    floats, armed, at = tables.floats, tables.armed, device["event"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
     u, d = schedule_value(tables, device["schedule"], t), floats[device["data"] + DEAD_BAND]
     if d == 0.0:
         return u
@@ -39,25 +54,38 @@ def spool_position(t, y, tables, device):
     """Position x of the spool [-]."""
     if device["states"] == 0:
         at_stop = tables.armed[device["event"] + LOWER] > 0.0
-        return tables.floats[device["data"] + LEAST] if at_stop else spool_command(t, tables, device)
+        return (
+            tables.floats[device["data"] + LEAST] if at_stop else spool_command(t, tables, device)
+        )
     return tables.floats[device["data"] + START] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
     """Write to `out` the conductances G o^2 of all edges [kg2/s2/Pa]; G : conductance at full opening, o : opening"""
-    floats, at, k, x = tables.floats, device["data"], device["valve"], spool_position(t, y, tables, device)
+    floats = tables.floats
+    at = device["data"]
+    k = device["valve"]
+    x = spool_position(t, y, tables, device)
     for e in range(int(floats[at + EDGES])):
         line = at + FIRST_EDGE + 3 * e
         is_below = tables.armed[device["event"] + int(floats[line + 2])] > 0.0
-        opening = max(floats[line] * x + floats[line + 1], 0.0) if (floats[line] > 0.0) != is_below else 0.0
-        out[tables.layout[0]["conductance"] + k + e] = tables.valves[k + e]["conductance"] * opening * opening
+        opening = (
+            max(floats[line] * x + floats[line + 1], 0.0)
+            if (floats[line] > 0.0) != is_below
+            else 0.0
+        )
+        out[tables.layout[0]["conductance"] + k + e] = (
+            tables.valves[k + e]["conductance"] * opening * opening
+        )
 
 
 @njit
 def spool_error(t, y, tables, device):
     """Command less position, beyond the half width of the hysteresis [-]."""
-    floats, armed, at = tables.floats, tables.armed, device["event"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
     e = (spool_command(t, tables, device) - floats[device["data"] + START]) - y[device["y"]]
     half = floats[device["data"] + HALF_WIDTH]
     if half == 0.0:
@@ -72,7 +100,11 @@ def move(t, y, dydt, out, tables, device):
     """Write the rates of position and speed to `dydt`; raise out[RATE] to the rate of the spool."""
     if device["states"] == 0:
         return
-    floats, armed, at, o, data = tables.floats, tables.armed, device["event"], device["y"], device["data"]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
+    o = device["y"]
+    data = device["data"]
     w, damping = floats[data + ANGULAR_FREQUENCY], floats[data + DAMPING]
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], w * max(1.0, 2.0 * damping))
@@ -93,7 +125,9 @@ def events(t, y, out, tables, device, g):
     They are distances from stops, from the greatest speed and from kinks. At a stop and at the greatest speed they are
     the acceleration away from it, over w^2.
     """
-    floats, at, data = tables.floats, device["event"], device["data"]
+    floats = tables.floats
+    at = device["event"]
+    data = device["data"]
     for flag in range(UPPER, EDGE, 2):
         event_pair(tables, g, at + flag, 1.0)
     if floats[data + DEAD_BAND] > 0.0:
@@ -119,8 +153,14 @@ def kink_event(tables, g, at, left):
 @njit
 def motion_events(t, y, tables, device, g, x):
     """Write the event functions of stops, greatest speed and hysteresis to g; x : position [-]"""
-    floats, armed, at, data, v = tables.floats, tables.armed, device["event"], device["data"], y[device["y"] + 1]
-    w, half, fastest = floats[data + ANGULAR_FREQUENCY], floats[data + HALF_WIDTH], floats[data + FASTEST]
+    floats = tables.floats
+    armed = tables.armed
+    at = device["event"]
+    data = device["data"]
+    v = y[device["y"] + 1]
+    w = floats[data + ANGULAR_FREQUENCY]
+    half = floats[data + HALF_WIDTH]
+    fastest = floats[data + FASTEST]
     if half > 0.0:
         e = (spool_command(t, tables, device) - floats[data + START]) - y[device["y"]]
         kink_event(tables, g, at + RISE, e - half)

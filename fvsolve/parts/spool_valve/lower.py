@@ -9,10 +9,23 @@ from fvsolve.parts.spool_valve import law
 from fvsolve.parts.spool_valve.part import EDGES, PORTS
 
 MOTION_EVENTS = (
-    "reaches its upper stop", "leaves its upper stop", "reaches its lower stop", "leaves its lower stop",
-    "moves forward at its greatest speed", "is slower again", "moves backward at its greatest speed",
-    "is slower again", "", "", "", "", "", "", "", "",
-)  # fmt: skip
+    "reaches its upper stop",
+    "leaves its upper stop",
+    "reaches its lower stop",
+    "leaves its lower stop",
+    "moves forward at its greatest speed",
+    "is slower again",
+    "moves backward at its greatest speed",
+    "is slower again",
+    "",
+    "",
+    "",
+    "",
+    "",
+    "",
+    "",
+    "",
+)
 
 
 class SpoolValveRows(Restriction, kind="spool-valve"):
@@ -27,7 +40,8 @@ class SpoolValveRows(Restriction, kind="spool-valve"):
         self.edges, self.ports, self.rows = EDGES[ways], PORTS[ways], len(EDGES[ways])
 
     def of(self, part) -> Restriction:
-        stops = part.ways_of == "2/2"  # at its stop 0, where the position does not follow its schedule
+        # at its stop 0, where the position does not follow its schedule
+        stops = part.ways_of == "2/2"
         if part.natural_frequency is not None or part.dead_band or stops:
             return CommandedRows(part)
         return SpoolValveRows(part.ways_of)
@@ -65,7 +79,10 @@ class SpoolValveRows(Restriction, kind="spool-valve"):
 
     def inputs(self, model, name, part):
         first = model.tables.valves[(k := model.valve_names.index(name)) : k + self.rows]
-        parts = {int(row["schedule"]): part.opening_line(edge) for edge, row in zip(self.edges, first, strict=True)}
+        parts = {
+            int(row["schedule"]): part.opening_line(edge)
+            for edge, row in zip(self.edges, first, strict=True)
+        }
         parts = tuple((schedule, *line) for schedule, line in parts.items())
         return {part.input_key: Input(POSITION, int(first[0]["command"]), parts=parts)}
 
@@ -93,16 +110,31 @@ class CommandedRows(SpoolValveRows, Device, kind=""):
             self.fill_edge(draft, name, link, edge, row)
 
     def numbers(self, draft, name, part) -> list[float]:
-        draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.schedule)
-        lines = [[*part.opening_line(edge), flag] for edge, flag in zip(self.edges, self.flags, strict=True)]
+        draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(
+            part.schedule
+        )
+        lines = [
+            [*part.opening_line(edge), flag]
+            for edge, flag in zip(self.edges, self.flags, strict=True)
+        ]
         lines = [float(number) for line in lines for number in line]
         fastest = 0.0 if part.stroke_time is None else 1.0 / part.stroke_time
-        frequency, damping = 2.0 * math.pi * (part.natural_frequency or 0.0), part.damping_ratio or 0.0
+        frequency = 2.0 * math.pi * (part.natural_frequency or 0.0)
+        damping = part.damping_ratio or 0.0
         return [
-            0.0, self.least, frequency, damping, fastest, 0.5 * (part.hysteresis or 0.0), part.dead_band or 0.0,
+            0.0,
+            self.least,
+            frequency,
+            damping,
+            fastest,
+            0.5 * (part.hysteresis or 0.0),
+            part.dead_band or 0.0,
             float(self.rows),
-            float(law.FIRST_EDGE + len(lines)), *lines, float(len(self.positions)), *self.positions,
-        ]  # fmt: skip
+            float(law.FIRST_EDGE + len(lines)),
+            *lines,
+            float(len(self.positions)),
+            *self.positions,
+        ]
 
     @property
     def least(self) -> float:
@@ -125,17 +157,29 @@ class CommandedRows(SpoolValveRows, Device, kind=""):
         return max(a * self.position_at_start(start, part, row) + b, 0.0)
 
     def begin(self, start, part, row) -> list[str]:
-        start.draft.tables.floats[row["data"] + law.START] = self.position_at_start(start, part, row)
+        start.draft.tables.floats[row["data"] + law.START] = self.position_at_start(
+            start, part, row
+        )
         name, k = start.draft.valve_names[row["valve"]], int(row["valve"])
-        ends = {int(valve[end]) for valve in start.valves[k : k + self.rows] for end in ("from_node", "to_node")}
-        if max(map(part.overlap_of, self.edges)) >= 0.0 and any(start.nodes["gates"][i] >= 0 for i in ends):
-            text = (f"{name}: a rigid column ends at a port that its spool shuts: steps become very short there; make "
-                    "the column a pipe, put a chamber between them, or give the edges an underlap")  # fmt: skip
+        ends = {
+            int(valve[end])
+            for valve in start.valves[k : k + self.rows]
+            for end in ("from_node", "to_node")
+        }
+        if max(map(part.overlap_of, self.edges)) >= 0.0 and any(
+            start.nodes["gates"][i] >= 0 for i in ends
+        ):
+            text = (
+                f"{name}: a rigid column ends at a port that its spool shuts: steps become very short there; make "
+                "the column a pipe, put a chamber between them, or give the edges an underlap"
+            )
             start.draft.warnings.append(Notice("range", f"links.{name}", text))
         return []
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
-        armed, at, o = run_data.armed, int(row["event"]), int(row["y"])
+        armed = run_data.armed
+        at = int(row["event"])
+        o = int(row["y"])
         if not self.moves:
             return
         floats, data = run_data.model.tables.floats, int(row["data"])

@@ -57,10 +57,16 @@ class Overlap(Value):
     edges: tuple[Edge, ...]
     about: str = "overlap of the edges, share of the stroke from the centre to an end; negative is an underlap"
     changes: str = PROFILE
-    number: ClassVar[Quantity] = Number(BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap"))
+    number: ClassVar[Quantity] = Number(
+        BelowUnity(), usual=UsualRange(-0.5, 0.5, "critical centre to wide overlap")
+    )
 
     def read(self, given: Any, setting: ReadContext) -> Any:
-        return read_keys(given, self.keys, setting) if isinstance(given, dict) else self.number.read(given, setting)
+        return (
+            read_keys(given, self.keys, setting)
+            if isinstance(given, dict)
+            else self.number.read(given, setting)
+        )
 
     @property
     def keys(self) -> dict[str, tuple[Value, Any]]:
@@ -102,58 +108,110 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
     ways_of: ClassVar[str] = "4/3"
     sizes: ClassVar[str] = "area, diameter, Kv, Cv or rated_flow"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        *Sized.alternatives, ("rated_flow", *SIZES[:4]), ("rated_flow", *SIZES[4:]), ("position", "command"),
-    )  # fmt: skip
+        *Sized.alternatives,
+        ("rated_flow", *SIZES[:4]),
+        ("rated_flow", *SIZES[4:]),
+        ("position", "command"),
+    )
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("position", "command"),)
     joins: ClassVar[dict[str, str]] = dict.fromkeys(PORTS["4/3"], "hydraulic")
     quantities: ClassVar[dict[str, str]] = flow_names("4/3")
     synonyms: ClassVar[dict[str, str]] = {
-        "lap": "overlap", "deadband": "dead_band", "underlap": "a negative `overlap`", "rated_pressure": "rated_drop",
-        "bandwidth": "natural_frequency", "spool_position": "position", "signal": "command",
-    }  # fmt: skip
+        "lap": "overlap",
+        "deadband": "dead_band",
+        "underlap": "a negative `overlap`",
+        "rated_pressure": "rated_drop",
+        "bandwidth": "natural_frequency",
+        "spool_position": "position",
+        "signal": "command",
+    }
 
     ports: Annotated[dict[str, str], WayPorts(PORTS["4/3"])]
-    ways: Annotated[str, Choice("type of spool valve", tuple(EDGES), "number of ports and positions")] = "4/3"
-    rated_flow: Annotated[float | None, Quantity(
-        "flow", positive, "flow of each edge at full opening and `rated_drop`, instead of another size [m3/s]",
-        UsualRange(1e-6, 1.0, "pilot valves to large servo valves"),
-    )] = None  # fmt: skip
-    rated_drop: Annotated[float | None, Quantity(
-        "pressure_drop", positive, "pressure drop of each edge at `rated_flow` [Pa]",
-        UsualRange(1e4, 3.5e7, "large spools to servo valves"),
-    )] = None  # fmt: skip
+    ways: Annotated[
+        str, Choice("type of spool valve", tuple(EDGES), "number of ports and positions")
+    ] = "4/3"
+    rated_flow: Annotated[
+        float | None,
+        Quantity(
+            "flow",
+            positive,
+            "flow of each edge at full opening and `rated_drop`, instead of another size [m3/s]",
+            UsualRange(1e-6, 1.0, "pilot valves to large servo valves"),
+        ),
+    ] = None
+    rated_drop: Annotated[
+        float | None,
+        Quantity(
+            "pressure_drop",
+            positive,
+            "pressure drop of each edge at `rated_flow` [Pa]",
+            UsualRange(1e4, 3.5e7, "large spools to servo valves"),
+        ),
+    ] = None
     overlap: Annotated[Any, Overlap(EDGES["4/3"])] = 0.0
     position: Annotated[  # the schedule is divided where an edge opens
-        Schedule | None, Scheduled("number", between(-1, 1), "position of the spool, -1 to 1", changes=SHAPE)
+        Schedule | None,
+        Scheduled("number", between(-1, 1), "position of the spool, -1 to 1", changes=SHAPE),
     ] = None
-    command: Annotated[Schedule | None, Scheduled(
-        "number", between(-1, 1), "position that the spool follows, -1 to 1, instead of `position`", changes=SHAPE
-    )] = None  # fmt: skip
-    natural_frequency: Annotated[float | None, Quantity(
-        "frequency", positive, "frequency at which the position lags the command by 90 degrees [Hz]; no delay if left "
-        "out", UsualRange(0.1, 2e3, "large proportional valves to servo valves"), VALUE,
-    )] = None  # fmt: skip
+    command: Annotated[
+        Schedule | None,
+        Scheduled(
+            "number",
+            between(-1, 1),
+            "position that the spool follows, -1 to 1, instead of `position`",
+            changes=SHAPE,
+        ),
+    ] = None
+    natural_frequency: Annotated[
+        float | None,
+        Quantity(
+            "frequency",
+            positive,
+            "frequency at which the position lags the command by 90 degrees [Hz]; no delay if left "
+            "out",
+            UsualRange(0.1, 2e3, "large proportional valves to servo valves"),
+            VALUE,
+        ),
+    ] = None
     damping_ratio: Annotated[
         float | None,
-        Number(nonnegative, "damping ratio of the spool, with `natural_frequency`; 1 is critical", changes=VALUE),
+        Number(
+            nonnegative,
+            "damping ratio of the spool, with `natural_frequency`; 1 is critical",
+            changes=VALUE,
+        ),
     ] = None
-    stroke_time: Annotated[float | None, Quantity(
-        "time", positive, "least time of the spool from the centre to an end [s]; no limit of its speed if left out",
-        UsualRange(1e-4, 10.0, "servo valves to large proportional valves"),
-    )] = None  # fmt: skip
-    dead_band: Annotated[float | None, Number(
-        BelowUnity(0), "command below which the spool stays in the centre; 0 if left out",
-        UsualRange(1e-4, 0.5, "proportional valves"),
-    )] = None  # fmt: skip
-    hysteresis: Annotated[float | None, Number(
-        BelowUnity(0), "width of the loop of position over command, with `natural_frequency`; 0 if left out",
-        UsualRange(1e-4, 0.2, "servo valves to valves without position control"),
-    )] = None  # fmt: skip
+    stroke_time: Annotated[
+        float | None,
+        Quantity(
+            "time",
+            positive,
+            "least time of the spool from the centre to an end [s]; no limit of its speed if left out",
+            UsualRange(1e-4, 10.0, "servo valves to large proportional valves"),
+        ),
+    ] = None
+    dead_band: Annotated[
+        float | None,
+        Number(
+            BelowUnity(0),
+            "command below which the spool stays in the centre; 0 if left out",
+            UsualRange(1e-4, 0.5, "proportional valves"),
+        ),
+    ] = None
+    hysteresis: Annotated[
+        float | None,
+        Number(
+            BelowUnity(0),
+            "width of the loop of position over command, with `natural_frequency`; 0 if left out",
+            UsualRange(1e-4, 0.2, "servo valves to valves without position control"),
+        ),
+    ] = None
 
     @classmethod
     def variant(cls, given: dict[str, Any]) -> type[Link]:
         ways, ports = str(given.get("ways", "4/3")), given.get("ports")
-        if ways not in EDGES and isinstance(ports, dict):  # a fault of its own; its ports tell what is meant
+        # a fault of its own; its ports tell what is meant
+        if ways not in EDGES and isinstance(ports, dict):
             ways = next((other for other, names in PORTS.items() if {*ports} == {*names}), ways)
         return {"3/2": ThreeWaySpoolValve, "2/2": TwoWaySpoolValve}.get(ways, SpoolValve)
 
@@ -170,9 +228,13 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
                 faults.append(((key,), f"needs the key `{other}`"))
         dynamic = "natural_frequency" in given
         if dynamic and "damping_ratio" not in given:
-            faults.append((("natural_frequency",), "needs the key `damping_ratio`, for example 0.8"))
+            faults.append(
+                (("natural_frequency",), "needs the key `damping_ratio`, for example 0.8")
+            )
         faults += [
-            ((key,), "needs the key `natural_frequency`") for key in DYNAMIC_KEYS if key in given and not dynamic
+            ((key,), "needs the key `natural_frequency`")
+            for key in DYNAMIC_KEYS
+            if key in given and not dynamic
         ]
         if "position" in given and "command" not in given:
             text = "needs the key `command`; `position` is the position of the spool itself"
@@ -191,7 +253,9 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
 
     def overlap_of(self, edge: Edge) -> float:
         """Overlap of an edge, share of the stroke."""
-        return self.overlap[f"{edge[0]}-{edge[1]}"] if isinstance(self.overlap, dict) else self.overlap
+        return (
+            self.overlap[f"{edge[0]}-{edge[1]}"] if isinstance(self.overlap, dict) else self.overlap
+        )
 
     def opening_line(self, edge: Edge) -> tuple[float, float]:
         """(a, b) of the opening max(0, a x + b) of an edge at the position x."""
@@ -213,7 +277,13 @@ class SpoolValve(Sized, Link, kind="spool-valve"):
         d = self.dead_band or 0.0
         if d == 0.0:
             return command
-        return (command - d) / (1.0 - d) if command > d else (command + d) / (1.0 - d) if command < -d else 0.0
+        return (
+            (command - d) / (1.0 - d)
+            if command > d
+            else (command + d) / (1.0 - d)
+            if command < -d
+            else 0.0
+        )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         if self.natural_frequency is not None and self.damping_ratio < 0.1:

@@ -6,7 +6,16 @@ from typing import Any, NamedTuple
 
 from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows, split_header
 from fvsolve.parts.table_model import check_table, keys_json, read_keys
-from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between, faults_of
+from fvsolve.parts.value import (
+    NEEDED,
+    Number,
+    ReadContext,
+    Rows,
+    Value,
+    ValueFault,
+    between,
+    faults_of,
+)
 from fvsolve.units import show
 
 LEAST = 1e-3  # least valid unit speed, unit flow and opening
@@ -17,12 +26,23 @@ SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit
 def faults_of_shut(curve) -> list[tuple[str, str]]:
     """Faults (key, text) of the curve of opening 0, at which the vanes are shut; the key is "" for the whole curve."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.quantity != TORQUE:
-        return [("", f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}")]
-    faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (curve.flow[0] != 0.0)
+        return [
+            (
+                "",
+                f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}",
+            )
+        ]
+    faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (
+        curve.flow[0] != 0.0
+    )
     if not curve.speed[0] >= LEAST:
-        faults.append((SPEED, f"{curve.speed[0]:g} is out of range; expected a value of at least {LEAST:g}"))
+        faults.append(
+            (SPEED, f"{curve.speed[0]:g} is out of range; expected a value of at least {LEAST:g}")
+        )
     if curve.value[0] > 0.0:
-        faults.append((TORQUE, f"{curve.value[0]:g} drives the runner behind shut vanes; expected 0 or less"))
+        faults.append(
+            (TORQUE, f"{curve.value[0]:g} drives the runner behind shut vanes; expected 0 or less")
+        )
     return faults
 
 
@@ -35,16 +55,22 @@ def faults_of_curve(curve) -> list[tuple[str, str]]:
         return [("", "has one point; expected at least two")]
     points, faults = list(zip(curve.speed, curve.flow, strict=True)), []
     if curve.opening < LEAST:
-        faults.append(("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
+        faults.append(
+            ("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0")
+        )
     if curve.quantity == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
         text = (
-            f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} instead for the whole curve"
+            f"gives no torque at point {k + 1}, {point_text(points[k])}; expected "
+            f"{TORQUE} instead for the whole curve"
         )
         faults.append((EFFICIENCY, text))
     if not any(q >= LEAST for _, q in points):
         faults.append(
-            (FLOW, f"has no value of {LEAST:g} or more; expected at least one, a flow that drives the turbine")
+            (
+                FLOW,
+                f"has no value of {LEAST:g} or more; expected at least one, a flow that drives the turbine",
+            )
         )
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
         text = (
@@ -75,7 +101,12 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
                 f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: list the points in their order "
                 "along the curve"
             )
-            return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
+            return [
+                (
+                    "",
+                    f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}",
+                )
+            ]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
             text = (
@@ -85,7 +116,12 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
             return [("", text)]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
         end = f"the end of the curve with the least angle, atan2({FLOW}, {SPEED})"
-        return [(SPEED, f"is below {LEAST:g} at {end}; expected a forward speed, at which a turbine drives")]
+        return [
+            (
+                SPEED,
+                f"is below {LEAST:g} at {end}; expected a forward speed, at which a turbine drives",
+            )
+        ]
     return []
 
 
@@ -96,7 +132,9 @@ def point_text(point: tuple[float, float]) -> str:
 
 UNIT_RANGE = between(-1e4, 1e4)  # n11 and Q11 of any machine
 UNITS = {SPEED: "rpm m^(1/2)", FLOW: "m^(1/2)/s", TORQUE: "N/m3"}
-EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
+EXAMPLE = (
+    "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
+)
 
 
 class OpeningCurve(NamedTuple):
@@ -116,8 +154,11 @@ class OpeningCurve(NamedTuple):
     def table(self) -> dict[str, Any]:
         """Curve as a table of a case file."""
         return {
-            "opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.quantity: list(self.value),
-        }  # fmt: skip
+            "opening": self.opening,
+            SPEED: list(self.speed),
+            FLOW: list(self.flow),
+            self.quantity: list(self.value),
+        }
 
     def torques(self, weight: float) -> list[float]:
         """Unit torque T11 [N/m3] at the points; weight : rho g [N/m3]"""
@@ -152,13 +193,16 @@ class HillChartValue(Value):
         "efficiency, or T11 = T / (D^3 H) [N/m3]"
     )
     takes = (
-        "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, or `{ file }`"
+        "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, "
+        "or `{ file }`"
     )
     keys = {
         "opening": (Number(between(0, 1)), NEEDED),
-        SPEED: (Rows("number", UNIT_RANGE), NEEDED), FLOW: (Rows("number", UNIT_RANGE), NEEDED),
-        EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number", between(-1e8, 1e8)), None),
-    }  # fmt: skip
+        SPEED: (Rows("number", UNIT_RANGE), NEEDED),
+        FLOW: (Rows("number", UNIT_RANGE), NEEDED),
+        EFFICIENCY: (Rows("number", between(0, 1)), None),
+        TORQUE: (Rows("number", between(-1e8, 1e8)), None),
+    }
 
     def read(self, given: Any, setting: ReadContext) -> HillChart:
         if isinstance(given, HillChart):
@@ -184,12 +228,21 @@ class HillChartValue(Value):
         keys = read_keys(given, self.keys, setting)
         words = [word for word in (EFFICIENCY, TORQUE) if keys[word] is not None]
         if len(words) != 1:
-            text = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"{EFFICIENCY} or {TORQUE} is missing"
+            text = (
+                f"{EFFICIENCY} and {TORQUE} are given; keep one"
+                if words
+                else f"{EFFICIENCY} or {TORQUE} is missing"
+            )
             raise ValueFault([(tuple(words[1:]), text)])
         return OpeningCurve(keys["opening"], keys[SPEED], keys[FLOW], keys[words[0]], words[0])
 
     def json(self) -> dict[str, Any]:
-        return {"anyOf": [{"type": "array", "items": keys_json(self.keys), "minItems": 1}, {"type": "object"}]}
+        return {
+            "anyOf": [
+                {"type": "array", "items": keys_json(self.keys), "minItems": 1},
+                {"type": "object"},
+            ]
+        }
 
 
 def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
@@ -200,7 +253,10 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     """
     unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
-        raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")])
+        raise ValueFault(
+            unknown
+            or [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")]
+        )
     try:
         path = find_file(given["file"], setting)
         columns, word = columns_of(read_rows(path))
@@ -216,7 +272,8 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
             curves[opening] = HillChartValue().curve({"opening": opening, **given}, setting)
         except ValueFault as error:
             faults += [
-                (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}") for below, text in error.faults
+                (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}")
+                for below, text in error.faults
             ]
     source = {"file": copy_name(path, setting)}
     return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, source, f"{path.name}, ")
@@ -231,14 +288,20 @@ def columns_of(rows) -> tuple[list, str]:
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:
         state = "has both; keep one" if words else "has neither"
-        raise ValueError(f"{rows.file}: expected a column {EFFICIENCY} or {TORQUE}; the file {state}")
+        raise ValueError(
+            f"{rows.file}: expected a column {EFFICIENCY} or {TORQUE}; the file {state}"
+        )
     columns = []
     for name in ("opening", SPEED, FLOW, words[0]):
         column = rows.column(name, 0)
         unit = split_header(rows.header[column])[1]
         if name in UNITS and unit not in ("", UNITS[name]):
-            raise CsvError(rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}")
-        columns.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
+            raise CsvError(
+                rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}"
+            )
+        columns.append(
+            rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist()
+        )
     return columns, words[0]
 
 
@@ -253,17 +316,26 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
         if curve.opening in seen:
             first = seen[curve.opening]
             message = (
-                f"{curve.opening:g} is already the opening of hill_chart[{first}]; give a single curve for each opening"
+                f"{curve.opening:g} is already the opening of hill_chart[{first}]; "
+                "give a single curve for each opening"
             )
             faults.append(((*places[k], "opening"), message))
         seen.setdefault(curve.opening, k)
         keys, name = places[k], f"{file}opening {curve.opening:g}: "
         texts = faults_of_shut(curve) if curve.opening == 0.0 else faults_of_curve(curve)
-        faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in texts]
-    open_curves = sorted((curve for curve in curves.values() if curve.opening > 0.0), key=lambda curve: curve.opening)
+        faults += [
+            ((*keys, key) if not file and key else keys, (name if file else "") + text)
+            for key, text in texts
+        ]
+    open_curves = sorted(
+        (curve for curve in curves.values() if curve.opening > 0.0), key=lambda curve: curve.opening
+    )
     if not open_curves and not faults:
         faults.append(((), "has no curve of an opening above 0; expected at least one"))
     if faults:
         raise ValueFault(faults)
-    shut_point = next(((curve.speed[0], curve.value[0]) for curve in curves.values() if curve.opening == 0.0), None)
+    shut_point = next(
+        ((curve.speed[0], curve.value[0]) for curve in curves.values() if curve.opening == 0.0),
+        None,
+    )
     return HillChart(tuple(open_curves), shut_point, source)

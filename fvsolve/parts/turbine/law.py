@@ -126,11 +126,16 @@ def chart_at(floats, at, opening, omega, flow):
     """
     curves, rays = int(floats[at + CURVES]), int(floats[at + RAYS])
     k, share, least = opening_share(floats, at, opening)
-    flow_scale = floats[at + FLOW] * least * interpolate_curves(floats, at + OWN + curves, 1, k, share)
+    flow_scale = (
+        floats[at + FLOW] * least * interpolate_curves(floats, at + OWN + curves, 1, k, share)
+    )
     n, u = omega / floats[at + SPEED], flow / flow_scale
     first = at + OWN + 4 * curves
     i = ray_below(floats, first, rays, operating_angle(n, u))
-    a, b, c, d = floats[first + rays + i], floats[first + 2 * rays + i], 0.0, 0.0
+    a = floats[first + rays + i]
+    b = floats[first + 2 * rays + i]
+    c = 0.0
+    d = 0.0
     c, d = floats[first + rays + i + 1], floats[first + 2 * rays + i + 1]
     turn = a * d - b * c
     share_1, share_2 = (n * d - u * c) / turn, (a * u - b * n) / turn
@@ -146,7 +151,9 @@ def chart_at(floats, at, opening, omega, flow):
     if root > 0.0:
         t = torque_between_rays(share_1, share_2, root_1, root_2, t_1, t_2)
         first, weight_2 = max(root_1, LEAST_ROOT), max(root_2, LEAST_ROOT)
-        t_slope = (first * d * (t_1 - t) - weight_2 * b * (t_2 - t)) / (turn * (first * share_1 + weight_2 * share_2))
+        t_slope = (first * d * (t_1 - t) - weight_2 * b * (t_2 - t)) / (
+            turn * (first * share_1 + weight_2 * share_2)
+        )
         torque, torque_slope = root * root * t, 2.0 * root * by_n * t + root * root * t_slope
     speed, shut_torque = floats[at + SPEED], floats[at + SHUT_VANES]
     torque = least * torque + (1.0 - least) * shut_torque * abs(omega) * omega
@@ -183,7 +190,8 @@ def is_outside(floats, at, opening, omega, flow):
         return False
     k, share, _ = opening_share(floats, at, opening)
     flow_scale = floats[at + FLOW] * capacity(floats, at, opening)
-    angle, own = operating_angle(omega / floats[at + SPEED], flow / flow_scale), at + OWN + 2 * curves
+    angle = operating_angle(omega / floats[at + SPEED], flow / flow_scale)
+    own = at + OWN + 2 * curves
     first = interpolate_curves(floats, own, 1, k, share)
     last = interpolate_curves(floats, own + curves, 1, k, share)
     return not first <= angle <= last
@@ -206,7 +214,9 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
     stiff : decrease of the drop per flow, caused by the adjacent pipes [Pa s/m3]; flow : start value of the search
     Other arguments as for `chart_at`.
     """
-    low, high, scale = -1e300, 1e300, flow_bound(floats, at, opening, weight, drop)
+    low = -1e300
+    high = 1e300
+    scale = flow_bound(floats, at, opening, weight, drop)
     for _ in range(200):
         head, slope = chart_head(floats, at, opening, omega, flow)
         residual = weight * head + stiff * (flow - start) - drop
@@ -278,14 +288,21 @@ def operating_point(out, tables, device):
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     opening = vane_opening(tables, k, out[layout["conductance"] + k])
-    return opening, out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho / tables.settings[0]["rho"]
+    return (
+        opening,
+        out[layout["drive"] + k],
+        out[layout["valve"] + k] / rho,
+        rho / tables.settings[0]["rho"],
+    )
 
 
 @njit
 def turbine_torque(out, tables, device):
     """Torque of the water on the shaft [N m], positive in forward rotation."""
     opening, omega, q, density_ratio = operating_point(out, tables, device)
-    return density_ratio * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
+    return density_ratio * chart_torque(
+        tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q
+    )
 
 
 @njit
@@ -311,7 +328,11 @@ def move(t, y, dydt, out, tables, device):
         return
     torque = turbine_torque(out, tables, device)
     if floats[at + MODE] == TORQUE_DRIVEN:
-        torque = floats[at + OFFSET] + (torque + floats[at + TORQUE]) + given_torque(t, tables, device, True)
+        torque = (
+            floats[at + OFFSET]
+            + (torque + floats[at + TORQUE])
+            + given_torque(t, tables, device, True)
+        )
     dydt[device["y"]] = torque / floats[at + INERTIA]
 
 
@@ -334,7 +355,9 @@ def power(t, y, dydt, out, tables, device):
     taken = -turbine_torque(out, tables, device) * omega
     if generator_holds_speed(t, tables, device):
         return taken, 0.0, taken
-    given = given_torque(t, tables, device, False) * omega if floats[at + TORQUE_COUNT] > 0.0 else 0.0
+    given = (
+        given_torque(t, tables, device, False) * omega if floats[at + TORQUE_COUNT] > 0.0 else 0.0
+    )
     return given, floats[at + INERTIA] * omega * dydt[device["y"]], taken
 
 
@@ -391,7 +414,9 @@ def slope(out, tables, k, g, drop):
     g : conductance [kg2/s2/Pa]; drop : [Pa]
     """
     m = out[tables.layout[0]["valve"] + k]
-    return turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+    return (
+        turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+    )
 
 
 @njit
@@ -402,4 +427,16 @@ def turbine_step(tables, out, k, rho, g, m, drop):
     """
     weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
     opening, stiff = vane_opening(tables, k, g), stiffness(tables, k)
-    return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)
+    return chart_step(
+        tables.floats,
+        tables.valves[k]["data"],
+        opening,
+        omega,
+        rho,
+        weight,
+        stiff,
+        g,
+        m,
+        drop,
+        m / rho,
+    )

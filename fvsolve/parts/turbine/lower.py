@@ -20,10 +20,12 @@ from fvsolve.parts.pump.lower_shaft import ShaftLowering, numbers_of
 from fvsolve.parts.turbine import law
 
 ANGLE_TOLERANCE = 1e-7  # angle below which two rays are merged [rad]
-SPACING = math.pi / 24.0  # angle between rays outside the chart where a turning runner pumps in reverse [rad]
+# angle between rays outside the chart where a turning runner pumps in reverse [rad]
+SPACING = math.pi / 24.0
 PUMP_RATIO = 2.0  # shaft power over hydraulic power there
 STEEPEST = 10.0  # flow over speed up to which the shaft torque rises; the head vanishes beyond
-STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles of a runner at rest and in backward rotation without flow [rad]
+# angles of a runner at rest and in backward rotation without flow [rad]
+STANDING, BACKWARD = 0.5 * math.pi, math.pi
 
 
 def chart_numbers(part, weight: float) -> list[float]:
@@ -43,7 +45,12 @@ def chart_numbers(part, weight: float) -> list[float]:
     numbers = [len(curves), len(rays), speed, flow, shut_torque]
     numbers += [entry.opening for entry in chart.curves] + [entry[0] for entry in curves]
     numbers += [entry[5][0] for entry in curves] + [entry[5][1] for entry in curves]
-    numbers += [*rays, *directions[:, 0], *directions[:, 1], *np.concatenate([root for root, _ in tables])]
+    numbers += [
+        *rays,
+        *directions[:, 0],
+        *directions[:, 1],
+        *np.concatenate([root for root, _ in tables]),
+    ]
     numbers += [*np.concatenate([torque for _, torque in tables])]
     return [float(entry) for entry in numbers]
 
@@ -68,14 +75,24 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
     torque = np.array(curve.torques(weight)) * d**3
     angle = np.unwrap(np.arctan2(u, n))
     if angle[-1] < angle[0]:
-        n, u, torque, angle = n[::-1], u[::-1], torque[::-1], angle[::-1]
+        n = n[::-1]
+        u = u[::-1]
+        torque = torque[::-1]
+        angle = angle[::-1]
     angle = angle - 2.0 * math.pi * math.floor((angle[0] + STANDING) / (2.0 * math.pi))
     distance = np.hypot(n, u)
     nodes = list(zip(angle, 1.0 / distance, torque, strict=True))
     nodes = nodes_before(nodes[0], n[0], u[0], torque[0], torque_scale * capacity) + nodes
     nodes += nodes_behind(nodes[-1], n[-1], u[-1], torque[-1], torque_scale * capacity)
     angles, roots, torques = (np.array(column) for column in zip(*nodes, strict=True))
-    return capacity, angles, np.column_stack([np.cos(angles), np.sin(angles)]), roots, torques, (angle[0], angle[-1])
+    return (
+        capacity,
+        angles,
+        np.column_stack([np.cos(angles), np.sin(angles)]),
+        roots,
+        torques,
+        (angle[0], angle[-1]),
+    )
 
 
 def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
@@ -110,7 +127,9 @@ def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -
     return pump_nodes(angle - BACKWARD, root, torque, torque_scale, 1.0)
 
 
-def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
+def pump_nodes(
+    angle: float, root: float, torque: float, torque_scale: float, direction: float
+) -> list:
     """(angle, root of head, torque over head) of each ray with reverse flow beyond a first ray, up to standstill.
 
     The root is -1 at standstill. The torque is that at which shaft power is PUMP_RATIO times hydraulic power, constant
@@ -129,7 +148,10 @@ def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, di
         share = math.cos(tilt) / math.cos(first_tilt)
         root_there = share * root - (math.sin(tilt) - share * math.sin(first_tilt))
         nodes.append((tilt, root_there, shaft_torque))
-    return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
+    return [
+        (-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque)
+        for tilt, value, shaft_torque in nodes
+    ]
 
 
 def merge_angles(angles: np.ndarray) -> np.ndarray:
@@ -138,7 +160,9 @@ def merge_angles(angles: np.ndarray) -> np.ndarray:
     They go from reverse flow at standstill (-pi / 2) over a full turn to 3 pi / 2, both included. The angle of a point
     is atan2(u, n), with its relative flow u and relative speed n.
     """
-    inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
+    inner = np.sort(
+        angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)]
+    )
     distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
     return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
 
@@ -154,7 +178,10 @@ def curve_at_rays(
     i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
     (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, ray_directions.T
     share_1, share_2 = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
-    weights = share_1 * np.maximum(roots[i], law.LEAST_ROOT), share_2 * np.maximum(roots[i + 1], law.LEAST_ROOT)
+    weights = (
+        share_1 * np.maximum(roots[i], law.LEAST_ROOT),
+        share_2 * np.maximum(roots[i + 1], law.LEAST_ROOT),
+    )
     root = share_1 * roots[i] + share_2 * roots[i + 1]
     torque = (weights[0] * torques[i] + weights[1] * torques[i + 1]) / (weights[0] + weights[1])
     nearest = np.abs(rays[:, None] - angles).argmin(axis=1)
@@ -180,10 +207,15 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         density = draft.fluid.density
         row["data"], row["schedule"] = len(draft.floats), draft.schedules.add(link.opening)
         draft.floats += chart_numbers(link, density * draft.case.gravity)
-        row["conductance"] = density * draft.floats[row["data"] + law.FLOW] ** 2 / draft.case.gravity
+        row["conductance"] = (
+            density * draft.floats[row["data"] + law.FLOW] ** 2 / draft.case.gravity
+        )
 
     def numbers(self, draft, name, part) -> list[float]:
-        by_index = self.drive_numbers(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
+        by_index = self.drive_numbers(draft, name, part) | {
+            INERTIA: part.inertia or np.inf,
+            RATED: 1.0,
+        }
         return numbers_of(by_index, self.torque_schedules(draft, name), [])
 
     def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
@@ -195,8 +227,10 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
 
     def passing_notice(self, model, name, part, time) -> Notice:
         moment = model.case.amount(time, "time", 6)
-        text = (f"{name}: leaves its hill chart at {moment}; beyond the chart the curves are straight lines to the "
-                "flow at rest and to the speed without flow; give more points there")  # fmt: skip
+        text = (
+            f"{name}: leaves its hill chart at {moment}; beyond the chart the curves are straight lines to the "
+            "flow at rest and to the speed without flow; give more points there"
+        )
         return Notice("range", f"links.{name}", text, "hill_chart")
 
     def edge(self, start, k: int):
@@ -204,19 +238,26 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         i, j = int(row["from_node"]), int(row["to_node"])
         row["drive"] = omega = self.speed_at(start, k)
         vanes = float(start.schedule_value(row["schedule"]))
-        row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT_SHARE else 0.0
+        row["open"] = g = (
+            row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT_SHARE else 0.0
+        )
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
             row["open"] = 0.0
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        floats, at, rho = start.draft.tables.floats, int(row["data"]), start.density_at(i)
+        floats = start.draft.tables.floats
+        at = int(row["data"])
+        rho = start.density_at(i)
         weight, ratio = rho * start.case.gravity, rho / start.draft.fluid.density
 
         def newton(flow, present):
             present = float(present * ratio)
-            first = law.flow_bound(floats, at, vanes, weight, present)  # finds the greatest of several flows
-            a, s = law.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
+            # finds the greatest of several flows
+            first = law.flow_bound(floats, at, vanes, weight, present)
+            a, s = law.chart_step(
+                floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first
+            )
             return 1.0 / s, ratio, a / s
 
         first = rho * floats[at + law.FLOW] * law.capacity(floats, at, vanes)
@@ -226,7 +267,9 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         """Do nothing: the function `begin` sets the drop of turbine k."""
 
     def begin(self, start, part, row) -> list[str]:
-        draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
+        draft = start.draft
+        valve = start.valves[int(row["valve"])]
+        moving = []
         name = draft.valve_names[row["valve"]]
         if valve["open"] > 0.0:
             rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
@@ -234,7 +277,10 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
             at = floats, int(valve["data"]), vanes, float(valve["drive"])
             drop = rho * start.case.gravity * law.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
-            if abs(drop - valve["drop"] * ratio) > FLOW_TOLERANCE * (abs(drop) + abs(valve["drop"])) + 1e-3:
+            if (
+                abs(drop - valve["drop"] * ratio)
+                > FLOW_TOLERANCE * (abs(drop) + abs(valve["drop"])) + 1e-3
+            ):
                 moving.append(f"turbine {name}: its flow at the start is not on its hill chart")
                 valve["open"] = 0.0
             elif draft.case.law.linear:
@@ -249,7 +295,9 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         rho = start.density_at(int(valve["from_node"]))
         vanes, omega = float(start.schedule_value(valve["schedule"])), float(valve["drive"])
         floats, density_ratio = start.draft.tables.floats, rho / start.draft.fluid.density
-        return -density_ratio * law.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
+        return -density_ratio * law.chart_torque(
+            floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho
+        )
 
 
 def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
@@ -258,8 +306,10 @@ def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
     if rec.JUNCTION in ends or not any(map(has_fold, part.hill_chart.curves)):
         return []
     cause = f"{part.from_} and {part.to} both set their own pressures"
-    text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the turbine may jump "
-            "between these flows; connect the turbine through a pipe or rigid-column")  # fmt: skip
+    text = (
+        f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the turbine may jump "
+        "between these flows; connect the turbine through a pipe or rigid-column"
+    )
     return [Notice("range", f"links.{name}", text, "hill_chart")]
 
 
@@ -268,12 +318,16 @@ def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
 
     The power is the greatest of the hill chart at the initial head.
     """
-    speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
+    speed = float(np.max(np.abs(part.speed.value)))
+    ends = [int(valve["from_node"]), int(valve["to_node"])]
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
         return []
     high, low = start.nodes["pressure"][ends] / start.weight + start.nodes["elevation"][ends]
-    unit = max(n * torque for curve in part.hill_chart.curves
-               for n, torque in zip(curve.speed, curve.torques(start.weight), strict=True))  # fmt: skip
+    unit = max(
+        n * torque
+        for curve in part.hill_chart.curves
+        for n, torque in zip(curve.speed, curve.torques(start.weight), strict=True)
+    )
     power = math.pi / 30.0 * unit * part.diameter**2 * max(high - low, 0.0) ** 1.5
     return unusual_inertia(start.case, name, part.inertia, power, speed) if power > 0.0 else []
 

@@ -26,26 +26,42 @@ class Turbine(TwoPort, kind="turbine"):
 
     owns: ClassVar[dict[str, str]] = {"shaft": "rotational"}
     quantities: ClassVar[dict[str, str]] = {
-        "flow": "flow", "head": "head", "speed": "angular_velocity", "torque": "torque", "power": "power",
+        "flow": "flow",
+        "head": "head",
+        "speed": "angular_velocity",
+        "torque": "torque",
+        "power": "power",
         "opening": "number",
-    }  # fmt: skip
+    }
 
     diameter: Annotated[
-        float, Quantity("length", positive, "runner diameter D, as in the hill chart [m]", RUNNER_DIAMETERS)
+        float,
+        Quantity(
+            "length", positive, "runner diameter D, as in the hill chart [m]", RUNNER_DIAMETERS
+        ),
     ]
     hill_chart: Annotated[HillChart, HillChartValue()]
     speed: Annotated[
-        Schedule, Scheduled("angular_velocity", anything, "speed held by the generator, positive forward [rad/s]")
+        Schedule,
+        Scheduled(
+            "angular_velocity", anything, "speed held by the generator, positive forward [rad/s]"
+        ),
     ]
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "opening of the guide vanes, 0 shut to 1 open")] = (
-        Field(default_factory=lambda: constant(1.0))
-    )
-    inertia: Annotated[float | None, Quantity(
-        "inertia", positive, "inertia of runner, water in it and generator, required with `trip` [kg m2]",
-        changes=PROFILE,
-    )] = None  # fmt: skip
+    opening: Annotated[
+        Schedule, Scheduled("number", between(0, 1), "opening of the guide vanes, 0 shut to 1 open")
+    ] = Field(default_factory=lambda: constant(1.0))
+    inertia: Annotated[
+        float | None,
+        Quantity(
+            "inertia",
+            positive,
+            "inertia of runner, water in it and generator, required with `trip` [kg m2]",
+            changes=PROFILE,
+        ),
+    ] = None
     trip: Annotated[
-        float | None, Quantity("time", about="time of load rejection, when the generator is disconnected [s]")
+        float | None,
+        Quantity("time", about="time of load rejection, when the generator is disconnected [s]"),
     ] = None
 
     @classmethod
@@ -55,7 +71,9 @@ class Turbine(TwoPort, kind="turbine"):
             text = "cannot follow a control if the machine trips, because the speed at the trip is then unknown"
             faults.append((("speed",), f"{text}; expected a schedule, or no `trip`"))
         if "trip" in given and "inertia" not in given:
-            faults.append((("trip",), "needs the key `inertia`, the inertia of all rotating masses"))
+            faults.append(
+                (("trip",), "needs the key `inertia`, the inertia of all rotating masses")
+            )
         return faults
 
     def faults(self, name: str, around: CaseContext) -> Faults:
@@ -69,12 +87,22 @@ class Turbine(TwoPort, kind="turbine"):
 
 def excess_power_point(curve: OpeningCurve, weight: float) -> str | None:
     """Text on the first point or line of a curve where shaft power exceeds hydraulic power; None for a valid curve."""
-    points = list(zip(curve.speed, curve.flow, (t * pi / 30.0 for t in curve.torques(weight)), strict=True))
+    points = list(
+        zip(curve.speed, curve.flow, (t * pi / 30.0 for t in curve.torques(weight)), strict=True)
+    )
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):
             most = t * n / (weight * q) if q > 0.0 else 0.0
-            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "a shaft power above the power of the flow"
-            rule = "at most 1" if q > 0.0 else "at most the power of the flow (negative if the shaft drives the water)"
+            excess = (
+                f"an efficiency of {most:.4g}"
+                if q > 0.0
+                else "a shaft power above the power of the flow"
+            )
+            rule = (
+                "at most 1"
+                if q > 0.0
+                else "at most the power of the flow (negative if the shaft drives the water)"
+            )
             return f"torque at unit_speed {n:g}, unit_flow {q:g} means {excess}; expected {rule}"
     for (n, q, t), (m, r, s) in pairwise(points):
         # power lost on the line, fractions a + b = 1: a^2 (w q - t n) + a b (w (q + r) - t m - s n) + b^2 (w r - s m)

@@ -19,13 +19,32 @@ def rule(floats, at, setting, ahead, z, fall):
 
 
 set = structures.set_structure
-flow = weir_law_flow = specialise(structures.flow_template, "weir_law_flow", RULE=rule, __name__=__name__)
-slopes = weir_law_slopes = specialise(structures.slopes_template, "weir_law_slopes", FLOW=flow, __name__=__name__)
-chord = weir_law_chord = specialise(structures.chord_template, "weir_law_chord", FLOW=flow, __name__=__name__)
-line = weir_law_line = specialise(
-    structures.line_template, "weir_law_line", FLOW=flow, SLOPES=slopes, CHORD=chord, __name__=__name__
+flow = weir_law_flow = specialise(
+    structures.flow_template, "weir_law_flow", RULE=rule, __name__=__name__
 )
-step = weir_law_step = specialise(structures.step_template, "weir_law_step", FLOW=flow, LINE=line, __name__=__name__)
-lift = weir_law_lift = specialise(structures.lift_template, "weir_law_lift", SLOPES=slopes, __name__=__name__)
-slope = weir_law_slope = specialise(structures.slope_template, "weir_law_slope", SLOPES=slopes, __name__=__name__)
-value = weir_law_value = specialise(structures.regime_template, "weir_law_value", FLOW=flow, __name__=__name__)
+slopes = weir_law_slopes = specialise(
+    structures.slopes_template, "weir_law_slopes", FLOW=flow, __name__=__name__
+)
+chord = weir_law_chord = specialise(
+    structures.chord_template, "weir_law_chord", FLOW=flow, __name__=__name__
+)
+line = weir_law_line = specialise(
+    structures.line_template,
+    "weir_law_line",
+    FLOW=flow,
+    SLOPES=slopes,
+    CHORD=chord,
+    __name__=__name__,
+)
+step = weir_law_step = specialise(
+    structures.step_template, "weir_law_step", FLOW=flow, LINE=line, __name__=__name__
+)
+lift = weir_law_lift = specialise(
+    structures.lift_template, "weir_law_lift", SLOPES=slopes, __name__=__name__
+)
+slope = weir_law_slope = specialise(
+    structures.slope_template, "weir_law_slope", SLOPES=slopes, __name__=__name__
+)
+value = weir_law_value = specialise(
+    structures.regime_template, "weir_law_value", FLOW=flow, __name__=__name__
+)

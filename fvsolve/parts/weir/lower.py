@@ -11,7 +11,8 @@ from fvsolve.errors import Notice
 
 from . import law
 
-SMALL_FLOW = 1e-6  # difference from the flow of the law at the start that counts as none, over the flow
+# difference from the flow of the law at the start that counts as none, over the flow
+SMALL_FLOW = 1e-6
 
 
 class StructureRows(Device, kind=""):
@@ -22,7 +23,9 @@ class StructureRows(Device, kind=""):
     """
 
     quantities = ("regime",)
-    setting, setting_input, bottom_key = "", CREST, "crest"
+    setting = ""
+    setting_input = CREST
+    bottom_key = "crest"
 
     def size(self, draft, part) -> float:
         """Flow [m3/s] at a head of about 1 m, by which small flows are measured."""
@@ -34,7 +37,8 @@ class StructureRows(Device, kind=""):
         row["conductance"] = (draft.fluid.density * self.size(draft, link)) ** 2 / weight
         row["transition"] = math.sqrt(row["conductance"] * weight * LINEAR_FALL)
         ends = (draft.case.places[end] for end in (link.from_, link.to))
-        row["chained"] = any(node.kind == "junction" for node in ends)  # which limit the rate of its flow
+        # which limit the rate of its flow
+        row["chained"] = any(node.kind == "junction" for node in ends)
 
     def bottoms(self, part) -> tuple[float, float]:
         """Least levels [m] at which water enters the structure at its ends `from` and `to`."""
@@ -43,8 +47,12 @@ class StructureRows(Device, kind=""):
     def begin(self, start, part, row) -> list[str]:
         """Add a notice to a structure between reservoirs whose levels never reach it."""
         ends = [start.case.nodes.get(end) for end in (part.from_, part.to)]
-        levels = [float(node.head.value.max()) for node in ends if getattr(node, "head", None) is not None]
-        if len(levels) == 2 and all(level <= low for level, low in zip(levels, self.bottoms(part), strict=True)):
+        levels = [
+            float(node.head.value.max()) for node in ends if getattr(node, "head", None) is not None
+        ]
+        if len(levels) == 2 and all(
+            level <= low for level, low in zip(levels, self.bottoms(part), strict=True)
+        ):
             name, key = start.draft.valve_names[row["valve"]], self.bottom_key
             text = f"{name}: the heads of {part.from_} and {part.to} never reach its `{key}`, so that no water flows"
             start.draft.warnings.append(Notice("range", f"links.{name}", text, key))
@@ -69,7 +77,9 @@ class StructureRows(Device, kind=""):
         row, weight = start.valves[k], start.weight
         rho = start.draft.fluid.density * start.density_ratios.get(k, (1.0, 1.0))[0]
         ambient = start.law.potential_of(start.case.ambient_pressure, 0.0)
-        floats, at, setting = start.draft.tables.floats, int(row["data"]), float(row["drive"])
+        floats = start.draft.tables.floats
+        at = int(row["data"])
+        setting = float(row["drive"])
 
         def linear(flow, drop, potential):
             z = (potential - ambient) / weight

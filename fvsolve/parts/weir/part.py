@@ -30,15 +30,24 @@ class Weir(HydraulicStructure, kind="weir"):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("coefficient", "kind"),)
 
-    width: Annotated[float, Quantity("length", positive, "width of the crest across the flow [m]", WIDTHS)]
+    width: Annotated[
+        float, Quantity("length", positive, "width of the crest across the flow [m]", WIDTHS)
+    ]
     crest: Annotated[Schedule, Scheduled("length", anything, "height of the crest above datum [m]")]
     coefficient: Annotated[
-        float | None, Number(positive, "coefficient C; that of `kind` if left out", WEIR_COEFFICIENTS)
+        float | None,
+        Number(positive, "coefficient C; that of `kind` if left out", WEIR_COEFFICIENTS),
     ] = None
     crest_kind: Annotated[
-        str, Choice("kind of crest", tuple(COEFFICIENTS), "kind of the crest, C = 0.62 sharp, 0.577 broad",
-                    changes=PROFILE), Field(alias="kind"),
-    ] = "sharp"  # fmt: skip
+        str,
+        Choice(
+            "kind of crest",
+            tuple(COEFFICIENTS),
+            "kind of the crest, C = 0.62 sharp, 0.577 broad",
+            changes=PROFILE,
+        ),
+        Field(alias="kind"),
+    ] = "sharp"
 
     @property
     def discharge_coefficient(self) -> float:

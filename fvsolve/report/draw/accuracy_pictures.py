@@ -12,9 +12,12 @@ from fvsolve.report.draw import style
 
 MARKERS = {"": "o", "pre-asymptotic": "^", "floor": "v", "reference": "X", "off the line": "D"}
 METHOD_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h", "*", "d")
-FLOOR_DISTANCE = 30.0  # an error floor below the least error divided by this factor is stated as text, not drawn
-FAILED_HEIGHT = 0.965  # vertical position of failed points, as a fraction of the height of the panel
-BOUND_DISTANCE = 5.0  # a bound lower than this number of ranges of its integral is stated as text, not drawn
+# an error floor below the least error divided by this factor is stated as text, not drawn
+FLOOR_DISTANCE = 30.0
+# vertical position of failed points, as a fraction of the height of the panel
+FAILED_HEIGHT = 0.965
+# a bound lower than this number of ranges of its integral is stated as text, not drawn
+BOUND_DISTANCE = 5.0
 MAX_PARTS = 6  # greatest number of parts drawn of each kind; the rest is drawn as a sum
 ENERGY_UNITS = ((1e9, "GJ"), (1e6, "MJ"), (1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6, "uJ"))
 COLOUR_MAPS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
@@ -29,7 +32,11 @@ def order_figure(sizes: Sequence[float], curves: Mapping, measure: str, title: s
     text for each size. Sizes with an empty mark are fitted and have solid markers; other sizes have open markers. The
     line is the fitted slope, with its order in the legend. A variable without positive errors has no panel.
     """
-    names = [name for name in curves if any(np.any(np.asarray(e) > 0.0) for e, _ in curves[name].values())]
+    names = [
+        name
+        for name in curves
+        if any(np.any(np.asarray(e) > 0.0) for e, _ in curves[name].values())
+    ]
     columns = min(2, max(1, len(names)))
     rows = max(1, math.ceil(len(names) / columns))
     figure = style.figure(0.5 + 3.1 * rows, width=4.8 * columns)
@@ -52,19 +59,34 @@ def panel(axes, sizes, norms: Mapping, name: str) -> None:
     for colour, (norm, (errors, fit)) in zip(style.COLOURS, norms.items(), strict=False):
         errors = np.asarray(errors, float)
         shown = errors > 0.0
-        label = f"{norm}: order {fit.order:.2f} ± {fit.spread:.2f}" if not fit.reason else f"{norm}: no order"
+        label = (
+            f"{norm}: order {fit.order:.2f} ± {fit.spread:.2f}"
+            if not fit.reason
+            else f"{norm}: no order"
+        )
         axes.plot(sizes[shown], errors[shown], color=colour, linewidth=0.8, alpha=0.5)
         axes.plot([], [], color=colour, marker="o", markersize=4, linewidth=1.4, label=label)
         for mark, marker in MARKERS.items():
             here = shown & np.array([kind == mark for kind in fit.marks])
             face = colour if mark == "" else "white"
-            axes.plot(sizes[here], errors[here], marker, color=colour, markerfacecolor=face, markersize=4.5)
+            axes.plot(
+                sizes[here],
+                errors[here],
+                marker,
+                color=colour,
+                markerfacecolor=face,
+                markersize=4.5,
+            )
         fitted = sizes[[mark == "" for mark in fit.marks]]
         if not fit.reason:
             span = np.array([fitted.max() * 1.15, fitted.min() / 1.15])
             axes.plot(span, fit.constant * span**fit.order, color=colour, linewidth=1.6)
     dress_panel(
-        axes, name, sorted({mark for _, fit in norms.values() for mark in fit.marks if mark in MARKERS and mark})
+        axes,
+        name,
+        sorted(
+            {mark for _, fit in norms.values() for mark in fit.marks if mark in MARKERS and mark}
+        ),
     )
 
 
@@ -82,7 +104,15 @@ def dress_panel(axes, name: str, marks: list[str]) -> None:
     axes.margins(x=0.06)
     axes.set_title(f"error of {name}", fontsize=9, color=style.INK, loc="left")
     for mark in marks:
-        axes.plot([], [], MARKERS[mark], color=style.MUTED, markerfacecolor="white", markersize=4.5, label=mark)
+        axes.plot(
+            [],
+            [],
+            MARKERS[mark],
+            color=style.MUTED,
+            markerfacecolor="white",
+            markersize=4.5,
+            label=mark,
+        )
     axes.legend(frameon=False, fontsize=7.5, labelcolor=style.INK, loc="best")
 
 
@@ -93,7 +123,8 @@ class Curve:
     errors : a float64[n] for each row of panels; costs : a float64[n] for each column; failed : bool[n]
     """
 
-    colour: str  # name that the colour stands for: the scheme, or the method of a case without schemes
+    # name that the colour stands for: the scheme, or the method of a case without schemes
+    colour: str
     marker: str  # name that the marker stands for: the method
     errors: Sequence[np.ndarray]
     costs: Sequence[np.ndarray]
@@ -102,7 +133,9 @@ class Curve:
 
 
 @style.without_markup
-def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence[str], floors, title: str = ""):
+def chart_figure(
+    curves: Sequence[Curve], rows: Sequence[str], columns: Sequence[str], floors, title: str = ""
+):
     """Figure with a panel for each kind of error (rows) and of cost (columns).
 
     Panels are shaded below the error floor; failed points are at the top. rows, columns : labels of the axes
@@ -122,13 +155,29 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
     for i, panels in enumerate(grid):
         for j, axes in enumerate(panels):
             for curve in sorted(curves, key=lambda curve: curve.bold):
-                _curve(axes, curve, curve.errors[i], curve.costs[j], colours[curve.colour], markers[curve.marker])
+                _curve(
+                    axes,
+                    curve,
+                    curve.errors[i],
+                    curve.costs[j],
+                    colours[curve.colour],
+                    markers[curve.marker],
+                )
             _front(axes, curves, i, j, floors[i])
         _limits(panels, [curve.errors[i][~curve.failed] for curve in curves], floors[i], failed)
         style.name_axes(panels[0], y=rows[i])
         if failed:
-            panels[0].text(0.99, FAILED_HEIGHT, "failed", transform=panels[0].transAxes, fontsize=7.5, ha="right",
-                           va="center", color=style.DOUBT, in_layout=False)  # fmt: skip
+            panels[0].text(
+                0.99,
+                FAILED_HEIGHT,
+                "failed",
+                transform=panels[0].transAxes,
+                fontsize=7.5,
+                ha="right",
+                va="center",
+                color=style.DOUBT,
+                in_layout=False,
+            )
     for axes, name in zip(grid[-1], columns, strict=True):
         style.name_axes(axes, name)
     for axes in grid.flat:
@@ -154,17 +203,30 @@ def _assign_signs(words, signs) -> dict:
 def _curve(axes, curve: Curve, errors, costs, colour: str, marker: str) -> None:
     good = ~curve.failed & np.isfinite(errors) & (errors > 0)
     axes.plot(
-        costs[good], errors[good], color=colour, marker=marker, markersize=5.5 if curve.bold else 4.2,
-        linewidth=2.2 if curve.bold else 0.9, markeredgecolor=style.INK if curve.bold else "white", markeredgewidth=0.5,
+        costs[good],
+        errors[good],
+        color=colour,
+        marker=marker,
+        markersize=5.5 if curve.bold else 4.2,
+        linewidth=2.2 if curve.bold else 0.9,
+        markeredgecolor=style.INK if curve.bold else "white",
+        markeredgewidth=0.5,
         zorder=3 if curve.bold else 2,
-    )  # fmt: skip
+    )
     lost = curve.failed & np.isfinite(costs) & (costs > 0)
     if lost.any():
         axes.plot(
-            costs[lost], np.full(lost.sum(), FAILED_HEIGHT), color=colour, marker=marker, markersize=4.5,
-            linestyle="none", markerfacecolor="none", transform=axes.get_xaxis_transform(), clip_on=False,
+            costs[lost],
+            np.full(lost.sum(), FAILED_HEIGHT),
+            color=colour,
+            marker=marker,
+            markersize=4.5,
+            linestyle="none",
+            markerfacecolor="none",
+            transform=axes.get_xaxis_transform(),
+            clip_on=False,
             in_layout=False,
-        )  # fmt: skip
+        )
 
 
 def _front(axes, curves, i: int, j: int, floor: float) -> None:
@@ -173,7 +235,9 @@ def _front(axes, curves, i: int, j: int, floor: float) -> None:
     costs = np.concatenate([curve.costs[j] for curve in curves])
     picked = np.lexsort((errors, costs))
     picked = [k for k in picked if np.isfinite(errors[k])]
-    least, x, y = np.inf, [], []
+    least = np.inf
+    x = []
+    y = []
     for k in picked:
         if max(errors[k], floor) < least:
             least = max(errors[k], floor)
@@ -196,8 +260,16 @@ def _limits(panels, errors, floor: float, failed: bool) -> None:
         if drawn:
             axes.axhspan(low, floor, color=style.HAIR, alpha=0.7, zorder=0, linewidth=0)
     note = "the references disagree here" if drawn else f"references agree to {floor:.0e}, below"
-    panels[0].text(0.015, 0.015, note, transform=panels[0].transAxes, fontsize=7, color=style.MUTED, va="bottom",
-                   in_layout=False)  # fmt: skip
+    panels[0].text(
+        0.015,
+        0.015,
+        note,
+        transform=panels[0].transAxes,
+        fontsize=7,
+        color=style.MUTED,
+        va="bottom",
+        in_layout=False,
+    )
 
 
 def _legend(figure, colours: dict, markers: dict, curves) -> None:
@@ -205,20 +277,41 @@ def _legend(figure, colours: dict, markers: dict, curves) -> None:
 
     handles = []
     if set(colours) != set(markers):
-        handles += [Line2D([], [], color=colour, linewidth=3.0, label=word) for word, colour in colours.items()]
-        handles += [Line2D([], [], color=style.INK, marker=marker, markersize=4.5, linestyle="none", label=word)
-                    for word, marker in markers.items()]  # fmt: skip
+        handles += [
+            Line2D([], [], color=colour, linewidth=3.0, label=word)
+            for word, colour in colours.items()
+        ]
+        handles += [
+            Line2D(
+                [], [], color=style.INK, marker=marker, markersize=4.5, linestyle="none", label=word
+            )
+            for word, marker in markers.items()
+        ]
     else:
-        handles += [Line2D([], [], color=colours[word], marker=markers[word], markersize=4.5, linewidth=1.2, label=word)
-                    for word in colours]  # fmt: skip
+        handles += [
+            Line2D(
+                [],
+                [],
+                color=colours[word],
+                marker=markers[word],
+                markersize=4.5,
+                linewidth=1.2,
+                label=word,
+            )
+            for word in colours
+        ]
     if any(curve.bold for curve in curves):
         handles.append(Line2D([], [], color=style.INK, linewidth=2.4, label="bold: the default"))
     handles.append(Line2D([], [], color=style.MUTED, linewidth=4.0, alpha=0.4, label="front"))
-    figure.legend(handles=handles, loc="outside right center", frameon=False, fontsize=8, labelcolor=style.INK)
+    figure.legend(
+        handles=handles, loc="outside right center", frameon=False, fontsize=8, labelcolor=style.INK
+    )
 
 
 @style.without_markup
-def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)):
+def energy_figure(
+    t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)
+):
     """Figure with three panels over time: supplied energy, stored and dissipated energy, and numerical loss.
 
     supplied, stored, dissipated, numerical : name -> float64[k] [J], cumulative
@@ -234,18 +327,29 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
     top, middle, low, *more = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     total = np.sum([np.zeros_like(t), *supplied.values()], axis=0)
     least = {name: np.min(line, initial=0.0) for name, line in stored.items()}
-    stored, start = {name: line - least[name] for name, line in stored.items()}, -sum(least.values())
+    stored = {name: line - least[name] for name, line in stored.items()}
+    start = -sum(least.values())
     shown = [total + start, *supplied.values(), *stored.values(), *dissipated.values()]
     clock, given = units
     size, unit = given or energy_unit(max(np.max(np.abs(line), initial=0.0) for line in shown))
     _stack(top, t, {"supplied": supplied}, size)
     top.plot(t, total / size, color=style.INK, linewidth=1.2, label="total supplied")
     _stack(middle, t, {"dissipated": dissipated, "stored": stored}, size)
-    middle.plot(t, (total + start) / size, color=style.INK, linewidth=1.2, label="supplied and\nstored at the start")
+    middle.plot(
+        t,
+        (total + start) / size,
+        color=style.INK,
+        linewidth=1.2,
+        label="supplied and\nstored at the start",
+    )
     losses = [np.max(np.abs(line), initial=0.0) for line in numerical.values()]
     small, own = given or energy_unit(max(losses, default=0.0))
     for (name, values), colour in zip(numerical.items(), style.COLOURS, strict=False):
-        look = {"color": style.INK, "linestyle": (0, (4, 2))} if name == "remainder" else {"color": colour}
+        look = (
+            {"color": style.INK, "linestyle": (0, (4, 2))}
+            if name == "remainder"
+            else {"color": colour}
+        )
         low.plot(t, values / small, linewidth=1.2, label=name, **look)
     low.axhline(0.0, color=style.MUTED, linewidth=0.6)
     names = (f"supplied [{unit}]", f"dissipated, stored [{unit}]", f"numerical loss [{own}]")
@@ -269,7 +373,9 @@ def _port_panel(axes, t, name, work, bound, given) -> None:
     """
     span = max(np.ptp(work), np.max(np.abs(work)))
     far = span > 0.0 and np.max(bound) < -BOUND_DISTANCE * span
-    size, unit = given or energy_unit(max(np.max(np.abs(work)), 0.0 if far else np.max(np.abs(bound))))
+    size, unit = given or energy_unit(
+        max(np.max(np.abs(work)), 0.0 if far else np.max(np.abs(bound)))
+    )
     axes.plot(t, work / size, color=style.COLOURS[0], linewidth=1.2, label="integral of p q")
     look = {"color": style.DOUBT, "linestyle": (0, (4, 2)), "linewidth": 1.2}
     if far:
@@ -303,7 +409,8 @@ def _stack(axes, t, kinds, size) -> None:
         named = _largest_parts(parts)
         shades = matplotlib.colormaps[COLOUR_MAPS[kind]](np.linspace(0.75, 0.3, len(named)))
         for (name, values), shade in zip(named.items(), shades, strict=True):
-            above, below = up + np.maximum(values, 0.0) / size, down + np.minimum(values, 0.0) / size
+            above = up + np.maximum(values, 0.0) / size
+            below = down + np.minimum(values, 0.0) / size
             look = {"facecolor": shade, "edgecolor": "white", "linewidth": 0.3}
             axes.fill_between(t, up, above, label=name, **look)
             axes.fill_between(t, below, down, **look)
@@ -320,4 +427,6 @@ def _largest_parts(parts):
     if len(order) <= MAX_PARTS:
         return {name: parts[name] for name in order}
     rest = np.sum([parts[name] for name in order[MAX_PARTS - 1 :]], axis=0)
-    return {name: parts[name] for name in order[: MAX_PARTS - 1]} | {f"{len(order) - MAX_PARTS + 1} others": rest}
+    return {name: parts[name] for name in order[: MAX_PARTS - 1]} | {
+        f"{len(order) - MAX_PARTS + 1} others": rest
+    }

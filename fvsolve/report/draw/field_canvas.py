@@ -12,15 +12,32 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.file_replacement import replacing
 from fvsolve.report.draw import style
 from fvsolve.report.draw.network_picture import draw_parts
-from fvsolve.report.draw.scene import WATER_VIEW, DrawnScene, Projection, box_corners, draw_box, fit_limits, round_scale
-from fvsolve.report.draw.sheet import COLOUR_MAP, HALF_SYMBOL, WATER, PictureSheet, colour_range, write_animation
+from fvsolve.report.draw.scene import (
+    WATER_VIEW,
+    DrawnScene,
+    Projection,
+    box_corners,
+    draw_box,
+    fit_limits,
+    round_scale,
+)
+from fvsolve.report.draw.sheet import (
+    COLOUR_MAP,
+    HALF_SYMBOL,
+    WATER,
+    PictureSheet,
+    colour_range,
+    write_animation,
+)
 
-FLAT_SHARE = 0.08  # height over width below which bodies are drawn in plan, or depth over width for a profile
+# height over width below which bodies are drawn in plan, or depth over width for a profile
+FLAT_SHARE = 0.08
 LOW_SHARE = 0.05  # height over width below which basins are drawn with enlarged heights
 DRAWN_SHARE = 0.12  # drawn height over width of such basins
 LINE_OFFSET = 2e-3  # distance of contour lines above a surface, as a fraction of its diagonal
 PART_MARGIN = 0.04  # margin for parts around a basin, as a fraction of its size
-BUILDING_HEIGHT = 0.25  # height of buildings above the scene, as a fraction of the height of the scene
+# height of buildings above the scene, as a fraction of the height of the scene
+BUILDING_HEIGHT = 0.25
 BED_COLOUR, SIDE_COLOUR, BUILDING_COLOUR, BODY_COLOUR = "#c9b99a", "#5b87a6", "#a8705a", "#4b5563"
 AMBIENT_LIGHT = 0.35  # ambient light
 BOX_MARGINS = (62.0, 44.0, 50.0, 14.0)  # margins of a box: left, low, right, high [points]
@@ -41,24 +58,39 @@ class FieldCanvas:
         self.axes = axes = self.sheet.axes
         self._widen()
         low, high = self.box[::2], self.box[1::2]
-        others = scene.shown([part.at for part in scene.parts]) * (1.0, 1.0, 0.0) + (0.0, 0.0, low[2])
-        fit_limits(axes, self.aspect.on_sheet(np.vstack([box_corners(low, high), others])), BOX_MARGINS)
+        others = scene.shown([part.at for part in scene.parts]) * (1.0, 1.0, 0.0) + (
+            0.0,
+            0.0,
+            low[2],
+        )
+        fit_limits(
+            axes, self.aspect.on_sheet(np.vstack([box_corners(low, high), others])), BOX_MARGINS
+        )
         unit, rises = scene.length.unit, scene.height.unit
         if self.aspect.kind == "aslant":
             axes.set_axis_off()
-            self.texts = draw_box(axes, self.aspect, low, high, (f"x [{unit}]", f"y [{unit}]", f"z [{rises}]"))
+            self.texts = draw_box(
+                axes, self.aspect, low, high, (f"x [{unit}]", f"y [{unit}]", f"z [{rises}]")
+            )
         else:
             style.style_axes(axes)
             axes.ticklabel_format(axis="both", style="plain", useOffset=False)
-            style.name_axes(axes, f"x [{unit}]", f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]")
+            style.name_axes(
+                axes, f"x [{unit}]", f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]"
+            )
         self.sheet.figure.canvas.draw()
         size = (round(axes.bbox.width), round(axes.bbox.height))
         self.plotter = pyvista.Plotter(off_screen=True, window_size=size)
         self.plotter.enable_anti_aliasing("ssaa")
         self.plotter.enable_parallel_projection()
         self._camera()
-        self.image = axes.imshow(np.zeros((2, 2, 4)), extent=(*axes.get_xlim(), *axes.get_ylim()), aspect="auto",
-                                 zorder=1, interpolation="antialiased")  # fmt: skip
+        self.image = axes.imshow(
+            np.zeros((2, 2, 4)),
+            extent=(*axes.get_xlim(), *axes.get_ylim()),
+            aspect="auto",
+            zorder=1,
+            interpolation="antialiased",
+        )
         draw_parts(self, scene, self._lines())
         self.sheet.bar(self.limits, scene.quantity.label)
         self.sheet.legend(scene.parts)
@@ -79,7 +111,9 @@ class FieldCanvas:
         """Write the first frame as an HTML page without network, in which the scene can be turned (PyVista, trame)."""
         self.show(0)
         if self.colours is not None:
-            self.plotter.add_scalar_bar(self.scene.quantity.label, color=style.INK, mapper=self.colours)
+            self.plotter.add_scalar_bar(
+                self.scene.quantity.label, color=style.INK, mapper=self.colours
+            )
         self.plotter.set_background("white")
         self.plotter.disable_parallel_projection()
         self.plotter.reset_camera()
@@ -92,7 +126,11 @@ class FieldCanvas:
         x, y, z = (self.box[1::2] - self.box[::2]).tolist()
         if self.wet:
             slant, wide = self.scene.height_ratio, max(x, y)
-            rise = round_scale(DRAWN_SHARE * wide / (slant * z)) if 0.0 < slant * z < LOW_SHARE * wide else 1.0
+            rise = (
+                round_scale(DRAWN_SHARE * wide / (slant * z))
+                if 0.0 < slant * z < LOW_SHARE * wide
+                else 1.0
+            )
             self.aspect = Projection("aslant", rise * slant, seen=WATER_VIEW)
         elif z <= FLAT_SHARE * max(x, y):
             self.aspect = Projection("plan")
@@ -131,12 +169,16 @@ class FieldCanvas:
             mesh = read_frame(file, self.scene)
             points = self.aspect.on_sheet(mesh.points)
             if 3 not in mesh.celltypes:
-                self.cover = np.vstack([self.cover, self.aspect.on_sheet(mesh.cell_centers().points)])
+                self.cover = np.vstack(
+                    [self.cover, self.aspect.on_sheet(mesh.cell_centers().points)]
+                )
                 continue
             lines = mesh.cells_dict[3]
             segments.append(points[lines])
             if "pipe" in mesh.cell_data:
-                self.scene.pipes = [(np.asarray(mesh.points), lines, np.zeros(0), np.asarray(mesh["pipe"]))]
+                self.scene.pipes = [
+                    (np.asarray(mesh.points), lines, np.zeros(0), np.asarray(mesh["pipe"]))
+                ]
             elif len(self.scene.frames) == 1:  # bodies move
                 self.labels = self._bodies(segments[-1], np.asarray(mesh["body"]))
         return np.concatenate(segments)
@@ -165,7 +207,9 @@ class FieldCanvas:
                 self.plotter.add_mesh(shape, color=BODY_COLOUR, ambient=AMBIENT_LIGHT)
         elif field in mesh.cell_data:
             plane = 3 not in mesh.celltypes
-            self._coloured(mesh.cell_data_to_point_data() if plane else tubes(mesh, self.box), plane)
+            self._coloured(
+                mesh.cell_data_to_point_data() if plane else tubes(mesh, self.box), plane
+            )
             if plane:
                 rim = boundary_edges(mesh)
                 self.plotter.add_mesh(rim, color=style.INK, line_width=2)
@@ -186,7 +230,9 @@ class FieldCanvas:
         bed = mesh.extract_cells(~block) if block.any() else mesh
         self.plotter.add_mesh(bed, color=BED_COLOUR, smooth_shading=False)
         if block.any():
-            self.plotter.add_mesh(mesh.extract_cells(block), color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT)
+            self.plotter.add_mesh(
+                mesh.extract_cells(block), color=BUILDING_COLOUR, ambient=AMBIENT_LIGHT
+            )
         if not surface.n_cells:
             return None
         sides = water_sides(surface, depth_direction(mesh) * (1.0, 1.0, rise))
@@ -202,7 +248,9 @@ class FieldCanvas:
         import pyvista
 
         for wall in self.scene.walls:
-            shape = pyvista.line_segments_from_points(self.scene.shown(wall) * (1.0, 1.0, self.aspect.rise))
+            shape = pyvista.line_segments_from_points(
+                self.scene.shown(wall) * (1.0, 1.0, self.aspect.rise)
+            )
             for colour, width in (("white", 6), (style.INK, 2)):
                 # the water beside the wall would hide parts of the lines, and the white line the other
                 shape.points[:] += WALL_OFFSET * shape.length * self.aspect.back
@@ -212,9 +260,15 @@ class FieldCanvas:
         """Draw a shape in the colours of the field; plane : True for a surface, which then also has contour lines."""
         (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
         actor = self.plotter.add_mesh(
-            shape, scalars=field, cmap=COLOUR_MAP, clim=self.limits, smooth_shading=True, show_scalar_bar=False,
-            lighting=not plane or self.wet, ambient=0.0 if plane else AMBIENT_LIGHT,
-        )  # fmt: skip
+            shape,
+            scalars=field,
+            cmap=COLOUR_MAP,
+            clim=self.limits,
+            smooth_shading=True,
+            show_scalar_bar=False,
+            lighting=not plane or self.wet,
+            ambient=0.0 if plane else AMBIENT_LIGHT,
+        )
         self.colours = actor.mapper
         if plane and count and field in shape.point_data:
             levels = [low + (high - low) * (k + 1) / (count + 1) for k in range(count)]
@@ -226,10 +280,12 @@ class FieldCanvas:
 
 
 TUBE_RADIUS = 0.008  # radius of a pipe as a fraction of the diagonal of the scene
-WALL_OFFSET = 0.01  # distance of the lines of walls towards the observer, over the extent of the wall
+# distance of the lines of walls towards the observer, over the extent of the wall
+WALL_OFFSET = 0.01
 WET_DEPTH = 1e-4  # least depth of water that is drawn [m]
 WALL_SLOPE = 1.0  # least slope of the bed that counts as a wall
-BUILDING_INSET = 1e-3  # relative reduction of a building, so that its walls do not coincide with those of the water
+# relative reduction of a building, so that its walls do not coincide with those of the water
+BUILDING_INSET = 1e-3
 
 
 def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
@@ -239,26 +295,43 @@ def field_extent(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bo
     It is (0, 1) if all cells are dry. The bounding box is in output units: least and greatest x, then y, then z.
     The process exits with a message if no frame has the field, since the function runs in a process of its own.
     """
-    known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
+    known = {}
+    lows = []
+    highs = []
+    boxes = []
+    wet = False
+    field = scene.quantity.name
     for file in (file for _, files in scene.frames for file in files):
         mesh = read_frame(file, scene)
         known |= dict.fromkeys(name for name in mesh.cell_data if name not in ("pipe", "normal"))
         if field in mesh.cell_data:
             values = mesh[field]
             if "depth" in mesh.cell_data and field != "bed":
-                values = values[mesh["depth"] > WET_DEPTH * scene.height.factor]  # only wet cells are drawn
+                # only wet cells are drawn
+                values = values[mesh["depth"] > WET_DEPTH * scene.height.factor]
             lows.append(float(values.min(initial=math.inf)))
             highs.append(float(values.max(initial=-math.inf)))
         box = list(mesh.bounds)
         if "surface" in mesh.cell_data:  # water may stand above the mesh
-            tops = mesh["depth"] + mesh.points[:, 2].max() if "normal" in mesh.cell_data else mesh["surface"]
+            tops = (
+                mesh["depth"] + mesh.points[:, 2].max()
+                if "normal" in mesh.cell_data
+                else mesh["surface"]
+            )
             box[5] = max(box[5], float(tops.max()))
         boxes.append(box)
         wet |= "depth" in mesh.cell_data
     if not lows:
-        sys.exit(f"unknown field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
-    limits = colour_range(min(lows), max(highs)) if min(lows) <= max(highs) else (0.0, 1.0)  # all dry
-    return limits, np.array([(min if k % 2 == 0 else max)(bounds[k] for bounds in boxes) for k in range(6)]), wet
+        sys.exit(
+            f"unknown field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}"
+        )
+    # all dry
+    limits = colour_range(min(lows), max(highs)) if min(lows) <= max(highs) else (0.0, 1.0)
+    return (
+        limits,
+        np.array([(min if k % 2 == 0 else max)(bounds[k] for bounds in boxes) for k in range(6)]),
+        wet,
+    )
 
 
 def read_frame(file: str | Path, scene: DrawnScene) -> Any:
@@ -347,7 +420,11 @@ def water_sides(surface: Any, up: np.ndarray) -> Any:
 
 def depth_direction(mesh: Any) -> np.ndarray:
     """Direction of depth in a basin : float64[3], vertical, or normal to the bed of a basin on a body."""
-    return mesh.cell_data["normal"].mean(axis=0) if "normal" in mesh.cell_data else np.array([0.0, 0.0, 1.0])
+    return (
+        mesh.cell_data["normal"].mean(axis=0)
+        if "normal" in mesh.cell_data
+        else np.array([0.0, 0.0, 1.0])
+    )
 
 
 def buildings(mesh: Any, top: float) -> list[Any]:
@@ -395,7 +472,9 @@ def raised_cells(mesh: Any) -> np.ndarray:
     low, high, size = (np.full(mesh.n_cells, np.nan) for _ in range(3))
     for rows, corners in cells:
         low[rows], high[rows] = z[corners].min(axis=1), z[corners].max(axis=1)
-        size[rows] = np.linalg.norm(mesh.points[corners[:, 0], :2] - mesh.points[corners[:, 2], :2], axis=1)
+        size[rows] = np.linalg.norm(
+            mesh.points[corners[:, 0], :2] - mesh.points[corners[:, 2], :2], axis=1
+        )
     steep = high - low > WALL_SLOPE * size
     if not steep.any():
         return steep
@@ -416,7 +495,10 @@ def raised_cells(mesh: Any) -> np.ndarray:
 
 def _cells(mesh: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     """Cells of a mesh, by their shape : list of (indices int[k], points of the corners int[k, 3 or 4])."""
-    return [(np.flatnonzero(mesh.celltypes == kind), corners) for kind, corners in mesh.cells_dict.items()]
+    return [
+        (np.flatnonzero(mesh.celltypes == kind), corners)
+        for kind, corners in mesh.cells_dict.items()
+    ]
 
 
 def _at_points(cells, chosen: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:

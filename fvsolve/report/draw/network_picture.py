@@ -7,8 +7,23 @@ import numpy as np
 
 from fvsolve.errors import visible
 from fvsolve.report.draw import style
-from fvsolve.report.draw.scene import DrawnScene, Projection, box_corners, choose_projection, draw_box, fit_limits
-from fvsolve.report.draw.sheet import COLOUR_MAP, HALF_SYMBOL, SIZE, PictureSheet, colour_range, draw_symbol, symbol_of
+from fvsolve.report.draw.scene import (
+    DrawnScene,
+    Projection,
+    box_corners,
+    choose_projection,
+    draw_box,
+    fit_limits,
+)
+from fvsolve.report.draw.sheet import (
+    COLOUR_MAP,
+    HALF_SYMBOL,
+    SIZE,
+    PictureSheet,
+    colour_range,
+    draw_symbol,
+    symbol_of,
+)
 
 SYMBOL_SPACING = 4.8  # least distance of symbols, in half widths of a symbol
 SMALL_SYMBOL_COUNT = 40  # number of parts above which symbols are small
@@ -19,7 +34,8 @@ EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
 # Directions of a name from its point, best first.
 LABEL_PLACES = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)]
 RANK_COST = 0.5  # cost of each lower rank of a direction, in covered points of lines
-POINT_SPACING, PADDING = 4.0, 3.0  # distance of points along lines, and free space around names [pixels]
+# distance of points along lines, and free space around names [pixels]
+POINT_SPACING, PADDING = 4.0, 3.0
 
 
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
@@ -32,11 +48,17 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
     """
     if not (scene.parts or scene.pipes or stage.labels):
         return 0, 0
-    axes, half, aspect = stage.axes, stage.half, stage.aspect
+    axes = stage.axes
+    half = stage.half
+    aspect = stage.aspect
     point = stage.sheet.figure.dpi / 72.0  # [pixels]
     at = symbol_positions(scene, aspect, axes, SYMBOL_SPACING * half * point)
     blocks, ties = [], []
-    for part in [part for part in scene.parts if not (part.joint and len(scene.parts) > MAX_PARTS_WITH_JOINTS)]:
+    for part in [
+        part
+        for part in scene.parts
+        if not (part.joint and len(scene.parts) > MAX_PARTS_WITH_JOINTS)
+    ]:
         ends = [at[name] for name in part.between if name in at]
         ties += [(at[part.key], end) for end in ends]
         along = ends[-1] - ends[0] if len(ends) > 1 else np.array([1.0, 0.0])
@@ -48,10 +70,14 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
     back = axes.transData.inverted().transform
     for a, b in ties:
         axes.plot(*back(np.array([a, b])).T, color=style.INK, linewidth=1.1, zorder=5)
-    return _write_names(stage, scene, segments, at, np.array(blocks).reshape(-1, 4), np.reshape(ties, (-1, 2, 2)))
+    return _write_names(
+        stage, scene, segments, at, np.array(blocks).reshape(-1, 4), np.reshape(ties, (-1, 2, 2))
+    )
 
 
-def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) -> dict[str, np.ndarray]:
+def symbol_positions(
+    scene: DrawnScene, aspect: Projection, axes, apart: float
+) -> dict[str, np.ndarray]:
     """Positions of symbols [pixels] : key of a part, or of a linked patch -> float64[2].
 
     A node whose position is not fixed is moved if a link to it is shorter than `apart` [pixels]. The symbol of a link
@@ -61,8 +87,13 @@ def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) 
     nodes = [part for part in scene.parts if not part.link]
     seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
     at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
-    at |= dict(zip(scene.anchors, axes.transData.transform(aspect.on_sheet(
-        scene.shown(list(scene.anchors.values())))), strict=True))  # fmt: skip
+    at |= dict(
+        zip(
+            scene.anchors,
+            axes.transData.transform(aspect.on_sheet(scene.shown(list(scene.anchors.values())))),
+            strict=True,
+        )
+    )
     held = {part.key for part in nodes if part.held} | set(scene.anchors)
     middle = seen.mean(axis=0) if len(seen) else np.zeros(2)
     for part in scene.parts:
@@ -107,7 +138,9 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
     pixels = axes.transData.transform(segments.reshape(-1, 2)).reshape(-1, 2, 2)
     labels, renderer = _names_to_draw(scene, at, pixels, stage.half), figure.canvas.get_renderer()
     look = {"color": style.INK, "fontsize": 8}
-    labels += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
+    labels += [
+        DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels
+    ]
     halo = [withStroke(linewidth=HALO_WIDTH, foreground="white")]
     always = {"zorder": 7, "parse_math": False, "va": "bottom", "path_effects": halo}
     texts = [axes.text(0.0, 0.0, visible(item.text), **always, **item.look) for item in labels]
@@ -115,16 +148,22 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
     ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
     point = figure.dpi / 72.0
     at, gaps = [item.at for item in labels], [point * item.gap for item in labels]
-    lines = np.vstack([points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)])
+    lines = np.vstack(
+        [points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]
+    )
     left, right = EDGE_MARGIN + axes.bbox.x0 * axes.axison, figure.bbox.x1 - EDGE_MARGIN
     within = left, axes.bbox.y0 - EDGE_MARGIN, right, axes.bbox.y1 + EDGE_MARGIN
-    places = place_labels(at, sizes, gaps, np.vstack([blocks, np.reshape(ticks, (-1, 4))]), lines, within)
+    places = place_labels(
+        at, sizes, gaps, np.vstack([blocks, np.reshape(ticks, (-1, 4))]), lines, within
+    )
     for text, corner in zip(texts, places, strict=True):
         if corner is None:
             text.remove()
         else:
             text.set_position(axes.transData.inverted().transform(corner))
-    without = sum(item.joint for item in scene.parts) if len(scene.parts) > MAX_PARTS_WITH_JOINTS else 0
+    without = (
+        sum(item.joint for item in scene.parts) if len(scene.parts) > MAX_PARTS_WITH_JOINTS else 0
+    )
     return sum(item is not None for item in places), len(labels) + without
 
 
@@ -135,14 +174,24 @@ def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName
     half : half width of a symbol [points]
     """
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
-    parts = [DrawnName(item.name, at[item.key], half + 3.0, plain) for item in scene.parts if not item.joint]
+    parts = [
+        DrawnName(item.name, at[item.key], half + 3.0, plain)
+        for item in scene.parts
+        if not item.joint
+    ]
     joints = [DrawnName(item.name, at[item.key], 5.0, small) for item in scene.parts if item.joint]
     joints = joints if len(scene.parts) <= MAX_PARTS_WITH_JOINTS else []
     if len(scene.names) > MAX_NAMED_PIPES or not scene.pipes or not scene.names:
         return parts + joints
     look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}
-    middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}
-    pipes = [DrawnName(name, item[len(item) // 2], 4.0, look) for name, item in middles.items() if len(item)]
+    middles = {
+        name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)
+    }
+    pipes = [
+        DrawnName(name, item[len(item) // 2], 4.0, look)
+        for name, item in middles.items()
+        if len(item)
+    ]
     return parts + pipes + joints
 
 
@@ -167,11 +216,15 @@ def place_labels(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, fl
             wider = box + (-PADDING, 0.0, PADDING, 0.0)
             if (box[:2] < within[:2]).any() or (box[2:] > within[2:]).any():
                 continue  # not inside
-            if any((wider[:2] < other[2:]).all() and (other[:2] < wider[2:]).all() for other in taken):
+            if any(
+                (wider[:2] < other[2:]).all() and (other[:2] < wider[2:]).all() for other in taken
+            ):
                 continue  # covers a name or a block
             cost = RANK_COST * rank
             if len(lines):
-                cost += int(((lines > box[:2] - PADDING) & (lines < box[2:] + PADDING)).all(axis=1).sum())
+                cost += int(
+                    ((lines > box[:2] - PADDING) & (lines < box[2:] + PADDING)).all(axis=1).sum()
+                )
             if cost < least:
                 best, least = box, cost
         places.append(None if best is None else (float(best[0]), float(best[1])))
@@ -186,14 +239,16 @@ def points_along(segments: np.ndarray) -> np.ndarray:
         return np.zeros((0, 2))
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     parts = [
-        np.linspace(a, b, max(2, int(length / POINT_SPACING))) for (a, b), length in zip(segments, lengths, strict=True)
+        np.linspace(a, b, max(2, int(length / POINT_SPACING)))
+        for (a, b), length in zip(segments, lengths, strict=True)
     ]
     return np.concatenate(parts)
 
 
 PIPE_WIDTH, EDGE_WIDTH = 3.6, 4.8  # widths of a pipe and of its edge [points]
 LEVEL_HEIGHT = 3.2  # height of a picture of a network along a level line [inch]
-SIDE_MARGIN, TOP_MARGIN = 0.11, 0.12  # margins of a profile at its sides and above it, as fractions of its size
+# margins of a profile at its sides and above it, as fractions of its size
+SIDE_MARGIN, TOP_MARGIN = 0.11, 0.12
 BOX_MARGIN = 0.03  # margin between a network and its box, as a fraction of its size
 PLAN_MARGINS = (46.0, 24.0, 46.0, 24.0)  # margins of a plan: left, low, right, high [points]
 BOX_MARGINS = (60.0, 40.0, 46.0, 16.0)  # margins of a network with a box [points]
@@ -210,9 +265,13 @@ class NetworkPicture:
         points = scene.shown(scene.pipes[0][0])
         self.nodes = scene.shown([part.at for part in scene.parts if not part.link])
         self.all = np.vstack([points, self.nodes])
-        self.aspect = choose_projection(self.all, len(scene.parts) > SMALL_SYMBOL_COUNT, scene.height_ratio)
+        self.aspect = choose_projection(
+            self.all, len(scene.parts) > SMALL_SYMBOL_COUNT, scene.height_ratio
+        )
         if self.aspect.kind == "profile" and scene.plan == "laid out":  # the first pipe begins at 0
-            self.aspect.begin = float(self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min())
+            self.aspect.begin = float(
+                self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min()
+            )
         self.level = self.aspect.kind == "profile" and not np.ptp(self.all[:, 2]) > 0.0
         high = LEVEL_HEIGHT if self.level else SIZE[1]
         self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant", high=high)
@@ -238,10 +297,16 @@ class NetworkPicture:
         from matplotlib.collections import LineCollection
 
         count = len(self.scene.names)
-        thin = 1.0 if count <= SMALL_SYMBOL_COUNT else 0.6 if count <= MAX_PARTS_WITH_JOINTS else 0.3
+        thin = (
+            1.0 if count <= SMALL_SYMBOL_COUNT else 0.6 if count <= MAX_PARTS_WITH_JOINTS else 0.3
+        )
         round_ends = {"capstyle": "round"}
-        edge = LineCollection(segments, colors=style.INK, linewidths=thin * EDGE_WIDTH, zorder=2, **round_ends)
-        inner = LineCollection(segments, cmap=COLOUR_MAP, linewidths=thin * PIPE_WIDTH, zorder=3, **round_ends)
+        edge = LineCollection(
+            segments, colors=style.INK, linewidths=thin * EDGE_WIDTH, zorder=2, **round_ends
+        )
+        inner = LineCollection(
+            segments, cmap=COLOUR_MAP, linewidths=thin * PIPE_WIDTH, zorder=3, **round_ends
+        )
         for collection in (edge, inner):
             self.axes.add_collection(collection)
         return inner
@@ -259,7 +324,9 @@ class NetworkPicture:
         notes = []
         if self.aspect.kind == "aslant":
             own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.height_ratio
-            notes.append("heights have a separate scale" if own else f"heights enlarged {times:g} times")
+            notes.append(
+                "heights have a separate scale" if own else f"heights enlarged {times:g} times"
+            )
         if self.scene.plan == "laid out":
             notes.append("laid out by lengths")
         if self.scene.plan == "own scale":
@@ -271,7 +338,9 @@ class NetworkPicture:
     def _axes(self) -> None:
         """Set limits and draw axes with units."""
         unit = "" if self.scene.plan == "own scale" else f" [{self.scene.length.unit}]"
-        axes, seen, high = self.axes, self.aspect.on_sheet(self.all), self.scene.height.unit
+        axes = self.axes
+        seen = self.aspect.on_sheet(self.all)
+        high = self.scene.height.unit
         self.texts, self.cover, self.labels = [], np.zeros((0, 2)), []
         if self.aspect.kind == "aslant":
             axes.set_axis_off()
@@ -293,7 +362,11 @@ class NetworkPicture:
             space = (SIDE_MARGIN, TOP_MARGIN) * (most - low)
             axes.set_xlim(low[0] - space[0], most[0] + space[0])
             axes.set_ylim(low[1] - (space[1] or 1.0), most[1] + (space[1] or 1.0))
-            along = "x" if tuple(self.aspect.right) == (1.0, 0.0, 0.0) and self.scene.plan != "laid out" else "distance"
+            along = (
+                "x"
+                if tuple(self.aspect.right) == (1.0, 0.0, 0.0) and self.scene.plan != "laid out"
+                else "distance"
+            )
             names = f"{along}{unit}", f"elevation [{high}]"
         style.name_axes(axes, names[0], "" if self.level else names[1])
         if self.scene.plan == "schematic":  # drawn distances have no meaning
@@ -306,10 +379,16 @@ class NetworkPicture:
         """Draw lines that show the heights: from the nodes down to the floor, and the pipes projected onto it."""
         from matplotlib.collections import LineCollection
 
-        floor, points, lines = self.all[:, 2].min(), self.scene.shown(self.scene.pipes[0][0]), self.scene.pipes[0][1]
+        floor = self.all[:, 2].min()
+        points = self.scene.shown(self.scene.pipes[0][0])
+        lines = self.scene.pipes[0][1]
         below = points * (1.0, 1.0, 0.0) + (0.0, 0.0, floor)
         shade = self.aspect.on_sheet(below)[lines]
-        self.axes.add_collection(LineCollection(shade, colors=style.HAIR, linewidths=2.0, zorder=0.5))
+        self.axes.add_collection(
+            LineCollection(shade, colors=style.HAIR, linewidths=2.0, zorder=0.5)
+        )
         foot = self.nodes * (1.0, 1.0, 0.0) + (0.0, 0.0, floor)
         posts = np.stack([self.aspect.on_sheet(self.nodes), self.aspect.on_sheet(foot)], axis=1)
-        self.axes.add_collection(LineCollection(posts, colors=style.MUTED, linewidths=0.5, zorder=0.6))
+        self.axes.add_collection(
+            LineCollection(posts, colors=style.MUTED, linewidths=0.5, zorder=0.6)
+        )

@@ -27,13 +27,33 @@ def case_figure(case):
             axes.plot(*zip(ends[0], end, strict=True), color=style.MUTED, linewidth=1.0, zorder=1)
         if len(ends) > 1 and len(case.links) <= MAX_NAMED_NODES:
             middle = [sum(x) / len(ends) for x in zip(*ends, strict=True)]
-            axes.text(*middle, f"{name} ({link.kind})", fontsize=7, color=style.MUTED, ha="center", va="bottom")
+            axes.text(
+                *middle,
+                f"{name} ({link.kind})",
+                fontsize=7,
+                color=style.MUTED,
+                ha="center",
+                va="bottom",
+            )
     for k, kind in enumerate(dict.fromkeys(node.kind for node in case.nodes.values())):
         own = [at[name] for name, node in case.nodes.items() if node.kind == kind]
-        axes.scatter(*zip(*own, strict=True), s=40, label=kind, color=style.COLOURS[k % len(style.COLOURS)], zorder=2)
+        axes.scatter(
+            *zip(*own, strict=True),
+            s=40,
+            label=kind,
+            color=style.COLOURS[k % len(style.COLOURS)],
+            zorder=2,
+        )
     for name in case.nodes if len(case.nodes) <= MAX_NAMED_NODES else ():
-        axes.annotate(name, at[name], xytext=(0, 7), textcoords="offset points", fontsize=8, color=style.INK,
-                      ha="center")  # fmt: skip
+        axes.annotate(
+            name,
+            at[name],
+            xytext=(0, 7),
+            textcoords="offset points",
+            fontsize=8,
+            color=style.INK,
+            ha="center",
+        )
     axes.margins(0.1)
     style.legend(axes)
     style.title(figure, case.title or case.name)
@@ -80,7 +100,9 @@ def node_positions(case) -> dict[str, tuple[float, float]]:
 def model_figure(model):
     """Bar chart of the heads at the first MAX_NAMED_NODES nodes of a model at the start."""
     names, unit = model.node_names[:MAX_NAMED_NODES], model.case.unit_of("head")
-    heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()][:MAX_NAMED_NODES]
+    heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()][
+        :MAX_NAMED_NODES
+    ]
     figure = style.figure(0.9 + 0.22 * max(len(names), 3))
     axes = figure.subplots()
     axes.barh(range(len(names)), heads, color=style.COLOURS[0], height=0.6)
@@ -151,8 +173,15 @@ def quantity_figure(sweep, name: str, heads: Mapping[str, str]):
         x, words = axis_positions([row[key] for row in sweep.rows])
         for colour, is_wrong in ((style.COLOURS[0], False), (style.DOUBT, True)):
             own = [at for at, failed in enumerate(wrong) if failed is is_wrong]
-            axes.plot([x[at] for at in own], [y[at] for at in own], linestyle="", marker="o", markersize=3.5,
-                      color=colour, label="not ok" if is_wrong and own else None)  # fmt: skip
+            axes.plot(
+                [x[at] for at in own],
+                [y[at] for at in own],
+                linestyle="",
+                marker="o",
+                markersize=3.5,
+                color=colour,
+                label="not ok" if is_wrong and own else None,
+            )
         style.style_axes(axes)
         axes.margins(x=0.04)
         if words:
@@ -176,7 +205,9 @@ def axis_positions(values: list) -> tuple[list[float], list[str]]:
         return [float(value) for value in values], []
     texts = [str(value) for value in values]
     known = {text: k for k, text in enumerate(dict.fromkeys(texts))}
-    return [float(known[text]) for text in texts], [text[:24] for text in known] if len(known) <= MAX_WORDS else []
+    return [float(known[text]) for text in texts], [text[:24] for text in known] if len(
+        known
+    ) <= MAX_WORDS else []
 
 
 @style.without_markup
@@ -202,7 +233,9 @@ def _map(axes, sweep, name: str) -> None:
     import numpy as np
 
     values = [[row[key] for row in sweep.rows] for key in sweep.keys]
-    numbers = np.array([math.nan if row.get(name) is None else float(row[name]) for row in sweep.rows])
+    numbers = np.array(
+        [math.nan if row.get(name) is None else float(row[name]) for row in sweep.rows]
+    )
     wrong = np.array([not row["ok"] for row in sweep.rows])
     steps = [sorted(set(axis_positions(column)[0])) for column in values]
     x, y = (np.array(axis_positions(column)[0]) for column in values)
@@ -214,14 +247,23 @@ def _map(axes, sweep, name: str) -> None:
         seen = axes.pcolormesh(table, cmap="viridis")
         x, y = x + 0.5, y + 0.5
         for axis, column, step in zip((axes.xaxis, axes.yaxis), values, steps, strict=True):
-            labels = axis_positions(column)[1] or ["" if isinstance(column[0], str) else f"{at:.4g}" for at in step]
+            labels = axis_positions(column)[1] or [
+                "" if isinstance(column[0], str) else f"{at:.4g}" for at in step
+            ]
             every = -(-len(labels) // MAX_WORDS)
             axis.set_ticks(np.arange(0, len(labels), every) + 0.5, labels[::every])
         if len(numbers) <= MAX_NUMBERS:
             for a, b, value, shade in zip(x, y, numbers, seen.norm(numbers), strict=True):
                 if math.isfinite(value):
-                    axes.text(a, b, f"{value:.4g}", ha="center", va="center", fontsize=7.5,
-                              color="white" if shade < 0.6 else style.INK)  # fmt: skip
+                    axes.text(
+                        a,
+                        b,
+                        f"{value:.4g}",
+                        ha="center",
+                        va="center",
+                        fontsize=7.5,
+                        color="white" if shade < 0.6 else style.INK,
+                    )
     else:
         seen = axes.scatter(x, y, c=numbers, s=36, cmap="viridis")
         axes.margins(0.05)
@@ -230,7 +272,9 @@ def _map(axes, sweep, name: str) -> None:
                 axis.set_ticks(range(len(words)), words)
     axes.plot(x[wrong], y[wrong], linestyle="", marker="x", markersize=9, color=style.DOUBT)
     bar = axes.figure.colorbar(seen, ax=axes)
-    bar.set_label(name + (", crossed where not ok" if wrong.any() else ""), fontsize=8.5, color=style.INK)
+    bar.set_label(
+        name + (", crossed where not ok" if wrong.any() else ""), fontsize=8.5, color=style.INK
+    )
     bar.ax.tick_params(labelsize=8, labelcolor=style.INK)
 
 
@@ -241,20 +285,38 @@ def sensitivity_figure(result):
     panels = figure.subplots(1, 2, sharey=True)
     unit = result.quantity.rpartition(" ")[2] if result.quantity.endswith("]") else ""
     effects = f"elementary effect, per whole range of the key {unit}".strip()
-    shown = (("share of the variance", (("S1", "S1, first order"), ("ST", "ST, total"))),
-             (effects, (("mu_star", "mean size"), ("sigma", "spread"))))  # fmt: skip
+    shown = (
+        ("share of the variance", (("S1", "S1, first order"), ("ST", "ST, total"))),
+        (effects, (("mu_star", "mean size"), ("sigma", "spread"))),
+    )
     for axes, (label, bars) in zip(panels, shown, strict=True):
         style.style_axes(axes)
         for shift, (name, text), colour in zip((-0.2, 0.2), bars, style.COLOURS, strict=False):
             at = [k + shift for k in range(len(result.keys))]
-            axes.barh(at, getattr(result, name), xerr=getattr(result, f"{name}_conf", None), height=0.36, color=colour,
-                      label=text, error_kw={"ecolor": style.MUTED, "elinewidth": 0.8})  # fmt: skip
+            axes.barh(
+                at,
+                getattr(result, name),
+                xerr=getattr(result, f"{name}_conf", None),
+                height=0.36,
+                color=colour,
+                label=text,
+                error_kw={"ecolor": style.MUTED, "elinewidth": 0.8},
+            )
         axes.locator_params(axis="x", nbins=5)
         axes.ticklabel_format(axis="x", scilimits=(-3, 4))
         axes.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
         style.name_axes(axes, label)
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
-    panels[0].set_yticks(range(len(result.keys)), [break_key(key) for key in result.keys], fontsize=8)
+        axes.legend(
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=2,
+            frameon=False,
+            fontsize=8,
+            borderaxespad=0.2,
+        )
+    panels[0].set_yticks(
+        range(len(result.keys)), [break_key(key) for key in result.keys], fontsize=8
+    )
     panels[0].invert_yaxis()
     style.title(figure, result.quantity)
     return figure
@@ -265,6 +327,8 @@ def break_key(key: str) -> str:
     lines = [""]
     for piece in key.replace(".", ".\n").split("\n"):
         lines = (
-            [*lines, piece] if len(lines[-1] + piece) > KEY_WIDTH and lines[-1] else [*lines[:-1], lines[-1] + piece]
+            [*lines, piece]
+            if len(lines[-1] + piece) > KEY_WIDTH and lines[-1]
+            else [*lines[:-1], lines[-1] + piece]
         )
     return "\n".join(lines)

@@ -11,21 +11,30 @@ import numpy as np
 from fvsolve.report.draw import style
 
 CONSTANT_TOLERANCE = 1e-9  # greatest range of a constant curve, as a fraction of its size
-SAME_TOLERANCE = 1e-3  # greatest difference of coinciding curves, as a fraction of the range of their panel
+# greatest difference of coinciding curves, as a fraction of the range of their panel
+SAME_TOLERANCE = 1e-3
 # greatest residual of a curve after scaling and shifting another to it, as a fraction of its range
 ALIKE_TOLERANCE = 1e-6
-OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # equivalent quantities at a fixed place
+# equivalent quantities at a fixed place
+OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")
 MAX_PANELS = 6  # greatest number of panels
 MAX_LINES = 8  # greatest number of curves in a panel
 MAX_CONSTANTS = 4  # greatest number of constant probes with names
 LEGEND_WIDTH = 26  # letters of a line of a legend
 MAX_PIPES = 6  # greatest number of pipes drawn; the longest are chosen
 MAX_POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
-LINE_LOOKS = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
-         "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
-LIMIT_LOOKS = {"maximum": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
-          "minimum": {"color": style.COLOURS[6], "linewidth": 1.1,
-                      "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
+LINE_LOOKS = {
+    "vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
+    "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."},
+}
+LIMIT_LOOKS = {
+    "maximum": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
+    "minimum": {
+        "color": style.COLOURS[6],
+        "linewidth": 1.1,
+        "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2)),
+    },
+}
 MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
 
 
@@ -55,7 +64,9 @@ class DrawnPanel:
     lines: list[DrawnLine]
 
 
-def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
+def select_curves(
+    values: np.ndarray, probes, measured=()
+) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
     """Panels with the curves to draw, and constant probes : (list of `DrawnPanel`, list of (probe, unit, value)).
 
     values : float64[k, n]; probes : (name, unit) of each column
@@ -77,7 +88,12 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
         line = DrawnLine(k, [place], [])
         if name not in measured and quantity in OF_PRESSURE:
             first = next(
-                (leader for j, leader in leaders.get(place, []) if _is_scaled(values[:, j], values[:, k])), None
+                (
+                    leader
+                    for j, leader in leaders.get(place, [])
+                    if _is_scaled(values[:, j], values[:, k])
+                ),
+                None,
             )
             if first is not None:
                 first.alike.append(quantity.replace("_", " "))
@@ -89,7 +105,9 @@ def select_curves(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPa
     return list(panels.values()), [(*probes[k], float(values[0, k])) for k in still if len(values)]
 
 
-def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
+def _without_doubles(
+    lines: list[DrawnLine], values: np.ndarray, probes, measured
+) -> list[DrawnLine]:
     """Curves of a panel without duplicates: coinciding curves become one curve, which has the places of all in `names`.
 
     A curve with measurements, or with quantities in `alike`, does not become part of another curve.
@@ -103,7 +121,10 @@ def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measure
         own = values[:, line.column]
         for other in result if may_join else ():
             drawn = values[:, other.column]
-            if np.array_equal(np.isnan(drawn), np.isnan(own)) and not (np.abs(drawn - own) > tolerance).any():
+            if (
+                np.array_equal(np.isnan(drawn), np.isnan(own))
+                and not (np.abs(drawn - own) > tolerance).any()
+            ):
                 other.names += line.names
                 break
         else:
@@ -124,7 +145,10 @@ def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
     if not (np.isfinite(a).all() and np.isfinite(b).all() and a[low] < a[high]):
         return False
     scale = (b[high] - b[low]) / (a[high] - a[low])
-    return bool(scale > 0.0 and np.abs(b - b[low] - scale * (a - a[low])).max() <= ALIKE_TOLERANCE * np.ptp(b))
+    return bool(
+        scale > 0.0
+        and np.abs(b - b[low] - scale * (a - a[low])).max() <= ALIKE_TOLERANCE * np.ptp(b)
+    )
 
 
 @style.without_markup
@@ -141,7 +165,9 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     figure = style.figure(0.7 + 2.1 * max(len(drawn), 1) + (0.5 if len(drawn) == 1 else 0.0))
     rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(rows, drawn, strict=False):
-        _panel(axes, t, values, probes, panel.lines, measured or {}, still if axes is rows[-1] else [])
+        _panel(
+            axes, t, values, probes, panel.lines, measured or {}, still if axes is rows[-1] else []
+        )
         style.name_axes(axes, y=f"{panel.quantity.replace('_', ' ')} [{panel.unit}]")
     for axes in rows:
         _shade(axes, t, marks, first=axes is rows[0])
@@ -171,13 +197,26 @@ def envelope_figure(envelope, units, title=""):
         axes.set_visible(False)
     for axes in grid[:, 0]:
         style.name_axes(axes, y=f"head [{units['max_head']}]")
-    figure.supxlabel(f"distance from the start of the pipe [{units['distance']}]", fontsize=8.5, color=style.INK)
+    figure.supxlabel(
+        f"distance from the start of the pipe [{units['distance']}]", fontsize=8.5, color=style.INK
+    )
     handles = {
-        label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        label: handle
+        for axes in grid.flat
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=4, frameon=False, fontsize=8)
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper right",
+        ncols=4,
+        frameon=False,
+        fontsize=8,
+    )
     more = len(envelope) - len(names)
-    style.title(figure, title + (f"\n(the {len(names)} longest of {len(envelope)} pipes)" if more else ""))
+    style.title(
+        figure, title + (f"\n(the {len(names)} longest of {len(envelope)} pipes)" if more else "")
+    )
     return figure
 
 
@@ -196,7 +235,9 @@ def thin_series(t, values, points=MAX_POINTS):
         return t, values
     edges = np.linspace(0, len(t), bins + 1).astype(int)
     low = np.array([a + np.argmin(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
-    high = np.array([a + np.argmax(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    high = np.array(
+        [a + np.argmax(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    )
     picked = np.unique(np.concatenate([[0], low, high, [len(t) - 1]]))
     return t[picked], values[picked]
 
@@ -205,10 +246,15 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.style_axes(axes)
     for i, curve in enumerate(lines[:MAX_LINES]):
         name, colour = probes[curve.column][0], style.COLOURS[i % len(style.COLOURS)]
-        label = textwrap.fill(curve.label, LEGEND_WIDTH, break_long_words=False)  # the legend stays narrow
-        axes.plot(*thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=label)
+        # the legend stays narrow
+        label = textwrap.fill(curve.label, LEGEND_WIDTH, break_long_words=False)
+        axes.plot(
+            *thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=label
+        )
         if name in measured:
-            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured")
+            axes.plot(
+                *measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured"
+            )
     if len(lines) > MAX_LINES:
         axes.plot([], [], " ", label=f"... {len(lines) - MAX_LINES} more in the table")
     if still:
@@ -231,11 +277,23 @@ def _shade(axes, t, marks, first: bool) -> None:
     axes.axvspan(begun, t[-1], color=style.DOUBT, alpha=0.08, linewidth=0)
     axes.axvline(begun, color=style.DOUBT, linewidth=0.8)
     late = begun > 0.5 * (t[0] + t[-1])
-    offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # leaves space for the power of ten of the axis
+    # leaves space for the power of ten of the axis
+    offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4
     if first:
-        place = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "va": "bottom"}
-        axes.annotate(f"not to be trusted from here: {cause}", (begun, 1.0), xytext=(-4 if late else offset, 2),
-                      ha="right" if late else "left", fontsize=7.5, color=style.DOUBT, **place)  # fmt: skip
+        place = {
+            "xycoords": ("data", "axes fraction"),
+            "textcoords": "offset points",
+            "va": "bottom",
+        }
+        axes.annotate(
+            f"not to be trusted from here: {cause}",
+            (begun, 1.0),
+            xytext=(-4 if late else offset, 2),
+            ha="right" if late else "left",
+            fontsize=7.5,
+            color=style.DOUBT,
+            **place,
+        )
 
 
 def _profile(axes, arrays, hilly: bool) -> None:
@@ -269,6 +327,38 @@ def run_up_figure(columns, name, title=""):
     return figure
 
 
+def mark_devices_and_limits(axes, section, window):
+    """Write the limits outside the window of heads at its edges, and the names of devices at their chainages."""
+    red = style.COLOURS[6]
+    for limits, edge in ((window.above, 1), (window.below, 0)):
+        if limits:
+            axes.annotate(
+                "\n".join(limits),
+                (0.97, edge),
+                xycoords="axes fraction",
+                xytext=(0, -22 if edge else 22),
+                textcoords="offset points",
+                ha="right",
+                va="top" if edge else "bottom",
+                fontsize=8,
+                color=red,
+                arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)},
+            )
+    for x in [device.chainage for device in section.devices]:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+    for x, names, stands in section.labels():
+        axes.annotate(
+            short_name(names),
+            (x, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 4),
+            rotation=40,
+            fontsize=7.5,
+            textcoords="offset points",
+            color=style.INK if stands else style.MUTED,
+        )
+
+
 @style.without_markup
 def section_figure(section, window, units, title=""):
     """Figure of heads along a path, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
@@ -281,38 +371,53 @@ def section_figure(section, window, units, title=""):
     for a, b in section.cavity_spans:
         axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
     k, posts = section.drawn_indices(), [device.chainage for device in section.devices]
-    chainage, along = section.chainage[k], {name: values[k] for name, values in section.along.items()}
+    chainage = section.chainage[k]
+    along = {name: values[k] for name, values in section.along.items()}
     high, low = along["max_head"], along["min_head"]
     axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
     axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="maximum head")
     axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="minimum head")
-    axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
-              label="initial head")  # fmt: skip
+    axes.plot(
+        chainage,
+        along["initial_head"],
+        color=style.INK,
+        linewidth=0.9,
+        linestyle=(0, (5, 3)),
+        label="initial head",
+    )
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
     for name, line in section.lines.items():
         look = LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]
         axes.plot(chainage, line[k], label=name, **look)
     if section.cavity_spans:
-        axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
+        axes.fill_between(
+            [], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached"
+        )
     if section.violations:
         at, heads, _ = zip(*section.violations, strict=True)
-        axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
-                  label="limit passed")  # fmt: skip
+        axes.plot(
+            at,
+            heads,
+            "x",
+            color=style.DOUBT,
+            markersize=7,
+            markeredgewidth=2.0,
+            clip_on=False,
+            zorder=5,
+            label="limit passed",
+        )
     axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
     axes.set_ylim(window.low, window.high)
-    red = style.COLOURS[6]
-    for limits, edge in ((window.above, 1), (window.below, 0)):
-        if limits:
-            axes.annotate("\n".join(limits), (0.97, edge), xycoords="axes fraction", xytext=(0, -22 if edge else 22),
-                          textcoords="offset points", ha="right", va="top" if edge else "bottom", fontsize=8,
-                          color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
-    for x in posts:
-        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
-    for x, names, stands in section.labels():
-        axes.annotate(short_name(names), (x, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 4), rotation=40,
-                      fontsize=7.5, textcoords="offset points", color=style.INK if stands else style.MUTED)  # fmt: skip
+    mark_devices_and_limits(axes, section, window)
     style.name_axes(axes, f"chainage [{units['distance']}]", f"head [{units['max_head']}]")
-    figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
+    figure.legend(
+        loc="outside lower center",
+        ncols=4,
+        handlelength=3,
+        frameon=False,
+        fontsize=8,
+        labelcolor=style.INK,
+    )
     style.title(figure, title)
     return figure
 
@@ -325,7 +430,9 @@ def phase_figure(pairs, title=""):
     """
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
-    figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
+    figure = style.figure(
+        0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH
+    )
     grid = figure.subplots(down, across, squeeze=False)
     for axes, (x, y) in zip(grid.flat, pairs, strict=False):
         style.style_axes(axes)

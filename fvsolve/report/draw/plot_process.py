@@ -31,9 +31,12 @@ class Picture(NamedTuple):
 def draw_picture(picture: Picture) -> str:
     """Write a picture so that its file is complete or missing; returns the error text, or "" on success."""
     try:
-        figure = getattr(import_module("fvsolve.report.draw.plot"), picture.function)(**picture.arguments)
+        figure = getattr(import_module("fvsolve.report.draw.plot"), picture.function)(
+            **picture.arguments
+        )
         save(figure, picture.path)
-    except Exception as error:  # a missing picture must not fail the run, whose numbers are complete
+    except Exception as error:
+        # a missing picture must not fail the run, whose numbers are complete
         return f"{type(error).__name__}: {error}"
     return ""
 
@@ -47,14 +50,23 @@ class PlotProcess:
 
     def __init__(self, second_process: bool) -> None:
         self.process = None
-        if not second_process or "matplotlib.figure" in sys.modules or processor_count() < 2 or not sys.executable:
+        if (
+            not second_process
+            or "matplotlib.figure" in sys.modules
+            or processor_count() < 2
+            or not sys.executable
+        ):
             return
         # A process group of its own: Ctrl-C must interrupt only the run, which then reports on pictures.
         options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
         with contextlib.suppress(OSError):  # the system allows no second process
-            self.process = subprocess.Popen(python_command("-m", "fvsolve.report.draw.plot_process"),
-                                            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                            env=python_environment(), **options)  # fmt: skip
+            self.process = subprocess.Popen(
+                python_command("-m", "fvsolve.report.draw.plot_process"),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=python_environment(),
+                **options,
+            )
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
         """Write pictures; returns the error text of each picture that could not be drawn, by its path."""

@@ -67,8 +67,10 @@ class DrawnScene:
     names: list[str] = field(default_factory=list)  # names of pipes
     bodies: list[str] = field(default_factory=list)  # names of bodies by index
     parts: list[DrawnPart] = field(default_factory=list)
-    anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # positions of linked patches [m]
-    walls: list[np.ndarray] = field(default_factory=list)  # faces of walls at their crests: float64[n, 2, 3] [m]
+    # positions of linked patches [m]
+    anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    # faces of walls at their crests: float64[n, 2, 3] [m]
+    walls: list[np.ndarray] = field(default_factory=list)
     plan: str = "given"
     contours: int = 0
     over_run: bool = False
@@ -84,11 +86,13 @@ class DrawnScene:
         return self.length.factor / self.height.factor
 
 
-WATER_VIEW = (0.6, -1.0, 0.75)  # direction from the scene to the observer for basins; x to the right, y away
+# direction from the scene to the observer for basins; x to the right, y away
+WATER_VIEW = (0.6, -1.0, 0.75)
 NETWORK_VIEW = (0.35, -1.0, 1.1)  # direction to the observer for networks
 LARGE_NETWORK_VIEW = (0.2, -1.0, 2.0)  # direction to the observer for large networks
 HEIGHT_SHARE = 0.4  # drawn height of a network as a fraction of its width
-STRAIGHT_TOLERANCE = 1e-6  # width over length up to which a network counts as straight and is drawn in profile
+# width over length up to which a network counts as straight and is drawn in profile
+STRAIGHT_TOLERANCE = 1e-6
 TICK_SPACING = 40.0  # least distance of ticks [points]
 # Distances from an edge: end of ticks, tick labels, axis name [points].
 TICK_LENGTH, LABEL_OFFSET, TITLE_OFFSET = 5.0, 9.0, 42.0
@@ -132,7 +136,9 @@ def choose_projection(points: np.ndarray, large: bool = False, slant: float = 1.
     plan = points[:, :2] - points[0, :2]
     _, widths, axes = np.linalg.svd(plan, full_matrices=False)
     if len(widths) < 2 or widths[1] <= STRAIGHT_TOLERANCE * widths[0]:
-        along = axes[0] * (1.0 if axes[0] @ (plan[-1] if plan[-1].any() else plan.sum(axis=0)) >= 0.0 else -1.0)
+        along = axes[0] * (
+            1.0 if axes[0] @ (plan[-1] if plan[-1].any() else plan.sum(axis=0)) >= 0.0 else -1.0
+        )
         return Projection("profile", along=np.where(np.abs(along) < STRAIGHT_TOLERANCE, 0.0, along))
     if spans[2] <= 1e-9 * max(spans):
         return Projection("plan")
@@ -148,7 +154,9 @@ def round_scale(value: float) -> float:
 
 def box_corners(low, high) -> np.ndarray:
     """Corners of a box : float64[8, 3]; low, high : float64[3]  least and greatest coordinates."""
-    return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    return np.array(
+        [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    )
 
 
 def fit_limits(axes, seen: np.ndarray, margins: tuple[float, float, float, float]) -> None:
@@ -177,7 +185,11 @@ def draw_box(axes, aspect: Projection, low, high, names: tuple[str, str, str]) -
     (x0, y0, z0), (x1, y1, z1) = low, high
     floor = aspect.on_sheet([(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0), (x0, y0, z0)])
     axes.plot(*floor.T, color=style.HAIR, linewidth=0.8, zorder=0)
-    sides = [((x0, y0, z0), (x1, y0, z0)), ((x1, y0, z0), (x1, y1, z0)), ((x0, y0, z0), (x0, y0, z1))]
+    sides = [
+        ((x0, y0, z0), (x1, y0, z0)),
+        ((x1, y0, z0), (x1, y1, z0)),
+        ((x0, y0, z0), (x0, y0, z1)),
+    ]
     middle, texts = floor[:4].mean(axis=0), []
     for axis, (start, end) in enumerate(sides):
         a, b = start[axis], end[axis]
@@ -191,13 +203,25 @@ def draw_box(axes, aspect: Projection, low, high, names: tuple[str, str, str]) -
         pixels = np.linalg.norm(np.diff(axes.transData.transform(ends), axis=0))
         spacing = TICK_SPACING if axis < 2 else 0.6 * TICK_SPACING
         count = max(1, min(6, int(pixels / (axes.figure.dpi / 72.0 * spacing))))
-        ticks, beyond = MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b), 1e-9 * (b - a)
+        ticks = MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b)
+        beyond = 1e-9 * (b - a)
         for tick in [tick for tick in ticks if a - beyond <= tick <= b + beyond]:
             at = ends[0] + (tick - a) / (b - a) * (ends[1] - ends[0])
             texts.append(_write(axes, at, out, f"{tick:.6g}", LABEL_OFFSET, style.INK, 7.5))
-            axes.annotate("", at, xytext=tuple(TICK_LENGTH * out), textcoords="offset points", annotation_clip=False,
-                          arrowprops={"arrowstyle": "-", "color": style.MUTED, "linewidth": 0.8, "shrinkA": 0,
-                                      "shrinkB": 0})  # fmt: skip
+            axes.annotate(
+                "",
+                at,
+                xytext=tuple(TICK_LENGTH * out),
+                textcoords="offset points",
+                annotation_clip=False,
+                arrowprops={
+                    "arrowstyle": "-",
+                    "color": style.MUTED,
+                    "linewidth": 0.8,
+                    "shrinkA": 0,
+                    "shrinkB": 0,
+                },
+            )
         gap = TITLE_OFFSET if axis == 2 else 0.72 * TITLE_OFFSET
         texts.append(_write(axes, ends.mean(axis=0), out, names[axis], gap, style.INK, 8.5))
     return texts
@@ -206,5 +230,15 @@ def draw_box(axes, aspect: Projection, low, high, names: tuple[str, str, str]) -
 def _write(axes, at, out, text: str, gap: float, colour: str, size: float):
     across = "center" if abs(out[0]) < 0.2 else "left" if out[0] > 0.0 else "right"
     upright = "center" if abs(out[1]) < 0.35 else "bottom" if out[1] > 0.0 else "top"
-    return axes.annotate(text, at, xytext=tuple(gap * out), textcoords="offset points", fontsize=size, color=colour,
-                         ha=across, va=upright, annotation_clip=False, zorder=8)  # fmt: skip
+    return axes.annotate(
+        text,
+        at,
+        xytext=tuple(gap * out),
+        textcoords="offset points",
+        fontsize=size,
+        color=colour,
+        ha=across,
+        va=upright,
+        annotation_clip=False,
+        zorder=8,
+    )

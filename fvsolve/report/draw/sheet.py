@@ -39,7 +39,9 @@ def symbol_of(kinds: Sequence[str], link: bool) -> str:
 
     kinds : kind of the part and the kinds from which it is derived, nearest first; link : True for a link
     """
-    return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
+    return next(
+        (SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE
+    )
 
 
 @cache
@@ -49,7 +51,9 @@ def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], boo
     fill : "white", "ink" or "water"
     """
     result: list[tuple[str, list, bool]] = []
-    words, at, fill = symbol.split(), 0, "white"
+    words = symbol.split()
+    at = 0
+    fill = "white"
     while at < len(words):
         word = words[at]
         if word in "*~":
@@ -60,7 +64,13 @@ def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], boo
         elif word == "O":
             x, y, r = map(float, words[at + 1 : at + 4])
             angles = [k * math.pi / 16 for k in range(32)]
-            result.append((fill, [(x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles], True))
+            result.append(
+                (
+                    fill,
+                    [(x + r * math.cos(angle), y + r * math.sin(angle)) for angle in angles],
+                    True,
+                )
+            )
             fill, at = "white", at + 4
         else:
             if word == "M":
@@ -88,8 +98,12 @@ class PictureSheet:
             (wide / SIZE[0], low / high, 1.0 - (wide + 0.25) / SIZE[0], 1.0 - (low + top) / high)
         )
         self._captions = [
-            self.figure.text(0.18 / SIZE[0], 1.0 - 0.14 / high, "", fontsize=11, color=style.INK, va="top"),
-            self.figure.text(0.18 / SIZE[0], 1.0 - 0.38 / high, "", fontsize=8.5, color=style.MUTED, va="top"),
+            self.figure.text(
+                0.18 / SIZE[0], 1.0 - 0.14 / high, "", fontsize=11, color=style.INK, va="top"
+            ),
+            self.figure.text(
+                0.18 / SIZE[0], 1.0 - 0.38 / high, "", fontsize=8.5, color=style.MUTED, va="top"
+            ),
         ]
         for text in self._captions:
             text.set_parse_math(False)
@@ -106,11 +120,15 @@ class PictureSheet:
         from matplotlib.ticker import MaxNLocator
 
         place = self.figure.add_axes((0.3 / SIZE[0], 0.42 / self.high, 0.4, 0.14 / self.high))
-        bar = self.figure.colorbar(ScalarMappable(Normalize(*limits), COLOUR_MAP), cax=place, orientation="horizontal")
+        bar = self.figure.colorbar(
+            ScalarMappable(Normalize(*limits), COLOUR_MAP), cax=place, orientation="horizontal"
+        )
         bar.outline.set_visible(False)
         bar.set_ticks(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(*limits))
         bar.ax.set_xlim(*limits)
-        bar.ax.tick_params(labelsize=8, colors=style.MUTED, labelcolor=style.INK, width=0.6, length=3)
+        bar.ax.tick_params(
+            labelsize=8, colors=style.MUTED, labelcolor=style.INK, width=0.6, length=3
+        )
         bar.ax.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
         bar.ax.set_title(label, fontsize=8.5, color=style.INK, loc="left", pad=4, parse_math=False)
         self.figure.draw_without_rendering()
@@ -129,7 +147,15 @@ class PictureSheet:
         for k, (kind, part) in enumerate(kinds.items()):
             x, y = (k % across) / across + 0.03, 0.9 - (k // across) * 0.26
             draw_symbol(place, symbol_of(part.kinds, part.link), (x, y), half=6.0)
-            place.text(x + 0.03, y, kind.replace("-", " "), fontsize=8, color=style.INK, va="center", parse_math=False)
+            place.text(
+                x + 0.03,
+                y,
+                kind.replace("-", " "),
+                fontsize=8,
+                color=style.INK,
+                va="center",
+                parse_math=False,
+            )
 
     def picture(self) -> np.ndarray:
         """Pixels of the sheet : uint8[height, width, 3]."""
@@ -137,7 +163,9 @@ class PictureSheet:
         return np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMBOL, shift=(0.0, 0.0)) -> None:
+def draw_symbol(
+    axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMBOL, shift=(0.0, 0.0)
+) -> None:
     """Draw a symbol at a point of the axes, rotated to the direction `along` and moved by `shift` [points].
 
     half : half width of the symbol [points]
@@ -151,9 +179,21 @@ def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMB
     transform = moved + ScaledTranslation(at[0], at[1], axes.transData)
     fills = {"white": "white", "ink": style.INK, "water": WATER}
     for fill, points, closed in strokes(symbol):
-        axes.add_patch(Polygon(points, closed=closed, fill=closed, facecolor=fills[fill], edgecolor=style.INK,
-                               linewidth=1.0, joinstyle="round", capstyle="round", transform=transform, zorder=6,
-                               clip_on=False))  # fmt: skip
+        axes.add_patch(
+            Polygon(
+                points,
+                closed=closed,
+                fill=closed,
+                facecolor=fills[fill],
+                edgecolor=style.INK,
+                linewidth=1.0,
+                joinstyle="round",
+                capstyle="round",
+                transform=transform,
+                zorder=6,
+                clip_on=False,
+            )
+        )
 
 
 def colour_range(low: float, high: float) -> tuple[float, float]:
@@ -166,7 +206,9 @@ def colour_range(low: float, high: float) -> tuple[float, float]:
     if most == 0.0:
         return 0.0, 1.0
     if high - low > EVEN_TOLERANCE * most:
-        return tuple(0.0 if abs(end) < ZERO_TOLERANCE * (high - low) else end for end in (low, high))
+        return tuple(
+            0.0 if abs(end) < ZERO_TOLERANCE * (high - low) else end for end in (low, high)
+        )
     middle, half = 0.5 * (low + high), EVEN_RANGE * most or 0.5
     return middle - half, middle + half
 
@@ -191,4 +233,6 @@ def write_animation(stage: Any, count: int, out: Path) -> None:
             imageio.mimsave(fresh, pictures, fps=1000 // FRAME_TIME, macro_block_size=1)
         else:
             drawn = [Image.fromarray(picture).quantize(255) for picture in pictures]
-            drawn[0].save(fresh, save_all=True, append_images=drawn[1:], duration=FRAME_TIME, loop=0)
+            drawn[0].save(
+                fresh, save_all=True, append_images=drawn[1:], duration=FRAME_TIME, loop=0
+            )

@@ -13,10 +13,16 @@ DEFAULT_EXTENT = 10.0  # drawn extent of larger or unbounded regions
 LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of the amplification factor |R| of a step
 SHADES = ("#0b6aa8", "#3f8abc", "#74abd0", "#a9cce3", "#d6e7f2")
 VERDICT_COLOURS = {
-    "stable": "#12876f", "ringing": "#e0b13c", "coarse": "#8fc4e8", "wrong": "#8a4fa3", "blown up": "#c2410c",
-    "refused": "#6b7785", "not run": "#eef1f4",
-}  # fmt: skip
-DARK_VERDICTS = ("stable", "wrong", "blown up", "refused")  # verdicts with dark colours, labelled in white
+    "stable": "#12876f",
+    "ringing": "#e0b13c",
+    "coarse": "#8fc4e8",
+    "wrong": "#8a4fa3",
+    "blown up": "#c2410c",
+    "refused": "#6b7785",
+    "not run": "#eef1f4",
+}
+# verdicts with dark colours, labelled in white
+DARK_VERDICTS = ("stable", "wrong", "blown up", "refused")
 
 
 @style.without_markup
@@ -57,11 +63,18 @@ def _window(r: Callable) -> tuple[float, float, float]:
     edge = stable[1:, 1:] != stable[:-1, 1:]
     edge |= stable[1:, 1:] != stable[1:, :-1]
     rows, columns = np.nonzero(edge)
-    if not len(rows) or max(np.abs(wide[rows]).max(), np.abs(wide[columns]).max()) > 0.95 * MAX_EXTENT:
+    if (
+        not len(rows)
+        or max(np.abs(wide[rows]).max(), np.abs(wide[columns]).max()) > 0.95 * MAX_EXTENT
+    ):
         return -DEFAULT_EXTENT, DEFAULT_EXTENT, DEFAULT_EXTENT
-    left, right, high = wide[columns].min(), wide[columns].max(), np.abs(wide[rows]).max()
+    left = wide[columns].min()
+    right = wide[columns].max()
+    high = np.abs(wide[rows]).max()
     pad = 0.15 * max(right - left, 2.0 * high)
-    left, right, high = min(left - pad, -pad), max(right + pad, pad), high + pad
+    left = min(left - pad, -pad)
+    right = max(right + pad, pad)
+    high = high + pad
     spare = max(0.0, high - 0.5 * (right - left))
     return left - spare, right + spare, high
 
@@ -72,7 +85,9 @@ def _amplification(r: Callable, x, y):
 
 
 @style.without_markup
-def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""):
+def spectrum_figure(
+    r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""
+):
     """Figure of eigenvalues times the time step over the stability region |R(s)| <= 1.
 
     r : stability function R; values : eigenvalues times the time step
@@ -83,21 +98,32 @@ def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = 
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     if field is not None:
         closed = np.append(field, field[:1])
-        axes.plot(closed.real, closed.imag, color=style.COLOURS[2], linewidth=1.2, label="field of values")
+        axes.plot(
+            closed.real, closed.imag, color=style.COLOURS[2], linewidth=1.2, label="field of values"
+        )
     inside = (values.real >= low[0]) & (values.real <= high[0]) & (np.abs(values.imag) <= high[1])
-    axes.plot(values.real, values.imag, ".", color=style.COLOURS[1], markersize=4, label="eigenvalues")
+    axes.plot(
+        values.real, values.imag, ".", color=style.COLOURS[1], markersize=4, label="eigenvalues"
+    )
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     far = int(np.sum(~inside))
     axes.legend(
-        loc="upper left", fontsize=8, framealpha=0.9, edgecolor=style.HAIR, labelcolor=style.INK,
-        title=f"{far} of {values.size} eigenvalues lie outside" if far else None, title_fontsize=8,
-    )  # fmt: skip
+        loc="upper left",
+        fontsize=8,
+        framealpha=0.9,
+        edgecolor=style.HAIR,
+        labelcolor=style.INK,
+        title=f"{far} of {values.size} eigenvalues lie outside" if far else None,
+        title_fontsize=8,
+    )
     return figure
 
 
 @style.without_markup
-def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", note: str = ""):
+def response_figure(
+    w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", note: str = ""
+):
     """Bode plot of a response h over frequency, with the real part Re h below.
 
     Bands with Re h < 0 are shaded; poles on the imaginary axis are dotted lines.
@@ -112,16 +138,24 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
     shown = np.isfinite(h)
     values = np.where(shown, h, np.nan)
     phase = np.degrees(np.angle(values))
-    phase = np.where(phase < -179.999, 180.0, phase)  # rounding at -180 degrees must not draw a jump
+    # rounding at -180 degrees must not draw a jump
+    phase = np.where(phase < -179.999, 180.0, phase)
     real = np.where(np.abs(values.real) > tolerance * np.abs(values), values.real, 0.0)
     for ax, line in zip(axes, (np.abs(values), phase, real), strict=True):
         style.style_axes(ax)
         for pole in poles:
-            ax.axvline(pole / (2.0 * np.pi), color=style.DOUBT, linewidth=0.9, linestyle=(0, (1, 2)))
+            ax.axvline(
+                pole / (2.0 * np.pi), color=style.DOUBT, linewidth=0.9, linestyle=(0, (1, 2))
+            )
         ax.plot(frequency, line, color=style.COLOURS[0], linewidth=1.2)
         for low, high in dips:
-            ax.axvspan(max(low / (2.0 * np.pi), frequency[0]), min(high / (2.0 * np.pi), frequency[-1]),
-                        color=style.DOUBT, alpha=0.25, linewidth=0.8)  # fmt: skip
+            ax.axvspan(
+                max(low / (2.0 * np.pi), frequency[0]),
+                min(high / (2.0 * np.pi), frequency[-1]),
+                color=style.DOUBT,
+                alpha=0.25,
+                linewidth=0.8,
+            )
     axes[0].set_xscale("log")
     _logarithmic(axes[0], np.abs(values))
     style.name_axes(axes[0], y=f"|{name}|  [{unit}]")
@@ -140,7 +174,9 @@ def _logarithmic(axes, size) -> None:
         return
     axes.set_yscale("log")
     axes.set_ylim(max(0.8 * least, 1e-6 * top), 1.25 * top)
-    axes.tick_params(axis="y", which="minor", labelsize=6.5, colors=style.MUTED, labelcolor=style.MUTED)
+    axes.tick_params(
+        axis="y", which="minor", labelsize=6.5, colors=style.MUTED, labelcolor=style.MUTED
+    )
 
 
 def _phase(axes, phase) -> None:
@@ -149,7 +185,9 @@ def _phase(axes, phase) -> None:
         axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     least, greatest = np.nanmin(phase), np.nanmax(phase)
     axes.set_ylim(min(-100.0, least - 10.0), max(100.0, greatest + 10.0))
-    axes.set_yticks([x for x in range(-180, 181, 45) if axes.get_ylim()[0] <= x <= axes.get_ylim()[1]])
+    axes.set_yticks(
+        [x for x in range(-180, 181, 45) if axes.get_ylim()[0] <= x <= axes.get_ylim()[1]]
+    )
     style.name_axes(axes, y="phase [deg]")
 
 
@@ -185,7 +223,9 @@ def failure_map_figure(result, title: str = "", head: str = ""):
     predicted stability limit. head : label of the columns if they are values of a key
     """
     tall = 0.30 * len(result.methods)
-    figure = style.figure(1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values)))
+    figure = style.figure(
+        1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values))
+    )
     panels = figure.subplots(len(result.schemes), 1, squeeze=False)[:, 0]
     for axes, scheme in zip(panels, result.schemes, strict=True):
         _panel(axes, result, scheme)
@@ -199,7 +239,9 @@ def failure_map_figure(result, title: str = "", head: str = ""):
 def column_labels(result) -> list[str]:
     """Labels of the columns of a failure map: time steps, with Courant numbers on a second line, or values of a key."""
     if result.key != "step":
-        return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in result.values]
+        return [
+            f"{value:.4g}" if isinstance(value, float) else str(value) for value in result.values
+        ]
     if not result.wave_rate:
         return [time_text(value) for value in result.values]
     return [f"{time_text(value)}\nC {value * result.wave_rate:.3g}" for value in result.values]
@@ -219,19 +261,37 @@ def _panel(axes, result, scheme: str) -> None:
     for row, method in enumerate(result.methods):
         squares = result.row(scheme, method)
         for square in squares:
-            colour, hatch = VERDICT_COLOURS[square.verdict], "////" if square.verdict == "not run" else None
+            colour = VERDICT_COLOURS[square.verdict]
+            hatch = "////" if square.verdict == "not run" else None
             corner = square.column - 0.5, row - 0.5
-            axes.add_patch(Rectangle(corner, 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2))
+            axes.add_patch(
+                Rectangle(corner, 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2)
+            )
             ink = "white" if square.verdict in DARK_VERDICTS else style.INK
             error = square.measures.error
             if math.isfinite(error) and square.verdict not in ("blown up", "refused", "not run"):
                 error_text = f"{100 * error:.2g} %"
-                axes.text(square.column, row, error_text, ha="center", va="center", fontsize=6.5, color=ink)
+                axes.text(
+                    square.column,
+                    row,
+                    error_text,
+                    ha="center",
+                    va="center",
+                    fontsize=6.5,
+                    color=ink,
+                )
         place = limit_place(result, squares)
         if place is not None:
             look = "dotted" if scheme in result.limited else "solid"
             for start in (row - 0.5, row + 0.24):  # leaves the number free
-                axes.plot([place] * 2, [start, start + 0.26], color=style.INK, lw=2.2, linestyle=look, zorder=3)
+                axes.plot(
+                    [place] * 2,
+                    [start, start + 0.26],
+                    color=style.INK,
+                    lw=2.2,
+                    linestyle=look,
+                    zorder=3,
+                )
     axes.set_xlim(-0.55, len(result.values) - 0.45)
     axes.set_ylim(len(result.methods) - 0.45, -0.55)
     axes.set_xticks(range(len(result.values)), column_labels(result))
@@ -269,11 +329,23 @@ def _legend(figure, result) -> None:
     from matplotlib.patches import Patch
 
     seen = {square.verdict for square in result.squares}
-    handles = [Patch(facecolor=colour, label=word, hatch="////" if word == "not run" else None)
-               for word, colour in VERDICT_COLOURS.items() if word in seen]  # fmt: skip
+    handles = [
+        Patch(facecolor=colour, label=word, hatch="////" if word == "not run" else None)
+        for word, colour in VERDICT_COLOURS.items()
+        if word in seen
+    ]
     looks = {"dotted" if scheme in result.limited else "solid" for scheme in result.schemes}
-    labels = {"solid": "predicted limit", "dotted": "predicted limit, with the weights of smooth flow"}
+    labels = {
+        "solid": "predicted limit",
+        "dotted": "predicted limit, with the weights of smooth flow",
+    }
     for look in [look for look in labels if look in looks]:
         handles.append(Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=labels[look]))
-    figure.legend(handles=handles, loc="outside lower left", ncols=5 if len(result.values) > 8 else 3, frameon=False,
-                  fontsize=8, labelcolor=style.INK)  # fmt: skip
+    figure.legend(
+        handles=handles,
+        loc="outside lower left",
+        ncols=5 if len(result.values) > 8 else 3,
+        frameon=False,
+        fontsize=8,
+        labelcolor=style.INK,
+    )

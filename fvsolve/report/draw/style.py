@@ -36,8 +36,12 @@ def without_markup(make: Callable) -> Callable:
         from matplotlib.ticker import LogFormatter
 
         figure = make(*arguments, **keywords)
-        powers = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
-                  if isinstance(axis.get_major_formatter(), LogFormatter)]  # fmt: skip
+        powers = [
+            axis
+            for axes in figure.axes
+            for axis in (axes.xaxis, axes.yaxis)
+            if isinstance(axis.get_major_formatter(), LogFormatter)
+        ]
         markup = {text for axis in powers for text in axis.findobj(Text) if text is not axis.label}
         for text in set(figure.findobj(Text)) - markup:
             text.set_parse_math(False)  # `text.set` would list all properties of its class
@@ -83,8 +87,15 @@ def label_decades(axes) -> None:
 def legend(axes) -> None:
     """Draw the legend to the right of the axes, where it does not cover any curve. Without labels nothing is drawn."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, fontsize=8, labelcolor=INK,
-                    handlelength=1.4, borderaxespad=0.0)  # fmt: skip
+        axes.legend(
+            loc="upper left",
+            bbox_to_anchor=(1.005, 1.02),
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+            handlelength=1.4,
+            borderaxespad=0.0,
+        )
 
 
 def cut_title(text: str) -> str:

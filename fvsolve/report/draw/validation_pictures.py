@@ -10,7 +10,9 @@ from fvsolve.report.draw import style
 
 COLUMNS = 2  # panels side by side
 INKS = {"light": (style.INK, style.MUTED, style.HAIR), "dark": ("#e8edf2", "#9aa7b4", "#3a4550")}
-MEASURED, COMPUTED, EXACT = style.COLOURS[1], style.COLOURS[0], style.COLOURS[2]
+MEASURED = style.COLOURS[1]
+COMPUTED = style.COLOURS[0]
+EXACT = style.COLOURS[2]
 
 
 class LinePanel(NamedTuple):
@@ -47,7 +49,11 @@ def validation_figure(panels: Sequence[LinePanel], rows: Sequence[ValueRow], the
         grid = next(places).add_gridspec(lines, COLUMNS)
         for k, panel in enumerate(panels):
             alone = k == len(panels) - 1 and k % COLUMNS == 0
-            axes.append(grid.figure.add_subplot(grid[k // COLUMNS, :] if alone else grid[k // COLUMNS, k % COLUMNS]))
+            axes.append(
+                grid.figure.add_subplot(
+                    grid[k // COLUMNS, :] if alone else grid[k // COLUMNS, k % COLUMNS]
+                )
+            )
             draw_lines(axes[-1], panel)
     if rows:
         axes.append(next(places).subplots())
@@ -61,7 +67,13 @@ def validation_figure(panels: Sequence[LinePanel], rows: Sequence[ValueRow], the
             spine.set_color(muted)
         ax.grid(True, color=hair, linewidth=0.5)
         legend = ax.get_legend()
-        for text in (ax.title, ax._left_title, ax.xaxis.label, *ax.texts, *(legend.get_texts() if legend else ())):
+        for text in (
+            ax.title,
+            ax._left_title,
+            ax.xaxis.label,
+            *ax.texts,
+            *(legend.get_texts() if legend else ()),
+        ):
             text.set_color(ink)
     return figure
 
@@ -78,10 +90,19 @@ def draw_lines(axes, panel: LinePanel) -> None:
             axes.loglog(x, y, "o-", markersize=3.5, linewidth=1.2, label=name)
         elif name == "measured":
             step = max(1, len(x) // 160)
-            axes.plot(x[::step], y[::step], "o", color=MEASURED, markersize=2.6, label=name, zorder=3)
+            axes.plot(
+                x[::step], y[::step], "o", color=MEASURED, markersize=2.6, label=name, zorder=3
+            )
         elif name in ("computed", "exact"):
             dash = {"linestyle": "--", "zorder": 3} if name == "exact" else {}
-            axes.plot(x, y, color=EXACT if name == "exact" else COMPUTED, linewidth=1.5, label=name, **dash)
+            axes.plot(
+                x,
+                y,
+                color=EXACT if name == "exact" else COMPUTED,
+                linewidth=1.5,
+                label=name,
+                **dash,
+            )
         else:
             axes.plot(x, y, color=next(others, style.MUTED), linewidth=0.9, label=name)
     if panel.logarithmic:
@@ -116,19 +137,33 @@ def draw_values(axes, rows: Sequence[ValueRow]) -> None:
                 solid_capstyle="round",
             )
         for value in row.others:
-            axes.plot(place(value), k, "|", color=style.COLOURS[3], markersize=11, markeredgewidth=1.6)
-        axes.plot([place(row.value - row.error), place(row.value + row.error)], [k, k], color=COMPUTED, linewidth=1.2)
-        axes.plot(place(row.value), k, "o" if row.passes else "X", color=COMPUTED, markersize=6, zorder=4)
+            axes.plot(
+                place(value), k, "|", color=style.COLOURS[3], markersize=11, markeredgewidth=1.6
+            )
+        axes.plot(
+            [place(row.value - row.error), place(row.value + row.error)],
+            [k, k],
+            color=COMPUTED,
+            linewidth=1.2,
+        )
+        axes.plot(
+            place(row.value), k, "o" if row.passes else "X", color=COMPUTED, markersize=6, zorder=4
+        )
         axes.text(1.01, k, f"{row.value:.4g} {row.unit}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [textwrap.fill(row.what, 44) for row in rows])
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xticks([0.25, 0.75], ["least that passes", "greatest that passes"])
-    marks = {"computed, with numerical error": {"marker": "o", "color": COMPUTED},
-             "gate": {"color": EXACT, "alpha": 0.18, "linewidth": 7},
-             "measured": {"color": MEASURED, "alpha": 0.7, "linewidth": 5},
-             "other codes": {"marker": "|", "color": style.COLOURS[3], "linestyle": "", "markersize": 9}}  # fmt: skip
-    shown = {"measured": any(row.measured is not None for row in rows), "other codes": any(row.others for row in rows)}
+    marks = {
+        "computed, with numerical error": {"marker": "o", "color": COMPUTED},
+        "gate": {"color": EXACT, "alpha": 0.18, "linewidth": 7},
+        "measured": {"color": MEASURED, "alpha": 0.7, "linewidth": 5},
+        "other codes": {"marker": "|", "color": style.COLOURS[3], "linestyle": "", "markersize": 9},
+    }
+    shown = {
+        "measured": any(row.measured is not None for row in rows),
+        "other codes": any(row.others for row in rows),
+    }
     for name, mark in marks.items():
         if shown.get(name, True):
             axes.plot([], [], label=name, **mark)

@@ -32,15 +32,21 @@ def view(scene: DrawnScene, out: Path) -> None:
     """
     animated = len(scene.frames) > 1
     if animated and out.suffix not in (".gif", ".mp4"):
-        raise FvsolveError(f"{out.name} is not an animation; expected a file name that ends in .gif or .mp4")
+        raise FvsolveError(
+            f"{out.name} is not an animation; expected a file name that ends in .gif or .mp4"
+        )
     if out.suffix == ".html" and scene.pipes:
-        raise FvsolveError(f"{out.name}: only basins and bodies are drawn as a page; expected .png, .svg or .pdf")
+        raise FvsolveError(
+            f"{out.name}: only basins and bodies are drawn as a page; expected .png, .svg or .pdf"
+        )
     if out.suffix == ".mp4" and animated:
         try:
             import imageio  # noqa: F401
             import imageio_ffmpeg  # noqa: F401
         except ImportError:
-            raise FvsolveError(f"an .mp4 cannot be written: a package is missing; {ANIMATION_FORMATS}") from None
+            raise FvsolveError(
+                f"an .mp4 cannot be written: a package is missing; {ANIMATION_FORMATS}"
+            ) from None
     if scene.pipes:
         from fvsolve.report.draw.network_picture import NetworkPicture
         from fvsolve.report.draw.sheet import write_animation
@@ -57,8 +63,12 @@ def _draw_in_process(scene: DrawnScene, out: Path) -> None:
     if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     request = pickle.dumps((scene, str(out)))
-    done = subprocess.run(python_command("-m", "fvsolve.report.draw.field_canvas"), env=environment, input=request,
-                          capture_output=True)  # fmt: skip
+    done = subprocess.run(
+        python_command("-m", "fvsolve.report.draw.field_canvas"),
+        env=environment,
+        input=request,
+        capture_output=True,
+    )
     output = done.stderr.decode(errors="replace")
     if lost := re.search(r"No module named '(?:pyvista|vtk).*'", output):
         raise FvsolveError(NO_PYVISTA.format(lost[0]))
@@ -66,4 +76,6 @@ def _draw_in_process(scene: DrawnScene, out: Path) -> None:
         raise FvsolveError(REMEDY)
     if done.returncode:
         last = (output.strip().splitlines() or ["no message"])[-1]
-        raise FvsolveError(last if last.startswith("unknown field") else f"{out} could not be drawn: {last}")
+        raise FvsolveError(
+            last if last.startswith("unknown field") else f"{out} could not be drawn: {last}"
+        )

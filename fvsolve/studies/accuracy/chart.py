@@ -53,7 +53,13 @@ from fvsolve.studies.outcome import (
 )
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import Reference, find_reference
-from fvsolve.studies.resolution import as_cells, basins_from_files, cells_for_lines, delay_lines, fixed_choices
+from fvsolve.studies.resolution import (
+    as_cells,
+    basins_from_files,
+    cells_for_lines,
+    delay_lines,
+    fixed_choices,
+)
 from fvsolve.studies.result_cache import ResultCache
 
 WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
@@ -61,14 +67,29 @@ WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 @declared("study")
 @validated(
-    schemes=NAMES, methods=NAMES, cells=NUMBERS, rtol=NUMBERS, step=NUMBERS, target=NUMBER, out=PATH, **STUDY_ARGUMENTS
+    schemes=NAMES,
+    methods=NAMES,
+    cells=NUMBERS,
+    rtol=NUMBERS,
+    step=NUMBERS,
+    target=NUMBER,
+    out=PATH,
+    **STUDY_ARGUMENTS,
 )
 def chart(
-    case, set: Mapping | None = None, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
-    cells: Sequence[int] | None = None, rtol: Sequence[float] | None = None, step: Sequence[float] | None = None,
-    target: float | None = None, out: str | Path | None = None, progress: Progress | None = None, jobs: int = 1,
+    case,
+    set: Mapping | None = None,
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    cells: Sequence[int] | None = None,
+    rtol: Sequence[float] | None = None,
+    step: Sequence[float] | None = None,
+    target: float | None = None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    jobs: int = 1,
     dask: str | None = None,
-) -> Chart:  # fmt: skip
+) -> Chart:
     """Run a case with all combinations of schemes, methods and cells (or tolerances); compare errors with their cost.
 
     schemes, methods : names (default a selection)
@@ -84,7 +105,9 @@ def chart(
     base_case, report = load(case, set), progress or (lambda *_: None)
     base_case = load(base_case, fixed_choices(base_case)) if fixed_choices(base_case) else base_case
     with ResultCache(out) as points, RunQueue(base_case, jobs, dask) as queue:
-        return _ChartStudy(base_case, points, report, queue).run(schemes, methods, cells, rtol, step, target)
+        return _ChartStudy(base_case, points, report, queue).run(
+            schemes, methods, cells, rtol, step, target
+        )
 
 
 class _ChartStudy:
@@ -94,7 +117,9 @@ class _ChartStudy:
     Raises FvsolveError if the mesh of a basin comes from a file.
     """
 
-    def __init__(self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue) -> None:
+    def __init__(
+        self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue
+    ) -> None:
         self.case, self.queue = case, queue
         if basins_from_files(self.case):
             reason = f"chart refines cells, but the mesh of {listing(basins_from_files(self.case))} is a file"
@@ -114,7 +139,9 @@ class _ChartStudy:
             coarse_case = self.case if main_part_name(self.case) else self.case_in_cells
             # cached, so that a repeated study has the same numbers of cells
             key = {"study": "chart", "coarse": True}
-            self.coarse = CoarseRun(**self.points.get(self.case, key, lambda: asdict(run_coarse(coarse_case))))
+            self.coarse = CoarseRun(
+                **self.points.get(self.case, key, lambda: asdict(run_coarse(coarse_case)))
+            )
             self.compiling += self.coarse.compile_seconds
         self.all = chart_settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
@@ -127,12 +154,25 @@ class _ChartStudy:
             points = self.add_coarser(points, target)
         if all(point.trajectory < least for point in points if point.ok):
             raise FvsolveError(_useless_text(self.case, points, floor))
-        rows = [front_row(points, entry, least, self.default) for entry in target_powers(good_errors(points), least)]
+        rows = [
+            front_row(points, entry, least, self.default)
+            for entry in target_powers(good_errors(points), least)
+        ]
         target_setting = None if target is None else self.reach_target(points, target, floor)
         return Chart(
-            self.case.name, points, floor["reference"], floor["second"], floor, self.default, self.compiling, rows,
-            self.points.reused, target_setting, tuple(floor["told"]), tuple(unsupported_schemes(self.case, schemes)),
-        )  # fmt: skip
+            self.case.name,
+            points,
+            floor["reference"],
+            floor["second"],
+            floor,
+            self.default,
+            self.compiling,
+            rows,
+            self.points.reused,
+            target_setting,
+            tuple(floor["told"]),
+            tuple(unsupported_schemes(self.case, schemes)),
+        )
 
     @cached_property
     def reference(self) -> Reference:
@@ -145,12 +185,17 @@ class _ChartStudy:
             self.compiling += self.compile(setting)
         stiff = self.coarse is not None and self.coarse.stiff
         reference = find_reference(
-            self.case, self.finest_keys(), stiff=stiff,
-            progress=lambda name: self.progress(self.done, self.total, f"reference {name}"), queue=self.queue,
-        )  # fmt: skip
+            self.case,
+            self.finest_keys(),
+            stiff=stiff,
+            progress=lambda name: self.progress(self.done, self.total, f"reference {name}"),
+            queue=self.queue,
+        )
         if not moving_probes(reference.run, reference):
             reason = "all probes are constant, so errors relative to their ranges do not exist"
-            raise FvsolveError(f"{self.case.name}: {reason}; try a probe that changes, or a longer run")
+            raise FvsolveError(
+                f"{self.case.name}: {reason}; try a probe that changes, or a longer run"
+            )
         return reference
 
     def finest_keys(self) -> dict | None:
@@ -163,7 +208,9 @@ class _ChartStudy:
         main = main_part_name(self.case) or main_part_name(self.case_in_cells)
         cells = self.finest or max(self.coarse.levels)
         keys = cell_keys(self.case, cells) if self.finest else {}
-        return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
+        return keys | cells_for_lines(
+            self.case, self.case.links[main].length / self.case.wave_speed(main) / cells
+        )
 
     def floor(self) -> dict:
         """Uncertainty of the reference (see `Reference`), as plain data with the keys of `Distance`.
@@ -173,7 +220,11 @@ class _ChartStudy:
 
         def make() -> dict:
             reference = self.reference
-            texts = {"reference": reference.words, "second": reference.second, "told": reference.failures}
+            texts = {
+                "reference": reference.words,
+                "second": reference.second,
+                "told": reference.failures,
+            }
             return texts | asdict(reference.uncertainty)
 
         floor = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
@@ -185,14 +236,20 @@ class _ChartStudy:
         if self.queue.in_process:
             return
         by_cost = sorted(self.all, key=lambda setting: (setting.cells or 0, -setting.size))
-        new = [setting for setting in by_cost if self.points.find(self.case, self.cache_key(setting)) is None]
+        new = [
+            setting
+            for setting in by_cost
+            if self.points.find(self.case, self.cache_key(setting)) is None
+        ]
         if not new:
             return
         self.reference  # noqa: B018  computes the reference first, with runs of its own
         requests = [RunRequest(best_run_of, setting.keys) for setting in new]
         for count, at in enumerate(self.queue.run_ahead(requests), 1):
             self.progress(self.done + count, self.total, f"{new[at].name}, {new[at].fineness}")
-            self.points.get(self.case, self.cache_key(new[at]), lambda setting=new[at]: self.measure(setting))
+            self.points.get(
+                self.case, self.cache_key(new[at]), lambda setting=new[at]: self.measure(setting)
+            )
 
     def cache_key(self, setting: MethodSetting) -> dict:
         """Values that identify the cached result of a setting."""
@@ -207,9 +264,13 @@ class _ChartStudy:
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
         given_up = self.given_up
         if setting.curve in given_up:
-            data = empty_point(f"not run: the run with {given_up[setting.curve]} was already given up")
+            data = empty_point(
+                f"not run: the run with {given_up[setting.curve]} was already given up"
+            )
         else:
-            data = self.points.get(self.case, self.cache_key(setting), lambda: self.measure(setting))
+            data = self.points.get(
+                self.case, self.cache_key(setting), lambda: self.measure(setting)
+            )
         self.done += 1
         if data["reason"].startswith(GIVEN_UP) and cost_grows(setting):
             given_up[setting.curve] = setting.fineness
@@ -241,13 +302,15 @@ class _ChartStudy:
 
     def measure(self, setting: MethodSetting) -> dict:
         """Results of the run of a setting, as fields of `Point`: errors and cost, or the reason of a failure."""
-        reference, run = self.reference, self.queue(self.case, RunRequest(best_run_of, setting.keys))
+        reference = self.reference
+        run = self.queue(self.case, RunRequest(best_run_of, setting.keys))
         if run.refused:
             return empty_point(run.reason)
         errors = asdict(distance(run, reference))
         ok, reason = run.ok, run.reason
         if ok and not errors["trajectory"] <= WRONG_ERROR:
-            ok, reason = False, f"wrong: the error is {errors['trajectory']:.3g} times the range of {errors['worst']}"
+            ok = False
+            reason = f"wrong: the error is {errors['trajectory']:.3g} times the range of {errors['worst']}"
         cost = {"seconds": run.processor, "rhs": run.counts["rhs"], "updates": run.cell_updates}
         return {"ok": ok, "reason": reason, **errors, **cost, "steps": run.counts["steps"]}
 
@@ -265,9 +328,17 @@ class _ChartStudy:
             )
         best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:
-            remedy = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
+            remedy = (
+                "more cells"
+                if self.finest
+                else "shorter steps"
+                if self.coarse
+                else "a smaller rtol"
+            )
             least = f"{min(good_errors(points)):.2g}"
-            raise FvsolveError(f"no setting reaches an error of {target:g}; the least error is {least}; try {remedy}")
+            raise FvsolveError(
+                f"no setting reaches an error of {target:g}; the least error is {least}; try {remedy}"
+            )
         name, crossing = best
         curve = curves_by_name(points)[name]
         for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
@@ -305,7 +376,11 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
         folder = None if case.path is None else case.path.resolve().parent
         below = folder is not None and path.is_relative_to(folder)
         keys["numerics.method"] = path.relative_to(folder).as_posix() if below else str(path)
-    numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
+    numerics = {
+        key.removeprefix("numerics."): value
+        for key, value in keys.items()
+        if key.startswith("numerics.")
+    }
     others = {key: value for key, value in keys.items() if not key.startswith("numerics.")}
     return TargetSetting(target, point, numerics, others)
 
@@ -313,11 +388,17 @@ def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
 def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
     """Message if all errors are below the difference of the two references; floor : as from `_ChartStudy.floor`."""
     least = min(good_errors(points), default=math.nan)
-    errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
+    errors = (
+        f"all errors (least {least:.2g})"
+        if math.isfinite(least)
+        else "any useful error, and no run succeeded"
+    )
     remedy = "a larger --rtol"
     if main_part_name(case):
         remedy = "fewer --cells (references have four times the cells of the finest run)"
     elif delay_lines(case):
         remedy = "a larger --step (if delay lines are exact, any step is accurate)"
-    return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
-            f"{floor['trajectory']:.2g}, more than {errors}; try {remedy}, or an earlier end of the run")  # fmt: skip
+    return (
+        f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
+        f"{floor['trajectory']:.2g}, more than {errors}; try {remedy}, or an earlier end of the run"
+    )

@@ -35,7 +35,8 @@ from fvsolve.studies.resolution import (
     total_cells,
 )
 
-IMPLICIT_RTOL = 1e-4  # rtol of implicit methods with cells: their steps follow the solution, not the cell size
+# rtol of implicit methods with cells: their steps follow the solution, not the cell size
+IMPLICIT_RTOL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,9 @@ class MethodSetting:
     @property
     def fineness(self) -> str:
         """Resolution in words, such as `200 cells` or `rtol 1e-06`."""
-        return f"{self.cells} cells" if self.cells is not None else f"{self.control} {self.size:.3g}"
+        return (
+            f"{self.cells} cells" if self.cells is not None else f"{self.control} {self.size:.3g}"
+        )
 
 
 def main_part_name(case: Case) -> str | None:
@@ -106,7 +109,11 @@ def cell_keys(case: Case, cells: int) -> dict:
         changed["numerics.cell_time"] = pipes[main_part].length / case.wave_speed(main_part) / cells
     elif len(stated) < len(pipes):
         unstated = [pipe for name, pipe in pipes.items() if name not in stated]
-        travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes.items() if name not in stated)
+        travel = max(
+            pipe.length / case.wave_speed(name)
+            for name, pipe in pipes.items()
+            if name not in stated
+        )
         changed["numerics.cell_time"] = travel / (max(pipe.cells for pipe in unstated) * factor)
     return changed
 
@@ -115,7 +122,13 @@ def cells_setting(case: Case, scheme: str, method: str, cells: int) -> MethodSet
     """Setting of a case with cells: Courant number 0.9, 1 for upwind with Euler, or a tolerance with error control."""
     by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"
-    size = IMPLICIT_RTOL if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
+    size = (
+        IMPLICIT_RTOL
+        if by_error
+        else 1.0
+        if (scheme, method) == ("upwind", "euler")
+        else DEFAULT_COURANT
+    )
     settings = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
     return MethodSetting(scheme, method, control, size, cells, settings | cell_keys(case, cells))
 
@@ -127,7 +140,9 @@ def lumped_setting(method: str, size: float, control: str | None = None) -> Meth
     control : "rtol" or "step"; if None a tolerance, or a step for methods without an error estimate
     """
     control = control or ("rtol" if is_adaptive(method) else "step")
-    return MethodSetting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
+    return MethodSetting(
+        None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size}
+    )
 
 
 def is_adaptive(method: str) -> bool:
@@ -136,15 +151,20 @@ def is_adaptive(method: str) -> bool:
 
 
 DEFAULT_SCHEMES = ("upwind", "muscl", "upwind5", "weno5")
-EXPLICIT_METHODS, IMPLICIT_METHOD, IMPLICIT_SCHEME = ("ssp-rk3", "rk4", "dormand-prince"), "rodas-5p", "upwind5"
+EXPLICIT_METHODS = ("ssp-rk3", "rk4", "dormand-prince")
+IMPLICIT_METHOD = "rodas-5p"
+IMPLICIT_SCHEME = "upwind5"
 LUMPED_METHODS = ("rk4", "bogacki-shampine", "dormand-prince", "radau-iia-5", "rodas-5p", AUTO)
 DELAY_LINE_METHODS = ("euler", "trapezoid", "ssp-rk3", "rk4")
-TRAVEL_PARTS = tuple(4 * 2**k for k in range(8))  # steps, about, per travel time of the slowest delay line
+# steps, about, per travel time of the slowest delay line
+TRAVEL_PARTS = tuple(4 * 2**k for k in range(8))
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(2, 11))
-STEP_COUNTS = tuple(32 * 4**k for k in range(7))  # numbers of steps of methods without an error estimate
+# numbers of steps of methods without an error estimate
+STEP_COUNTS = tuple(32 * 4**k for k in range(7))
 LEVEL_COUNT, MAX_CELLS = 5, 400
 MAX_WORK = 1e7  # greatest number of cells times steps of the finest run
-STIFFNESS_RATIO = 3.0  # a case is stiff above this ratio of its steps to those for Courant number 0.9
+# a case is stiff above this ratio of its steps to those for Courant number 0.9
+STIFFNESS_RATIO = 3.0
 CELL_TIME = 1e-8  # usual time of one call of the rates for one cell [s]
 
 
@@ -200,12 +220,19 @@ def run_coarse(case: Case) -> CoarseRun:
     waves, compile_time = span * float(model.wave_rate) / DEFAULT_COURANT, compile_seconds(model)
     result = best_run(model, most=1)
     fraction = (result.t - case.numerics.start) / span  # less than 1 if the run was stopped
-    finer_model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys)
+    finer_model = study_model(
+        case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys
+    )
     more_cells = max(1, finer_model.all_cells - model.all_cells)
-    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / more_cells  # a difference: nodes also cost time
+    # a difference: nodes also cost time
+    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / more_cells
     dearness = max(1.0, cell_time / CELL_TIME)
     sizes = None if basin_cells(case) is None else basin_sizes(case)
-    works = [] if sizes else [run_work(case, MAX_CELLS >> k) for k in range(MAX_CELLS.bit_length() - LEVEL_COUNT)]
+    works = (
+        []
+        if sizes
+        else [run_work(case, MAX_CELLS >> k) for k in range(MAX_CELLS.bit_length() - LEVEL_COUNT)]
+    )
     steps = round(result.counts["steps"] / fraction) if fraction > 0.0 else 0
     return CoarseRun(model.all_cells, waves, steps, works, compile_time, dearness, sizes)
 
@@ -219,7 +246,9 @@ def basin_sizes(case: Case) -> list[tuple[int, float]]:
     main_cells, sizes = basin_cells(case), []
     for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):
         try:
-            sizes += [(n, run_work(case, n))] if n > 0 and n * 2**LEVEL_COUNT % main_cells == 0 else []
+            sizes += (
+                [(n, run_work(case, n))] if n > 0 and n * 2**LEVEL_COUNT % main_cells == 0 else []
+            )
         except CaseError:
             continue  # patches or holes do not end on grid lines
     return sizes
@@ -247,7 +276,11 @@ def default_curve(case: Case) -> str:
 
 def unsupported_schemes(case: Case, schemes: Sequence[str] | None) -> list[str]:
     """Names of default schemes of a chart that do not support the fluid of this case; none if `schemes` is given."""
-    return [] if schemes or not main_part_name(case) else [name for name in DEFAULT_SCHEMES if name not in case.schemes]
+    return (
+        []
+        if schemes or not main_part_name(case)
+        else [name for name in DEFAULT_SCHEMES if name not in case.schemes]
+    )
 
 
 def chart_settings(
@@ -311,7 +344,8 @@ def scheme_method_pairs(
         pairs = [(scheme, method) for scheme in names for method in methods]
     else:
         pairs = [("upwind", "euler")] if "upwind" in names else []
-        explicit = EXPLICIT_METHODS[:1] if stiff else EXPLICIT_METHODS  # stiffness limits all explicit methods alike
+        # stiffness limits all explicit methods alike
+        explicit = EXPLICIT_METHODS[:1] if stiff else EXPLICIT_METHODS
         pairs += [(scheme, method) for scheme in names for method in explicit]
         implicit = names if stiff else [IMPLICIT_SCHEME] if IMPLICIT_SCHEME in names else names[:1]
         pairs += [(scheme, IMPLICIT_METHOD) for scheme in implicit]
@@ -320,7 +354,10 @@ def scheme_method_pairs(
 
 def check_names(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:
     """Raise FvsolveError for an unknown scheme or method, with the nearest known names."""
-    for kind, given, names in (("scheme", schemes, tuple(SCHEMES)), ("method", methods, (AUTO, *METHODS))):
+    for kind, given, names in (
+        ("scheme", schemes, tuple(SCHEMES)),
+        ("method", methods, (AUTO, *METHODS)),
+    ):
         for name in given or ():
             if name not in names:
                 hint = did_you_mean(name, names) or f"; expected {listing(names, 60)}"

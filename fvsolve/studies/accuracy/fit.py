@@ -26,7 +26,8 @@ STEEP_RATIO = 3.0  # greatest ratio of the orders before a short window to its s
 CLEAR_SPREAD = 0.03  # greatest spread of a clear line, times 1 + order
 LEAST_REDUCTION = 1.8  # factor by which errors must fall over the window
 LEAST_ORDER = 0.2
-DRIFT_STEPS = 1.5, 3.0  # further drift of orders, least and greatest, as a multiple of their last change
+# further drift of orders, least and greatest, as a multiple of their last change
+DRIFT_STEPS = 1.5, 3.0
 NO_ERROR = "no order: no row has an error above zero"
 PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the line", "failed"
 
@@ -79,7 +80,10 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
     if rows.good.size < LEAST_ROWS:
         return rows.no_fit(rows.too_few_reason())
     result = (
-        rows.fit_all() or rows.fit_without_outlier() or rows.fit_all(strict=False) or rows.no_fit(rows.failure_reason())
+        rows.fit_all()
+        or rows.fit_without_outlier()
+        or rows.fit_all(strict=False)
+        or rows.no_fit(rows.failure_reason())
     )
     # False for a fit without an order, whose spread and order are NaN
     return rows.no_fit(rows.drift_reason()) if result.spread >= result.order else result
@@ -95,8 +99,15 @@ class FitRows:
         self.h, self.e, self.floor = h, e, floor
         self.marks = [FAILED if not math.isfinite(x) else "" for x in e]
         self.pairwise = tuple(float(p) for p in pair_orders(h, e))
-        at_floor = [i for i, x in enumerate(e) if math.isfinite(x) and (x == 0.0 or x < FLOOR_MARGIN * floor)]
-        last = next((i for i in at_floor if all(k in at_floor or self.marks[k] for k in range(i, len(e)))), len(e))
+        at_floor = [
+            i
+            for i, x in enumerate(e)
+            if math.isfinite(x) and (x == 0.0 or x < FLOOR_MARGIN * floor)
+        ]
+        last = next(
+            (i for i in at_floor if all(k in at_floor or self.marks[k] for k in range(i, len(e)))),
+            len(e),
+        )
         for i in at_floor:
             self.marks[i] = FLOOR if i >= last else OFF_LINE
         self.good = np.array([i for i, mark in enumerate(self.marks) if not mark], dtype=int)
@@ -114,15 +125,23 @@ class FitRows:
         for i in range(1, len(self.good) - 1):
             rest = np.delete(self.good, i)
             limits = find_window(self.h[rest], self.e[rest])
-            if limits is None or limits[1] - limits[0] < LEAST_ROWS + 1 or not limits[0] < i < limits[1]:
+            if (
+                limits is None
+                or limits[1] - limits[0] < LEAST_ROWS + 1
+                or not limits[0] < i < limits[1]
+            ):
                 continue
             candidate = self.fit_window(rest, *limits, outlier=int(self.good[i]))
             line = candidate.constant * self.h[self.good[i]] ** candidate.order
-            if self.e[self.good[i]] < 0.5 * line and (best is None or candidate.spread < best.spread):
+            if self.e[self.good[i]] < 0.5 * line and (
+                best is None or candidate.spread < best.spread
+            ):
                 best = candidate
         return best
 
-    def fit_window(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
+    def fit_window(
+        self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None
+    ) -> Fit:
         """`Fit` of the rows with the indices rows[first] to rows[stop - 1].
 
         note : remark on a later row that leaves the line of these rows; outlier : index of a row that lies off the line
@@ -133,11 +152,18 @@ class FitRows:
             marks[i] = PRE_ASYMPTOTIC if k < first else after if k >= stop else ""
         if outlier is not None:
             marks[outlier] = OFF_LINE
-            note = note or "one error lies far below the line of the other errors, as if the error changed sign there"
+            note = (
+                note
+                or "one error lies far below the line of the other errors, as if the error changed sign there"
+            )
         h, e = self.h[rows[first:stop]], self.e[rows[first:stop]]
         slope, intercept = line_of(h, e)
         p, recent = pair_orders(h, e), rows[max(first - 1, 0) : stop]
-        drift = DRIFT_STEPS[0] if FLOOR in marks else remaining_drift(pair_orders(self.h[recent], self.e[recent]))
+        drift = (
+            DRIFT_STEPS[0]
+            if FLOOR in marks
+            else remaining_drift(pair_orders(self.h[recent], self.e[recent]))
+        )
         limit = p[-1] + drift * (p[-1] - p[-2])
         spread = float(np.max(np.abs([*p, limit] - np.float64(slope))))
         return Fit(self.pairwise, slope, spread, tuple(marks), math.exp(intercept), "", note)
@@ -166,7 +192,9 @@ class FitRows:
         if np.any(e[1:] > ALLOWED_RISE * e[:-1]) and not e[-1] < e[0] / LEAST_REDUCTION:
             return "no order: the errors do not fall"
         if np.all(p < LEAST_ORDER):
-            return f"no order: the errors hardly fall; orders between rows are below {LEAST_ORDER:g}"
+            return (
+                f"no order: the errors hardly fall; orders between rows are below {LEAST_ORDER:g}"
+            )
         if p[-1] < LEAST_ORDER:
             return "no order: the errors reach a floor before three rows show one order; try a coarser first row"
         last_orders = ", ".join(f"{x:.2f}" for x in p[-3:])
@@ -174,7 +202,9 @@ class FitRows:
 
     def drift_reason(self) -> str:
         """Reason why there is no order if the spread is as large as the order, which may drift to zero or double."""
-        last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
+        last_orders = ", ".join(
+            f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:]
+        )
         rows = self.good.size
         return f"no order: orders between rows still drift ({last_orders}) after {rows} rows; try {rows + 2} rows"
 
@@ -285,7 +315,12 @@ def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
     all_changes = np.max(np.abs(np.diff(p[first : stop - 1])), initial=0.0)
     inner_changes = np.max(np.abs(np.diff(p[first : stop - 2])), initial=0.0)
     leaving = p[stop - 2] < np.min(p[first : stop - 2], initial=math.inf)
-    if stop < len(h) and stop - first > LEAST_ROWS and leaving and inner_changes < all_changes / 3.0:
+    if (
+        stop < len(h)
+        and stop - first > LEAST_ROWS
+        and leaving
+        and inner_changes < all_changes / 3.0
+    ):
         return first, stop - 1
     return first, stop
 
@@ -313,7 +348,11 @@ def classify_tail(h, e, first: int, stop: int) -> str | None:
         if falls < min(0.3 * slope, 0.4) and (settled or is_clear_line(h, e, first, stop)):
             return ""
     if rest.size == 1 and stop - first > LEAST_ROWS:
-        if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
+        if (
+            0.0 < excess[0]
+            and rest[0] < ALLOWED_RISE * last
+            and abs(rest[0] / last - 1.0) < 0.1 * slope
+        ):
             return ""  # the error no longer falls
         leaves = "the error of the last row leaves the line of the other rows"
         return f"{leaves}: an error floor or another order begins there"

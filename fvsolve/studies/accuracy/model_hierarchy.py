@@ -51,7 +51,14 @@ def level_names(case) -> list[str]:
     greatest = max(pipe.cells for pipe in pipes)
     counts = [2**k for k in range(20) if 2 ** (k + 1) <= greatest]
     cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
-    return ["rigid column", "lumped volume", "column and volume", "delay lines", *cells, "full line"]
+    return [
+        "rigid column",
+        "lumped volume",
+        "column and volume",
+        "delay lines",
+        *cells,
+        "full line",
+    ]
 
 
 def sloshing_basins(case) -> dict[str, Any]:
@@ -78,10 +85,16 @@ def level_keys(case, level: str) -> dict[str, Any]:
         return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
     if level.endswith(("cell", "cells")):
         count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
-        return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
+        return {
+            f"links.{name}.cells": max(1, round(pipe.cells * count / greatest))
+            for name, pipe in pipes.items()
+        }
     keys = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **LUMPED_NUMERICS}
-    keys["output.probes"] = [probe.text for probe in case.output.probes if probe.part != "links"
-                             or probe.name not in pipes or probe.text == f"{probe.name}.flow"]  # fmt: skip
+    keys["output.probes"] = [
+        probe.text
+        for probe in case.output.probes
+        if probe.part != "links" or probe.name not in pipes or probe.text == f"{probe.name}.flow"
+    ]
     if level != "lumped volume":
         keys |= {f"links.{name}": rigid_column(case, name) for name in pipes}
     else:
@@ -101,7 +114,11 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
     basins, keys = sloshing_basins(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
         quantities = {"frozen": (), "modes": ("depth",)}[level]
-        probes = [entry for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities]
+        probes = [
+            entry
+            for entry in case.output.probes
+            if entry.name not in basins or entry.quantity in quantities
+        ]
         keys["output.probes"] = [entry.text for entry in probes]
         return keys | {f"nodes.{name}.sloshing": level for name in basins} | LUMPED_NUMERICS
     keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}
@@ -110,8 +127,12 @@ def sloshing_keys(case, level: str) -> dict[str, Any]:
     if level == "cells":
         return keys
     factor, step = int(level.split()[0]), case.numerics.step
-    keys |= {f"nodes.{name}.cells": [factor * entry if entry > MIN_REFINED_CELLS else entry for entry in basin.cells]
-              for name, basin in basins.items()}  # fmt: skip
+    keys |= {
+        f"nodes.{name}.cells": [
+            factor * entry if entry > MIN_REFINED_CELLS else entry for entry in basin.cells
+        ]
+        for name, basin in basins.items()
+    }
     return keys if step is None else keys | {"numerics.step": step / factor}
 
 
@@ -120,8 +141,11 @@ def rigid_column(case, name: str) -> dict[str, Any]:
     names = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
     raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
     table = {"type": "rigid-column", **{key: raw[key] for key in names if key in raw}}
-    if table.get("friction", {}).get("model") == "unsteady":  # a rigid column has no unsteady friction
-        friction = {key: value for key, value in table["friction"].items() if key in ("roughness", "factor")}
+    # a rigid column has no unsteady friction
+    if table.get("friction", {}).get("model") == "unsteady":
+        friction = {
+            key: value for key, value in table["friction"].items() if key in ("roughness", "factor")
+        }
         table["friction"] = {"model": "quasi-steady", **friction}
     return table
 
@@ -134,15 +158,23 @@ def orifice_of(case, model, name: str) -> dict[str, Any]:
     """
     row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
-    flow, scale = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
+    flow = float(row["flow"])
+    scale = 2.0 * model.case.properties.density * row["area"] * case.links[name].length
     if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
         raise NotApplicable(f"{name} is at rest at the start, so its friction loss is not known")
     zeta = float(scale * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
     if not zeta > 0.0:
-        raise NotApplicable(f"{name} has no friction, so there is no resistance between two volumes")
+        raise NotApplicable(
+            f"{name} has no friction, so there is no resistance between two volumes"
+        )
     raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
-    return {"type": "orifice", "from": raw["from"], "to": raw["to"], "diameter": raw["diameter"],
-            "loss_coefficient": zeta}  # fmt: skip
+    return {
+        "type": "orifice",
+        "from": raw["from"],
+        "to": raw["to"],
+        "diameter": raw["diameter"],
+        "loss_coefficient": zeta,
+    }
 
 
 def junction_chambers(case, pipes: dict) -> dict[str, Any]:
@@ -157,7 +189,9 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
     fluid = case.properties
     for name, pipe in pipes.items():
         stiffness = fluid.density * case.wave_speed(name) ** 2
-        half_volume = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiffness
+        half_volume = (
+            0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiffness
+        )
         for end in pipe.ports.values():
             volume_of[end] = volume_of.get(end, 0.0) + half_volume
     chambers = {}
@@ -168,11 +202,15 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
         if node.kind not in ("junction", "inflow", "chamber"):
             raise NotApplicable(f"a volume at {name} would replace the {node.kind}")
         if name not in case.nodes:
-            raise NotApplicable(f"{name} is a chamber of a cylinder, to which no other volume can be added")
+            raise NotApplicable(
+                f"{name} is a chamber of a cylinder, to which no other volume can be added"
+            )
         raw = case.raw["nodes"][name]
         if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
             raise NotApplicable(f"flow enters or leaves at {name}, which a volume cannot represent")
-        start_keys = {key: raw[key] for key in ("elevation", "position", "initial_pressure") if key in raw}
+        start_keys = {
+            key: raw[key] for key in ("elevation", "position", "initial_pressure") if key in raw
+        }
         own_volume = node.volume if node.kind == "chamber" else 0.0
         chambers[f"nodes.{name}"] = {"type": "chamber", "volume": own_volume + volume, **start_keys}
     if not chambers:
@@ -183,13 +221,15 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
 
 
 DEFAULT_TARGET = 1e-2
-BEST_OF, BRIEF_RUN = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
+# timed runs of a level; time of the first run above which it is not repeated [s]
+BEST_OF, BRIEF_RUN = 3, 0.3
 LEVEL_CPU_LIMIT = 8.0  # CPU time after which a level is given up [s]
 STRAIN_FACTOR = 3.0  # a difference of the laws above this multiple of dp/K has another cause
 LINES = ("delay lines", "linear")  # level and law with a bound of its own
 LINE_REFINEMENT, LINE_SAFETY = 4.0, 1.5
 DECIDED = 0.1  # own error of the reference, in targets, at which it is not refined further
-MAX_DOUBLINGS = 6  # greatest number of doublings of the cells, to find the error of the richest level itself
+# greatest number of doublings of the cells, to find the error of the richest level itself
+MAX_DOUBLINGS = 6
 REFINED_COST = 4.0  # ratio of computing times, for twice the cells and twice the steps
 SCHEDULE_SAMPLES = 4001  # sample times of each schedule, to find its steepest slope
 
@@ -281,11 +321,15 @@ class Hierarchy(PlainData):
             return ""
         if self.own_error is None:
             return f"the error of {self.richest.name} itself is not known: the run with twice the cells failed"
-        text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
+        text = (
+            f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
+        )
         if self.own_error <= self.target:
             return text
-        return (f"{text}, more than the target, so all errors of the table have at least this uncertainty; "
-                "try `fvsolve order` to see how this error falls with more cells")  # fmt: skip
+        return (
+            f"{text}, more than the target, so all errors of the table have at least this uncertainty; "
+            "try `fvsolve order` to see how this error falls with more cells"
+        )
 
     @property
     def rules(self) -> list[str]:
@@ -295,10 +339,20 @@ class Hierarchy(PlainData):
             rules.append(self._law_rule(self.law_difference))
         if self.travel_time > 0.0 and math.isfinite(self.change_time):
             ratio = self.change_time / self.travel_time
-            kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
-            crossing, change = (self.case.amount(time, "time", 3) for time in (self.travel_time, self.change_time))
-            rules.append(f"a wave travels along a pipe for up to {crossing}; the fastest input changes in {change}, "
-                         f"{ratio:.3g} times as long: {kind}")  # fmt: skip
+            kind = (
+                "waves matter"
+                if ratio < 2.0
+                else "waves fade"
+                if ratio < 20.0
+                else "waves hardly matter"
+            )
+            crossing, change = (
+                self.case.amount(time, "time", 3) for time in (self.travel_time, self.change_time)
+            )
+            rules.append(
+                f"a wave travels along a pipe for up to {crossing}; the fastest input changes in {change}, "
+                f"{ratio:.3g} times as long: {kind}"
+            )
         return [*rules, self.own_error_note] if self.own_error_note else rules
 
     def _law_rule(self, apart: LawDifference) -> str:
@@ -311,24 +365,34 @@ class Hierarchy(PlainData):
         text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
         text += f", {side} the target"
         if apart.error <= STRAIN_FACTOR * self.strain:
-            return (f"dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): the laws differ by about "
-                    f"this fraction of a pressure change; here {text}")  # fmt: skip
+            return (
+                f"dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): the laws differ by about "
+                f"this fraction of a pressure change; here {text}"
+            )
         reason = f"the difference is {apart.start:.3g} at the start and grows"
         if apart.start >= 0.5 * apart.error:
-            reason = (f"the difference is already {apart.start:.3g} at the start, because at pressures of "
-                      f"{apart.level:.2g} times the bulk modulus the laws differ by this fraction, and the range of "
-                      f"{apart.probe} is only {apart.moves:.2g} of its value")  # fmt: skip
+            reason = (
+                f"the difference is already {apart.start:.3g} at the start, because at pressures of "
+                f"{apart.level:.2g} times the bulk modulus the laws differ by this fraction, and the range of "
+                f"{apart.probe} is only {apart.moves:.2g} of its value"
+            )
         dynamic = self.case.amount(apart.swift, "pressure", 3, span=True)
-        reason += f"; linear neglects the dynamic pressure, {dynamic} at the start" if apart.swift > 0.0 else ""
+        reason += (
+            f"; linear neglects the dynamic pressure, {dynamic} at the start"
+            if apart.swift > 0.0
+            else ""
+        )
         return f"{text}, more than dp/K = {self.strain:.2g} (greatest pressure change / bulk modulus): {reason}"
 
 
 @declared("study")
 @validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def ladder(
-    case, set: Mapping | None = None, target: float = DEFAULT_TARGET,
+    case,
+    set: Mapping | None = None,
+    target: float = DEFAULT_TARGET,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Hierarchy:  # fmt: skip
+) -> Hierarchy:
     """Run a case as rigid columns, lumped volumes, delay lines, few and many cells, with every possible density law.
 
     A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
@@ -350,46 +414,72 @@ def ladder(
     runs, given_up = [], {}  # given_up: law -> level with cells that was given up under it
     for at, (name, law) in enumerate(models):
         report(at, len(models), f"{name}, {law}")
-        reason = f"not run: the run with {given_up[law]} was already given up" if law in given_up else ""
+        reason = (
+            f"not run: the run with {given_up[law]} was already given up" if law in given_up else ""
+        )
         runs.append(Outcome(reason, refused=True) if reason else _run_level(case, name, law))
         if runs[-1].reason.startswith(GIVEN_UP) and name.endswith(("cell", "cells")):
             given_up[law] = name
-    at = max((k for k, entry in enumerate(runs) if entry.ok and models[k][0] == models[-1][0]), default=None)
+    at = max(
+        (k for k, entry in enumerate(runs) if entry.ok and models[k][0] == models[-1][0]),
+        default=None,
+    )
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
     own_run, law = runs[at], models[at][1]
 
     def enough(reference: Outcome, own: float) -> bool:
-        known = [_level_of(*names, entry, reference) for names, entry in zip(models, runs, strict=True)]
+        known = [
+            _level_of(*names, entry, reference) for names, entry in zip(models, runs, strict=True)
+        ]
         known = [entry for entry in known if not is_sure(entry, target, sure)]
         return own <= target and (own <= DECIDED * target or not undecided(known, target, own))
 
-    of_law = {pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]}
+    of_law = {
+        pair[1]: entry for entry, pair in zip(runs, models, strict=True) if pair[0] == models[at][0]
+    }
     difference = law_difference(of_law.get("linear", own_run), own_run)
-    sure = line_bound(case, dict(zip(models, runs, strict=True)), 0.0 if difference is None else difference.error)
+    sure = line_bound(
+        case, dict(zip(models, runs, strict=True)), 0.0 if difference is None else difference.error
+    )
 
     finer_runs, own = refine_richest(
-        case, law, own_run, enough, lambda name: report(len(models), len(models) + 1, f"{name}, {law}")
+        case,
+        law,
+        own_run,
+        enough,
+        lambda name: report(len(models), len(models) + 1, f"{name}, {law}"),
     )
     richest = finer_runs[-1][1] if finer_runs else own_run
-    models, runs = [*models, *((name, law) for name, _ in finer_runs)], [*runs, *(entry for _, entry in finer_runs)]
+    models = [*models, *((name, law) for name, _ in finer_runs)]
+    runs = [*runs, *(entry for _, entry in finer_runs)]
     levels = [_level_of(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
     if all(entry.error is None for entry in levels):
         reason = "no probe changes, so models have no errors"
         raise FvsolveError(f"{reason}; try a probe that changes, or an input that does")
     top = levels[-1] if finer_runs else levels[at]
-    accurate = [*within(levels, target, own or 0.0), *(entry for entry in levels if is_sure(entry, target, sure)), top]
+    accurate = [
+        *within(levels, target, own or 0.0),
+        *(entry for entry in levels if is_sure(entry, target, sure)),
+        top,
+    ]
     cheapest = min(accurate, key=lambda level: level.seconds)
     change = change_time(richest.model)
     travel = max((pipe.length / pipe.wave_speed for pipe in richest.model.pipes), default=0.0)
     strain = max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(richest)), default=0.0)
     strain /= least_stiffness(richest)
     notes = tuple(shallow_water_notes(case, target))
-    return Hierarchy(levels, top, target, cheapest, travel, change, strain, difference, own, notes, case)
+    return Hierarchy(
+        levels, top, target, cheapest, travel, change, strain, difference, own, notes, case
+    )
 
 
 def refine_richest(
-    case, law: str, own_run: Outcome, enough: Callable[[Outcome, float], bool], report: Callable[[str], None]
+    case,
+    law: str,
+    own_run: Outcome,
+    enough: Callable[[Outcome, float], bool],
+    report: Callable[[str], None],
 ) -> tuple[list, float | None]:
     """Run levels with 2, 4, ... times the cells until the last level is accurate enough as a reference.
 
@@ -402,11 +492,15 @@ def refine_richest(
     cannot be run, the error is r d / (1 - r), with the difference d to the level before, or None if no finer level was
     run at all. There are no finer levels without pipes and tanks on bodies, and if such a tank states no cells.
     """
-    runs, differences, ratio = [("full line", own_run)], [], 0.5
+    runs = [("full line", own_run)]
+    differences = []
+    ratio = 0.5
     refinable = any(link.kind == "pipe" for link in case.links.values())
     if tanks := sloshing_basins(case):
         refinable = all(tank.cells for tank in tanks.values())
-    for name in [f"{2**k} times the cells" for k in range(1, MAX_DOUBLINGS + 1)] if refinable else []:
+    for name in (
+        [f"{2**k} times the cells" for k in range(1, MAX_DOUBLINGS + 1)] if refinable else []
+    ):
         report(name)
         if REFINED_COST * runs[-1][1].processor > LEVEL_CPU_LIMIT:
             break
@@ -458,7 +552,11 @@ def within(levels: list[ModelLevel], target: float, own: float) -> list[ModelLev
 def undecided(levels: list[ModelLevel], target: float, own: float) -> bool:
     """True if a level may be within `target` that is faster than all that are; own : error of the reference."""
     fastest = min((level.seconds for level in within(levels, target, own)), default=math.inf)
-    near = [entry for entry in levels if entry.error is not None and target - own < entry.error <= target + own]
+    near = [
+        entry
+        for entry in levels
+        if entry.error is not None and target - own < entry.error <= target + own
+    ]
     return any(entry.seconds < fastest for entry in near)
 
 
@@ -504,7 +602,9 @@ def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel
     worst = max(errors.values(), default=None)
     greatest = max((gap.ranges()["max"] for gap in gaps.values()), default=None)
     reason = "" if errors else "the model has none of the probes"
-    return ModelLevel(name, law, reason, run.model.y_size, worst, greatest, errors, run.seconds, run.counts["rhs"])
+    return ModelLevel(
+        name, law, reason, run.model.y_size, worst, greatest, errors, run.seconds, run.counts["rhs"]
+    )
 
 
 def _rms_error(gap: Deviation) -> float:
@@ -516,12 +616,18 @@ def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
 
     It is None if both are the same, if the linear run failed, or if no probe changes.
     """
-    gaps = {} if linear is richest or not linear.ok else moving_probes(linear, reference_of_run(richest))
+    gaps = (
+        {}
+        if linear is richest or not linear.ok
+        else moving_probes(linear, reference_of_run(richest))
+    )
     if not gaps:
         return None
     probe = max(gaps, key=lambda name: _rms_error(gaps[name]))
     values = richest.rows[:, 1 + richest.probes.index(probe)]
-    level = max((float(abs(change[0])) for change in probe_pressures(richest)), default=0.0) / least_stiffness(richest)
+    level = max(
+        (float(abs(change[0])) for change in probe_pressures(richest)), default=0.0
+    ) / least_stiffness(richest)
     moves = float(np.ptp(values) / np.max(np.abs(values)))
     start = float(abs(gaps[probe].error[0]) / gaps[probe].span)
     model = richest.model
@@ -538,8 +644,10 @@ def shallow_water_notes(case, target: float) -> Iterator[str]:
     for name, basin in sloshing_basins(case).items():
         mesh = {**case.meshes, **case.lumped}[name]
         if (mode := slowest(basin, mesh)) is not None:
-            text = (f"{name}: its slowest wave, with k h = {mode.kh:.2g} (wave number times depth), is "
-                    f"{mode.excess:.2g} % too fast in shallow-water theory")  # fmt: skip
+            text = (
+                f"{name}: its slowest wave, with k h = {mode.kh:.2g} (wave number times depth), is "
+                f"{mode.excess:.2g} % too fast in shallow-water theory"
+            )
             more = ", more than the target: modes are more accurate for small waves"
             yield text + more if mode.excess > share else text
 
@@ -552,8 +660,17 @@ def change_time(model) -> float:
     numerics = model.case.numerics
     if any(jump for t, jump in model.breaks if t > numerics.start):
         return 0.0
-    times = np.unique([*np.linspace(numerics.start, numerics.end, SCHEDULE_SAMPLES), *(t for t, _ in model.breaks)])
-    trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
+    times = np.unique(
+        [
+            *np.linspace(numerics.start, numerics.end, SCHEDULE_SAMPLES),
+            *(t for t, _ in model.breaks),
+        ]
+    )
+    trips = {
+        name: link.trip
+        for name, link in model.case.links.items()
+        if getattr(link, "trip", None) is not None
+    }
     quickest = math.inf
     for name, t in trips.items():
         # time in which the pump would stop under the torque that it has at its trip
@@ -562,7 +679,10 @@ def change_time(model) -> float:
         if rate != 0.0:
             quickest = min(quickest, speed / abs(rate))
     for index in range(len(model.tables.schedules)):
-        if any(np.ptp(schedule_values(model, index, [math.nextafter(t, -math.inf), t])) for t in trips.values()):
+        if any(
+            np.ptp(schedule_values(model, index, [math.nextafter(t, -math.inf), t]))
+            for t in trips.values()
+        ):
             continue  # a jump at the trip of a pump, whose run-down time counts instead
         values = schedule_values(model, index, times)
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
@@ -589,4 +709,6 @@ def probe_pressures(run: Outcome) -> list[np.ndarray]:
 def least_stiffness(run: Outcome) -> float:
     """Least effective bulk modulus K = rho a^2 of a pipe [Pa]; without pipes the bulk modulus of the fluid."""
     fluid = run.model.case.properties
-    return min((fluid.density * pipe.wave_speed**2 for pipe in run.model.pipes), default=fluid.bulk_modulus)
+    return min(
+        (fluid.density * pipe.wave_speed**2 for pipe in run.model.pipes), default=fluid.bulk_modulus
+    )

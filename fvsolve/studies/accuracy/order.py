@@ -15,7 +15,15 @@ from fvsolve.exact.solution import Solution, averages
 from fvsolve.studies.accuracy.order_study import Order, OrderStudy
 from fvsolve.studies.accuracy.refine import affordable_plan
 from fvsolve.studies.distance import recording_keys
-from fvsolve.studies.outcome import STUDY_ARGUMENTS, Outcome, Progress, name_list, outcome, refuse_basins, study_model
+from fvsolve.studies.outcome import (
+    STUDY_ARGUMENTS,
+    Outcome,
+    Progress,
+    name_list,
+    outcome,
+    refuse_basins,
+    study_model,
+)
 from fvsolve.studies.parallel import RunQueue
 from fvsolve.studies.reference import Reference, reference_of_solution
 from fvsolve.studies.resolution import delay_lines, fixed_choices, pipes
@@ -30,12 +38,24 @@ REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
     source=FUNCTION, exact=FUNCTION, out=OUT, **STUDY_ARGUMENTS,
 )  # fmt: skip
 def order(
-    case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
-    cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
-    reference: str = "auto", initial: Callable | None = None, source: Callable | None = None,
-    exact: Callable | None = None, out: str | Path | ResultCache | None = None, progress: Progress | None = None,
-    jobs: int = 1, dask: str | None = None,
-) -> Order | list[Order]:  # fmt: skip
+    case,
+    set: Mapping | None = None,
+    *,
+    refine: str | None = None,
+    key: str | None = None,
+    levels: int | None = None,
+    cells: int | None = None,
+    schemes: str | Sequence[str] | None = None,
+    methods: str | Sequence[str] | None = None,
+    reference: str = "auto",
+    initial: Callable | None = None,
+    source: Callable | None = None,
+    exact: Callable | None = None,
+    out: str | Path | ResultCache | None = None,
+    progress: Progress | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
+) -> Order | list[Order]:
     """Run a case over a refinement; returns errors and the order with which they decrease.
 
     With several schemes or methods, the result is a list with an `Order` for each pair of scheme and method.
@@ -53,23 +73,38 @@ def order(
     Raises CaseError, FvsolveError.
     """
     if reference not in REFERENCE_KINDS:
-        hint = did_you_mean(reference, REFERENCE_KINDS) or f"; expected {', '.join(REFERENCE_KINDS)}"
+        hint = (
+            did_you_mean(reference, REFERENCE_KINDS) or f"; expected {', '.join(REFERENCE_KINDS)}"
+        )
         raise FvsolveError(f'reference = "{reference}" is unknown{hint}')
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
-        raise FvsolveError("initial, source and exact are functions of this process; expected jobs = 1 and no dask")
+        raise FvsolveError(
+            "initial, source and exact are functions of this process; expected jobs = 1 and no dask"
+        )
     report, studies = progress or (lambda *_: None), []
-    pairs = [(scheme, method) for scheme in name_list(schemes) or [None] for method in name_list(methods) or [None]]
+    pairs = [
+        (scheme, method)
+        for scheme in name_list(schemes) or [None]
+        for method in name_list(methods) or [None]
+    ]
     with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
         for scheme, method in pairs:
             pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
-            settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
+            settings = {
+                **(set or {}),
+                **{name: value for name, value in pair_settings.items() if value is not None},
+            }
             rows = refine, key, levels, cells
-            studies.append(_order_of_pair(case, settings, rows, reference, given, points, report, queue))
+            studies.append(
+                _order_of_pair(case, settings, rows, reference, given, points, report, queue)
+            )
     return studies[0] if len(studies) == 1 else studies
 
 
-def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue) -> Order:
+def _order_of_pair(
+    case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue
+) -> Order:
     """Order study of one scheme and method; against : reference as for `order`; progress as there.
 
     settings : overrides of the case; rows : (refine, key, levels, cells) as for `order`; given : (initial, source,
@@ -86,8 +121,10 @@ def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points,
         return OrderStudy(case, refinement, against, queue, settings).study(points, progress)
     refuse_basins(case, "order by functions of pipes")
     if delayed := delay_lines(case):
-        raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines; set "
-                           'numerics.pipe_model = "finite-volume", and remove `pipe_model` from all pipes')  # fmt: skip
+        raise FvsolveError(
+            f"functions along pipes need cells, but {listing(delayed)} would be delay lines; set "
+            'numerics.pipe_model = "finite-volume", and remove `pipe_model` from all pipes'
+        )
     return ManufacturedStudy(case, refinement, against, *given).study(points, progress)
 
 
@@ -101,7 +138,13 @@ class ManufacturedStudy(OrderStudy):
     """
 
     def __init__(
-        self, case, plan, against: str, initial: Callable | None, source: Callable | None, exact: Callable | None
+        self,
+        case,
+        plan,
+        against: str,
+        initial: Callable | None,
+        source: Callable | None,
+        exact: Callable | None,
     ) -> None:
         super().__init__(case, plan, "auto", RunQueue(case), {})
         self.against = against
@@ -110,14 +153,19 @@ class ManufacturedStudy(OrderStudy):
                 'reference = "exact" needs the function exact(pipe, x, t); expected that function, or "finer"'
             )
         if not pipes(case):
-            raise FvsolveError("initial, source and exact are functions along pipes, but this case has no pipes")
+            raise FvsolveError(
+                "initial, source and exact are functions along pipes, but this case has no pipes"
+            )
         if not case.law.linear:
             raise FvsolveError(
                 f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}"; '
                 'set fluid.law = "linear", without cavitation'
             )
         t0 = case.numerics.start
-        self.source, self.exact = source and UserFunction("source", source), exact and UserFunction("exact", exact)
+        self.source, self.exact = (
+            source and UserFunction("source", source),
+            exact and UserFunction("exact", exact),
+        )
         self.initial = initial and UserFunction("initial", initial)
         if initial is None and exact is not None:
             self.initial = lambda pipe, x: self.exact(pipe, x, t0)
@@ -132,14 +180,17 @@ class ManufacturedStudy(OrderStudy):
 
         The pressure of a node by the exact function is that at the pipe end that joins the node.
         """
-        time_only = self.plan.way == "time" and self.against == "auto"  # the space error would hide the time error
+        # the space error would hide the time error
+        time_only = self.plan.way == "time" and self.against == "auto"
         use_exact = self.exact is not None and self.against != "finer" and not time_only
         if not use_exact:
             return self.find_reference(self.plan.way, False, run=self.outcome)
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
-                laws[node] = lambda t, name=name, x=x: self.exact(name, np.full(np.shape(t), x), t)[0]
+                laws[node] = lambda t, name=name, x=x: self.exact(name, np.full(np.shape(t), x), t)[
+                    0
+                ]
         solution = Solution(self.case, pressure=laws, pipe=self.exact)
         return reference_of_solution(solution, "function", "exact solution given as a function")
 
@@ -151,7 +202,9 @@ class ManufacturedStudy(OrderStudy):
         """Outcome of the case with changed keys, from the given initial state and with the given source."""
         model = study_model(case, keys)
         y = self.initial_state(model)
-        return outcome(model, y=y) if self.source is None else RunWithSource(model, self.source).run(y)
+        return (
+            outcome(model, y=y) if self.source is None else RunWithSource(model, self.source).run(y)
+        )
 
     def initial_state(self, model) -> np.ndarray:
         """Initial state vector: forward and backward waves of the given initial state, averaged over cells [kg/s].
@@ -187,14 +240,20 @@ class UserFunction:
         except Exception as error:
             raise self.fault_for(pipe, f"raised {type(error).__name__}: {error}") from error
         try:
-            first, second = (np.broadcast_to(np.asarray(field, dtype=float), shape) for field in values)
+            first, second = (
+                np.broadcast_to(np.asarray(field, dtype=float), shape) for field in values
+            )
         except (TypeError, ValueError) as error:
             size = " x ".join(map(str, shape))
-            raise self.fault_for(pipe, f"must return two numbers or arrays of {size} values, one for each x") from error
+            raise self.fault_for(
+                pipe, f"must return two numbers or arrays of {size} values, one for each x"
+            ) from error
         for field in (first, second):
             if not np.all(np.isfinite(field)):
                 place = float(np.broadcast_to(x, shape)[~np.isfinite(field)].flat[0])
-                raise self.fault_for(pipe, f"returns values that are not finite, first at x = {place:g} m")
+                raise self.fault_for(
+                    pipe, f"returns values that are not finite, first at x = {place:g} m"
+                )
         return first, second
 
     def fault_for(self, pipe: str, problem: str) -> FvsolveError:
@@ -226,18 +285,34 @@ class RunWithSource:
         """
         from fvsolve.core.steppers.ode import integrate
 
-        model, numerics, every = self.model, self.model.case.numerics, self.model.case.output.every
-        bounds = [numerics.start, *(t for t, _ in model.breaks if numerics.start < t < numerics.end), numerics.end]
+        model = self.model
+        numerics = self.model.case.numerics
+        every = self.model.case.output.every
+        bounds = [
+            numerics.start,
+            *(t for t, _ in model.breaks if numerics.start < t < numerics.end),
+            numerics.end,
+        ]
         count = int(np.floor((numerics.end - numerics.start) / every * (1.0 + 1e-12)))
         due = numerics.start + every * np.arange(count + 1)
         stepping = {"rtol": numerics.rtol} if numerics.rtol is not None else {"step": self.step()}
-        rows, counts, began = [self.row(numerics.start, y)], {}, time.perf_counter()
+        rows = [self.row(numerics.start, y)]
+        counts = {}
+        began = time.perf_counter()
         for low, high in zip(bounds[:-1], bounds[1:], strict=True):
             self.limit, segment_counts = high, {}
             inner = due[(due > low * (1 + 1e-14)) & (due < high * (1 - 1e-14))]
             times = np.concatenate([[low], inner, [high]])
             try:
-                states = integrate(self.rates, y, times, numerics.method, atol=None, counts=segment_counts, **stepping)
+                states = integrate(
+                    self.rates,
+                    y,
+                    times,
+                    numerics.method,
+                    atol=None,
+                    counts=segment_counts,
+                    **stepping,
+                )
             except FvsolveError as error:
                 if self.source.fault is not None:
                     raise self.source.fault from self.source.fault.__cause__
@@ -248,9 +323,16 @@ class RunWithSource:
         probes = tuple(probe.text for probe in model.case.probes)
         seconds = time.perf_counter() - began
         return Outcome(
-            "finished", ok=True, t=numerics.end, y=y, rows=np.array(rows), probes=probes, counts=counts,
-            seconds=seconds, model=model,
-        )  # fmt: skip
+            "finished",
+            ok=True,
+            t=numerics.end,
+            y=y,
+            rows=np.array(rows),
+            probes=probes,
+            counts=counts,
+            seconds=seconds,
+            model=model,
+        )
 
     def row(self, t: float, y: np.ndarray) -> np.ndarray:
         """Row of output at the state (t, y): time [s], then the values of the probes [SI]."""

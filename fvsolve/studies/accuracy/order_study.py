@@ -20,7 +20,14 @@ from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
-from fvsolve.studies.outcome import REFERENCE_CPU_LIMIT, Outcome, Progress, capped, outcome, study_model
+from fvsolve.studies.outcome import (
+    REFERENCE_CPU_LIMIT,
+    Outcome,
+    Progress,
+    capped,
+    outcome,
+    study_model,
+)
 from fvsolve.studies.parallel import RunQueue, RunRequest
 from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
 from fvsolve.studies.resolution import (
@@ -94,12 +101,18 @@ class Order(Displayable, PlainData):
     def table_columns(self) -> dict[str, list]:
         """Columns of the table, header -> value of each row: cells, size, step [s], errors in SI, and cost."""
         columns: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
-        columns |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}
+        columns |= {
+            "size": [row.level.size for row in self.rows],
+            "step": [row.level.step for row in self.rows],
+        }
         for name, norms in self.fits.items():
             for norm in norms:
                 key = f"{name} {norm}"
                 columns[key] = [row.errors.get(name, {}).get(norm, math.nan) for row in self.rows]
-        return columns | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
+        return columns | {
+            "rhs": [row.rhs for row in self.rows],
+            "seconds": [row.seconds for row in self.rows],
+        }
 
     def error_unit(self, variable: str) -> tuple[float, str]:
         """(factor from SI, unit) of the printed errors of a variable."""
@@ -117,24 +130,32 @@ class Order(Displayable, PlainData):
 
 
 SHOWN_VARIABLES = 3  # variables with a table on the terminal; order.csv contains all
-CELLS = "cell size [m]"  # measure that is printed in the units of the case; steps and tolerances are SI
+# measure that is printed in the units of the case; steps and tolerances are SI
+CELLS = "cell size [m]"
 
 
 def order_picture(study):
     """matplotlib Figure of an `Order`: errors over size, a panel for each first variable, a line for each norm."""
     from fvsolve.report.draw.accuracy_pictures import order_figure
 
-    length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
+    length_factor, length = (
+        study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
+    )
     measure = CELLS.replace("[m]", f"[{length}]") if length else study.plan.measure
     curves = {}
     for variable, fits in list(study.fits.items())[: 2 * SHOWN_VARIABLES]:
         size, error_unit = study.error_unit(variable)
         curves[f"{variable} [{error_unit}]"] = {
-            norm: ([size * row.errors.get(variable, {}).get(norm, math.nan) for row in study.rows],
-                   replace(fit, constant=size * fit.constant / length_factor**fit.order)) for norm, fit in fits.items()
-        }  # fmt: skip
+            norm: (
+                [size * row.errors.get(variable, {}).get(norm, math.nan) for row in study.rows],
+                replace(fit, constant=size * fit.constant / length_factor**fit.order),
+            )
+            for norm, fit in fits.items()
+        }
     sizes = [length_factor * row.level.size for row in study.rows]
-    return order_figure(sizes, curves, measure, f"{study.case}: {study_title(study)}; {study.words}")
+    return order_figure(
+        sizes, curves, measure, f"{study.case}: {study_title(study)}; {study.words}"
+    )
 
 
 def study_title(study) -> str:
@@ -163,27 +184,40 @@ def variable_dimension(variable: str, case=None) -> str:
     if case is not None:
         name = variable.split("@")[0].rsplit(".", 1)[0].rsplit(" ", 1)[-1]
         kinds = [*(parts[name] for parts in (case.nodes, case.links) if name in parts), *kinds]
-    return next((quantities[quantity] for kind in kinds
-                 for quantities in (kind.quantities, getattr(kind, "along", {}))
-                 if quantity in quantities), "number")  # fmt: skip
+    return next(
+        (
+            quantities[quantity]
+            for kind in kinds
+            for quantities in (kind.quantities, getattr(kind, "along", {}))
+            if quantity in quantities
+        ),
+        "number",
+    )
 
 
 def error_scale(case, variable: str) -> tuple[float, str]:
     """(factor from SI, unit) of errors of a variable in the units of `[output]`, or of lengths for "length"."""
     from fvsolve.core.output.unit_columns import column
 
-    result = column("", variable if variable == "length" else variable_dimension(variable, case), case)
+    result = column(
+        "", variable if variable == "length" else variable_dimension(variable, case), case
+    )
     return result.span_from_si(1.0), result.span_unit
 
 
-BEST_OF, BRIEF_RUN = 2, 1.0  # timed runs of a row; time of the first run above which it is not repeated [s]
-EXCESS_ORDER = 1.5  # greatest excess of a fitted order over that of scheme and method; it occurs at single points
+# timed runs of a row; time of the first run above which it is not repeated [s]
+BEST_OF, BRIEF_RUN = 2, 1.0
+# greatest excess of a fitted order over that of scheme and method; it occurs at single points
+EXCESS_ORDER = 1.5
 REFERENCE_MARGIN = 10.0  # errors below this multiple of the error of the reference are not used
 UNCERTAIN = "reference"  # mark of rows with errors too close to that of the reference
 FINEST_ROW = "finest"  # mark of a row that ran, but has no finer row for comparison
-EXTRAPOLATION_ERROR = 0.25  # greatest relative error of the factor 1 / (1 - ratio^-p) of an extrapolation
-EXACT_ERROR = 1e-12  # relative to the size of a variable: smaller errors do not come from steps or stretches
-ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order of three differences from theory
+# greatest relative error of the factor 1 / (1 - ratio^-p) of an extrapolation
+EXTRAPOLATION_ERROR = 0.25
+# relative to the size of a variable: smaller errors do not come from steps or stretches
+EXACT_ERROR = 1e-12
+# a, b: greatest distance a + b order of an order of three differences from theory
+ORDER_TOLERANCE = 0.06, 0.04
 
 
 def timed_run(case, keys: Mapping) -> Outcome:
@@ -203,8 +237,11 @@ class OrderStudy:
         self.queue, self.stages = queue, (dict(settings),)
         self.probe_names = tuple(probe.text for probe in case.probes)
         if against == "exact" and case.exact is None:
-            raise FvsolveError('reference = "exact": the case names no solution under [exact]; expected "finer"')
-        if against == "auto" and case.exact is None and basins(case):  # 4 times the cells along both axes take too long
+            raise FvsolveError(
+                'reference = "exact": the case names no solution under [exact]; expected "finer"'
+            )
+        # 4 times the cells along both axes take too long
+        if against == "auto" and case.exact is None and basins(case):
             self.against = "richardson"
 
     @cached_property
@@ -230,7 +267,9 @@ class OrderStudy:
             if self.against != "auto" or self.case.exact is not None:
                 raise
             result = self.richardson(progress)
-            return replace(result, notes=(f"no other reference can be used: {error}", *result.notes))
+            return replace(
+                result, notes=(f"no other reference can be used: {error}", *result.notes)
+            )
 
     def against_reference(self, points: ResultCache | None, progress: Progress) -> Order:
         """Study against an exact solution or a finer run."""
@@ -242,9 +281,14 @@ class OrderStudy:
 
         reference_data = cached("reference", lambda: self.reference_data(progress, total))
         if points is not None and not self.queue.in_process:
-            new = [k for k in range(len(levels)) if points.find(self.case, self.cache_key(k)) is None]
-            reference = self.reference if new else None  # before other runs start, else they would wait for each other
-            for count, at in enumerate(self.queue.run_ahead([self.request(levels[k]) for k in new]), 1):
+            new = [
+                k for k in range(len(levels)) if points.find(self.case, self.cache_key(k)) is None
+            ]
+            # before other runs start, else they would wait for each other
+            reference = self.reference if new else None
+            for count, at in enumerate(
+                self.queue.run_ahead([self.request(levels[k]) for k in new]), 1
+            ):
                 cached(new[at], lambda level=levels[new[at]]: self.row(level).plain())
                 progress(total - len(new) + count - 1, total, reference.words)
         for k, level in enumerate(levels):
@@ -252,20 +296,32 @@ class OrderStudy:
             data = cached(k, lambda level=level: self.row(level).plain())
             seconds = np.nan if data["seconds"] is None else data["seconds"]
             work = data["rhs"], data["cell_updates"], data["steps"]
-            rows.append(OrderRow(level, error_numbers(data["errors"]), seconds, *work, data["reason"]))
+            rows.append(
+                OrderRow(level, error_numbers(data["errors"]), seconds, *work, data["reason"])
+            )
         own, sizes = error_numbers(reference_data["own"]), reference_data["sizes"]
         return self.fitted_order(rows, reference_data["kind"], reference_data["words"], own, sizes)
 
     def cache_key(self, name) -> dict:
         """Values that identify a cached result of the case; name : "reference" or the number of a row."""
-        return {"study": "order", "against": self.against, "way": self.plan.way, "what": name,
-                "levels": [level.set for level in self.plan.levels]}  # fmt: skip
+        return {
+            "study": "order",
+            "against": self.against,
+            "way": self.plan.way,
+            "what": name,
+            "levels": [level.set for level in self.plan.levels],
+        }
 
     def reference_data(self, progress: Progress, total: int) -> dict:
         """Plain data: kind, words and error of the reference, greatest values of variables; total : for `progress`."""
         progress(0, total, "reference")
         reference = self.reference
-        return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
+        return {
+            "kind": reference.kind,
+            "words": reference.words,
+            "own": reference.own_error,
+            "sizes": self.sizes(),
+        }
 
     @cached_property
     def reference(self) -> Reference:
@@ -284,9 +340,17 @@ class OrderStudy:
         delayed = way != "time" and delay_lines(self.case)
         keys = last.set | (cells_for_lines(self.case, last.step) if delayed else {})
         return find_reference(
-            self.case, recording_keys(self.case, keys), opinions=1, exclude_own=True, way=way, lines=bool(delayed),
-            stiff=method is None or not method.explicit, exact=exact, stages=self.stages, **options,
-        )  # fmt: skip
+            self.case,
+            recording_keys(self.case, keys),
+            opinions=1,
+            exclude_own=True,
+            way=way,
+            lines=bool(delayed),
+            stiff=method is None or not method.explicit,
+            exact=exact,
+            stages=self.stages,
+            **options,
+        )
 
     def request(self, level: Level) -> RunRequest:
         """`RunRequest` for the run of a refinement level."""
@@ -301,7 +365,10 @@ class OrderStudy:
         for level in self.plan.levels:
             run = self.run(level)
             if run.ok:
-                return {name: variable_size(run, name) for name in error_norms(run, self.reference, self.probe_names)}
+                return {
+                    name: variable_size(run, name)
+                    for name in error_norms(run, self.reference, self.probe_names)
+                }
         raise FvsolveError(f"no row could be run: {run.reason}")
 
     def row(self, level: Level) -> OrderRow:
@@ -316,13 +383,18 @@ class OrderStudy:
         kind, words : kind and description of the reference
         own : variable -> norm -> error of the reference [SI]; sizes : variable -> greatest absolute value [SI]
         """
-        fits, doubtful, smooth_order = {}, [], self.smooth_order()
+        fits = {}
+        doubtful = []
+        smooth_order = self.smooth_order()
         for name in sizes:
             fits[name] = {}
             for norm in NORMS:
                 errors = [row.errors.get(name, {}).get(norm, np.nan) for row in rows]
                 floor, rounding = own.get(name, {}).get(norm, 0.0), ROUNDING * sizes[name]
-                fitted = check_order(fit([row.level.size for row in rows], errors, max(floor, rounding)), smooth_order)
+                fitted = check_order(
+                    fit([row.level.size for row in rows], errors, max(floor, rounding)),
+                    smooth_order,
+                )
                 uncertain = [e < REFERENCE_MARGIN * floor and floor > rounding for e in errors]
                 pairs = zip(uncertain, fitted.marks, strict=True)
                 marks = [UNCERTAIN if bad and mark == FLOOR else mark for bad, mark in pairs]
@@ -331,25 +403,45 @@ class OrderStudy:
         self.refuse_reference(rows, fits, words)
         left_out = self.case.exact is None and "exact" in self.case.raw
         notes = ["[exact] does not hold with these settings and is not used"] if left_out else []
-        largest = [max(norms.values()) / sizes[name] for row in rows for name, norms in row.errors.items()
-                   if name not in ("pressure", "flow") and sizes[name] > 0.0]  # fmt: skip
+        largest = [
+            max(norms.values()) / sizes[name]
+            for row in rows
+            for name, norms in row.errors.items()
+            if name not in ("pressure", "flow") and sizes[name] > 0.0
+        ]
         exact = bool(delay_lines(self.case)) and max(largest, default=1.0) <= EXACT_ERROR
         notes += row_notes(rows, [] if exact else doubtful)
         numerics = self.case.numerics
         notes += [*self.order_notes(exact), *self.step_error_note(fits)]
         notes += [notice.text for notice in limiter_notices(numerics.scheme, numerics.limiter)]
         units = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
-        scales = {name: error_scale(self.case, name) for name in [*fits, "length"] if name not in units}
-        return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
-                     tuple(notes), units, scales)  # fmt: skip
+        scales = {
+            name: error_scale(self.case, name) for name in [*fits, "length"] if name not in units
+        }
+        return Order(
+            self.case.name,
+            numerics.scheme,
+            numerics.method,
+            self.plan,
+            kind,
+            words,
+            tuple(rows),
+            fits,
+            own,
+            tuple(notes),
+            units,
+            scales,
+        )
 
     def refuse_reference(self, rows, fits, words: str) -> None:
         """Raise FvsolveError if all errors of all variables are too close to that of the reference, named `words`."""
         uncertain = [
             mark == UNCERTAIN
-            for name, norms in fits.items() for norm, fitted in norms.items()
-            for row, mark in zip(rows, fitted.marks, strict=True) if row.errors.get(name, {}).get(norm, 0.0) > 0.0
-        ]  # fmt: skip
+            for name, norms in fits.items()
+            for norm, fitted in norms.items()
+            for row, mark in zip(rows, fitted.marks, strict=True)
+            if row.errors.get(name, {}).get(norm, 0.0) > 0.0
+        ]
         if uncertain and all(uncertain):
             raise FvsolveError(
                 f"the reference is not more accurate than the rows ({words}); name an exact solution under [exact], "
@@ -382,7 +474,9 @@ class OrderStudy:
         if delay_lines(self.case):
             return dict.fromkeys(NORMS, np.nan)
         if self.plan.way == "time" or not breaks:
-            return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
+            return dict.fromkeys(
+                NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p
+            )
         s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
         if s == 0.0 and any(basin.physics_type.has_shocks for basin in basins(self.case).values()):
             return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores remain steep
@@ -399,7 +493,11 @@ class OrderStudy:
         effect = "jumps, so that fronts travel" if jump else "has kinks, which travel"
         source = "a schedule" if study_model(self.case).breaks else "the start"
         max_order = "none in max" if jump else f"{orders['max']:.2g} in max"
-        parts = ", as do those of parts that open or shut during the run" if study_model(self.case).events else ""
+        parts = (
+            ", as do those of parts that open or shut during the run"
+            if study_model(self.case).events
+            else ""
+        )
         return [
             f"{source} {effect} through the cells{parts}: order {self.smooth_order()} in space and time is expected "
             f"to show as about {orders['L1']:.2g} in L1, {orders['L2']:.2g} in L2 and {max_order}"
@@ -418,16 +516,22 @@ class OrderStudy:
             key = f"step={0.25 * step:.2g}"
         else:
             last = self.plan.levels[-1].set
-            cells = {name: tuple(np.atleast_1d(last[name]).tolist()) for name in cell_counts(self.case)}
+            cells = {
+                name: tuple(np.atleast_1d(last[name]).tolist()) for name in cell_counts(self.case)
+            }
             key = f"courant={0.25 * step * greatest_wave_rate(self.case, cells):.2g}"
-        return [f"the time error is the same in all rows. If it hides the order in space, try --set numerics.{key}"]
+        return [
+            f"the time error is the same in all rows. If it hides the order in space, try --set numerics.{key}"
+        ]
 
     # Richardson ------------------------------------------------------------------------------------------------
 
     def richardson(self, progress: Progress) -> Order:
         """Study without a reference: differences between each row and the next, extrapolated to errors."""
         runs, levels = [], self.plan.levels
-        for count, at in enumerate(self.queue.run_ahead([self.request(level) for level in levels]), 1):
+        for count, at in enumerate(
+            self.queue.run_ahead([self.request(level) for level in levels]), 1
+        ):
             progress(count, len(levels), level_text(self.plan, levels[at]))
         for k, level in enumerate(levels):
             progress(k, len(levels), level_text(self.plan, level))
@@ -443,8 +547,13 @@ class OrderStudy:
             raise FvsolveError(f"no row could be run: {runs[0].reason}")
         sizes = {name: variable_size(good, name) for name in names}
         result, theory = self.fitted_order(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
-        fits = {name: {norm: mark_finest(check_three_differences(fitted, theory[norm]), rows)
-                       for norm, fitted in norms.items()} for name, norms in result.fits.items()}  # fmt: skip
+        fits = {
+            name: {
+                norm: mark_finest(check_three_differences(fitted, theory[norm]), rows)
+                for norm, fitted in norms.items()
+            }
+            for name, norms in result.fits.items()
+        }
         notes = *result.notes, *difference_notes(rows, fits)
         return replace(result, rows=extrapolate(rows, fits), fits=fits, notes=notes)
 
@@ -453,8 +562,11 @@ def check_order(fitted: Fit, smooth_order: float) -> Fit:
     """Return a fit, with a note if its order is far above `smooth_order`, the order of scheme and method together."""
     if fitted.reason or not fitted.order > smooth_order + EXCESS_ORDER:
         return fitted
-    return replace(fitted, note=f"errors fall faster than the order {smooth_order:g} of scheme and method allows: the "
-                   "motion decays, or errors change sign, so this is not the order of the method")  # fmt: skip
+    return replace(
+        fitted,
+        note=f"errors fall faster than the order {smooth_order:g} of scheme and method allows: the "
+        "motion decays, or errors change sign, so this is not the order of the method",
+    )
 
 
 RICHARDSON = "Richardson: each row against the next, extrapolated"
@@ -463,10 +575,16 @@ RICHARDSON = "Richardson: each row against the next, extrapolated"
 def check_three_differences(fitted: Fit, theory: float) -> Fit:
     """Return a fit of differences; an order of only three rows is removed if it differs from the order `theory`."""
     tolerance = max(fitted.spread, ORDER_TOLERANCE[0] + ORDER_TOLERANCE[1] * theory)
-    if fitted.reason or fitted.marks.count("") > LEAST_ROWS or not abs(fitted.order - theory) > tolerance:
+    if (
+        fitted.reason
+        or fitted.marks.count("") > LEAST_ROWS
+        or not abs(fitted.order - theory) > tolerance
+    ):
         return fitted
-    reason = (f"no order: three differences show {fitted.order:.2f}, but {theory:.2g} is expected; they are too few to "
-              "decide if rows are still too coarse; try more levels, or finer rows")  # fmt: skip
+    reason = (
+        f"no order: three differences show {fitted.order:.2f}, but {theory:.2g} is expected; they are too few to "
+        "decide if rows are still too coarse; try more levels, or finer rows"
+    )
     return replace(fitted, order=np.nan, spread=np.nan, constant=np.nan, reason=reason, note="")
 
 
@@ -479,7 +597,9 @@ def mark_finest(fitted: Fit, rows) -> Fit:
 
 def is_certain(fitted: Fit, ratio: float) -> bool:
     """True if 1 / (1 - ratio^-p), with the fitted order p and the ratio of sizes of rows, is certain to a quarter."""
-    return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (ratio**fitted.order - 1.0)
+    return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (
+        ratio**fitted.order - 1.0
+    )
 
 
 def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
@@ -504,26 +624,41 @@ def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
 def difference_notes(rows, fits) -> list[str]:
     """List with a note on variables whose order is uncertain (see `is_certain`), at most three, or an empty list."""
     ratio = rows[0].level.size / rows[1].level.size
-    names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
-             if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip
+    names = [
+        f"{name} ({', '.join(uncertain)})"
+        for name, norms in fits.items()
+        if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])
+    ]
     if not names:
         return []
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return [f"where the order is uncertain, nothing is extrapolated: for {', '.join(names[:3])}{more} the table "
-            "shows differences to the next row, and errors are larger"]  # fmt: skip
+    return [
+        f"where the order is uncertain, nothing is extrapolated: for {', '.join(names[:3])}{more} the table "
+        "shows differences to the next row, and errors are larger"
+    ]
 
 
 def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
     """`OrderRow` of a refinement level, from its run and errors."""
     counts = run.counts
     updates = run.cell_updates if run.model is not None else 0
-    return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
-               "" if run.ok else run.reason)  # fmt: skip
+    return OrderRow(
+        level,
+        errors,
+        run.seconds,
+        counts.get("rhs", 0),
+        updates,
+        counts.get("steps", 0),
+        "" if run.ok else run.reason,
+    )
 
 
 def error_numbers(errors: Mapping) -> dict:
     """Errors from plain data : variable -> {norm: error}, with NaN instead of None."""
-    return {name: {norm: np.nan if e is None else e for norm, e in norms.items()} for name, norms in errors.items()}
+    return {
+        name: {norm: np.nan if e is None else e for norm, e in norms.items()}
+        for name, norms in errors.items()
+    }
 
 
 def level_text(plan: Plan, level: Level) -> str:
@@ -538,7 +673,9 @@ def row_notes(rows, doubtful: list[str]) -> list[str]:
     notes = []
     failed = [row for row in rows if row.reason]
     if failed:
-        notes.append(f"{len(failed)} of {len(rows)} rows failed; reason of the first: {failed[0].reason}")
+        notes.append(
+            f"{len(failed)} of {len(rows)} rows failed; reason of the first: {failed[0].reason}"
+        )
     if doubtful:
         names = ", ".join(dict.fromkeys(doubtful))
         notes.append(

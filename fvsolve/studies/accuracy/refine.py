@@ -41,7 +41,8 @@ TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
 DEFAULT_LEVELS = {"both": 4, "space": 4, "time": 6}
 FIRST_RTOL = 1e-4  # first tolerance of a refinement of rtol, unless that of the case is greater
 MAX_CELLS = 10**6  # greatest number of cells of a row
-STEP_ERROR_SHARE = 0.01  # approximate ratio of time error to space error on the finest row, if space alone is refined
+# approximate ratio of time error to space error on the finest row, if space alone is refined
+STEP_ERROR_SHARE = 0.01
 LEAST_COURANT = 0.02  # smaller Courant numbers would take too long
 
 
@@ -93,7 +94,11 @@ def pipes_by_cell_time(case) -> list[str]:
 
 
 def refinement_plan(
-    case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
+    case,
+    refine: str | None = None,
+    key: str | None = None,
+    levels: int | None = None,
+    cells: int | None = None,
 ) -> Plan:
     """Plan of a refinement of a case; a row is the run of a level, coarsest first.
 
@@ -112,8 +117,12 @@ def refinement_plan(
     known = resolutions(case)
     if key is not None and key not in known:
         hint = did_you_mean(key, known)
-        raise FvsolveError(f"{key} is not a resolution of this case; expected one of {listing(known)}{hint}")
-    refine = refine or (known[key] if key else "both" if cell_counts(case) or delay_lines(case) else "time")
+        raise FvsolveError(
+            f"{key} is not a resolution of this case; expected one of {listing(known)}{hint}"
+        )
+    refine = refine or (
+        known[key] if key else "both" if cell_counts(case) or delay_lines(case) else "time"
+    )
     if refine not in WAYS:
         hint = did_you_mean(refine, WAYS) or f"; expected {', '.join(WAYS)}"
         raise FvsolveError(f'refine = "{refine}" is unknown{hint}')
@@ -121,10 +130,14 @@ def refinement_plan(
         refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         way = "time" if known[key] == "time" else "space"
-        raise FvsolveError(f'{key} refines {way}, so refine = "{refine}" is impossible; leave `refine` out')
+        raise FvsolveError(
+            f'{key} refines {way}, so refine = "{refine}" is impossible; leave `refine` out'
+        )
     levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
-        raise FvsolveError(f"levels = {levels} is too few; expected at least 2, and at least 3 for a fitted order")
+        raise FvsolveError(
+            f"levels = {levels} is too few; expected at least 2, and at least 3 for a fitted order"
+        )
     if refine == "time" and cells is not None:
         text = "only steps are refined here; leave `cells` out, or set the cells of the case"
         raise FvsolveError(f"cells = {cells}: {text}")
@@ -132,7 +145,9 @@ def refinement_plan(
         return time_plan(case, key, levels)
     if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
         if cells is not None:
-            raise FvsolveError(f"cells = {cells}: cells of delay lines are only for output; leave `cells` out")
+            raise FvsolveError(
+                f"cells = {cells}: cells of delay lines are only for output; leave `cells` out"
+            )
         return delay_line_plan(case, refine, levels)
     return space_plan(case, refine, key, levels, cells)
 
@@ -147,23 +162,36 @@ def delay_line_plan(case, way: str, levels: int) -> Plan:
     With "space" it is the travel time of a stretch [s], in the line with most stretches in the last row.
     Raises FvsolveError if with "space" the stretches do not change.
     """
-    count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
+    count = total_cells(case, cell_counts(case))
+    step = first_step(case) if case.numerics.rtol is None else math.nan
     rows = [stretch_keys(case, way, k) for k in range(levels)]
     if way == "both":
         by_error = math.isnan(step)
         first = 1.0 / greatest_wave_rate(case, cell_counts(case)) if by_error else step
-        refined = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
-                   for k, row in enumerate(rows)]  # fmt: skip
+        refined = [
+            Level(
+                row if by_error else row | {"numerics.step": step / 2**k},
+                first / 2**k,
+                count,
+                step / 2**k,
+            )
+            for k, row in enumerate(rows)
+        ]
         what = "longest step" if by_error else "step"
         words = f"{STRETCH_WORDS}, and {'the longest step' if by_error else 'steps'} halved"
         return Plan(way, f"{what} [s]", tuple(refined), words)
     tables = [lines_of(study_model(case, row)) for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
-        raise FvsolveError("a smaller numerics.delay_tolerance divides no delay line of this case into more stretches: "
-                           'there is no friction, or stretches are as short as a step; '
-                           'expected refine = "both" or refine = "time"')  # fmt: skip
-    refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
+        raise FvsolveError(
+            "a smaller numerics.delay_tolerance divides no delay line of this case into more stretches: "
+            "there is no friction, or stretches are as short as a step; "
+            'expected refine = "both" or refine = "time"'
+        )
+    refined = [
+        Level(row, float(table["tau"][line]), count, step)
+        for row, table in zip(rows, tables, strict=True)
+    ]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
 
@@ -175,9 +203,17 @@ def stretch_keys(case, way: str, k: int) -> dict:
 
     With way = "space" the cells of delay lines stay.
     """
-    keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
-    if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
-        keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in delay_lines(case)}
+    keys = (
+        {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k}
+        if delay_lines(case)
+        else {}
+    )
+    if way == "both" and (
+        case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)
+    ):
+        keys |= {
+            f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in delay_lines(case)
+        }
     return keys
 
 
@@ -193,26 +229,48 @@ def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) 
     refined = [name for name in first if key in (None, name)]
     if key == "numerics.cell_time":
         refined = [f"links.{name}.cells" for name in pipes_by_cell_time(case)]
-    all_counts = [{name: tuple(n * 2**k for n in numbers) if name in refined else numbers
-                   for name, numbers in first.items()} for k in range(levels)]  # fmt: skip
+    all_counts = [
+        {
+            name: tuple(n * 2**k for n in numbers) if name in refined else numbers
+            for name, numbers in first.items()
+        }
+        for k in range(levels)
+    ]
     finest = total_cells(case, all_counts[-1])
     if finest > MAX_CELLS:
-        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells; expected at most "
-                           f"{MAX_CELLS:.0e}; try fewer levels, or fewer cells in the first row")  # fmt: skip
+        raise FvsolveError(
+            f"the finest of {levels} levels would have {finest:.3g} cells; expected at most "
+            f"{MAX_CELLS:.0e}; try fewer levels, or fewer cells in the first row"
+        )
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
     for k, row_counts in enumerate(all_counts):
-        step, stepping = step_keys(case, row_counts, row_counts if way == "both" else {**all_counts[-1]}, k, courant)
+        step, stepping = step_keys(
+            case, row_counts, row_counts if way == "both" else {**all_counts[-1]}, k, courant
+        )
         length = max(cell_size(case, name, row_counts[name]) for name in refined)
         stretched = stretch_keys(case, way, k) if key is None else {}
         if stretched and way == "both" and courant is not None:
             step = courant / greatest_wave_rate(case, first) / 2**k
-        rows.append(Level(cell_keys_of(row_counts) | stepping | stretched, length, total_cells(case, row_counts), step))
+        rows.append(
+            Level(
+                cell_keys_of(row_counts) | stepping | stretched,
+                length,
+                total_cells(case, row_counts),
+                step,
+            )
+        )
     names = ", ".join(name.split(".")[1] for name in refined)
-    kinds = " and ".join(kind for kind, parts in (("pipes", pipes_with_cells(case)), ("basins", basins(case))) if parts)
+    kinds = " and ".join(
+        kind
+        for kind, parts in (("pipes", pipes_with_cells(case)), ("basins", basins(case)))
+        if parts
+    )
     all_refined = len(refined) == len(first) and not basins_from_files(case)
     text = f"cells of all {kinds}" if all_refined else f"cells of {names}"
     text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
-    return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
+    return Plan(
+        way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}"
+    )
 
 
 def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
@@ -242,7 +300,9 @@ def space_courant(case, levels: int) -> float | None:
     return min(numerics.courant, max(LEAST_COURANT, float(f"{share ** (1.0 / q):.2g}")))
 
 
-def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
+def step_keys(
+    case, cells: Counts, step_cells: Counts, k: int, courant: float | None
+) -> tuple[float, dict]:
     """(time step [s], overrides that set it) of row k: by the Courant number, or from the step that the case states.
 
     cells : numbers of cells of row k; step_cells : numbers of cells whose wave rate sets the step. If both are the same
@@ -254,7 +314,11 @@ def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | 
         return math.nan, {}
     if numerics.step is not None:
         halved = step_cells is cells
-        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_wave_rate(case, step_cells))
+        finest = (
+            numerics.step
+            if halved
+            else min(numerics.step, 1.0 / greatest_wave_rate(case, step_cells))
+        )
         step = finest / 2**k if halved else finest
         return step, {"numerics.step": step}
     step = courant / greatest_wave_rate(case, step_cells)
@@ -286,14 +350,23 @@ def time_plan(case, key: str | None, levels: int) -> Plan:
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
         if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
-            raise FvsolveError(f"{numerics.method} estimates no error, so rtol cannot be refined; expected "
-                               "numerics.step, or another method")  # fmt: skip
+            raise FvsolveError(
+                f"{numerics.method} estimates no error, so rtol cannot be refined; expected "
+                "numerics.step, or another method"
+            )
         first = max(FIRST_RTOL, numerics.rtol or 0.0)
         tolerances = [first / 10.0**k for k in range(levels)]
         rows = tuple(Level({"numerics.rtol": rtol}, rtol, count, math.nan) for rtol in tolerances)
-        return Plan("time", "rtol", rows, "rtol divided by ten, on one grid" if count else "rtol divided by ten")
+        return Plan(
+            "time",
+            "rtol",
+            rows,
+            "rtol divided by ten, on one grid" if count else "rtol divided by ten",
+        )
     if numerics.method == AUTO:
-        raise FvsolveError('method "auto" chooses its steps by their error; expected the key numerics.rtol')
+        raise FvsolveError(
+            'method "auto" chooses its steps by their error; expected the key numerics.rtol'
+        )
     step = first_step(case)
     steps = [step / 2**k for k in range(levels)]
     rows = tuple(Level({"numerics.step": h}, h, count, h) for h in steps)
@@ -323,9 +396,14 @@ REFERENCE_COST = 21.0 * 7.0
 
 
 def affordable_plan(
-    case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
+    case,
+    refine: str | None,
+    key: str | None,
+    levels: int | None,
+    cells: int | None,
+    against: str,
     points: ResultCache | None,
-) -> Plan:  # fmt: skip
+) -> Plan:
     """Plan of a refinement; if neither `cells` nor `key` is given, the study is planned to end within minutes.
 
     For this the number of cells of the first row is reduced if necessary, unless only steps are refined.
@@ -334,8 +412,13 @@ def affordable_plan(
     refinement = refinement_plan(case, refine, key, levels, cells)
     if cells is not None or key is not None or refinement.way == "time" or not cell_counts(case):
         return refinement
-    settings = {"study": "order", "what": "first cells", "way": refinement.way, "levels": len(refinement.levels),
-                "against": against}  # fmt: skip
+    settings = {
+        "study": "order",
+        "what": "first cells",
+        "way": refinement.way,
+        "levels": len(refinement.levels),
+        "against": against,
+    }
     stored = None if points is None else points.find(case, settings)
     first = stored["cells"] if stored else first_cells(case, refinement, refine, levels, against)
     if first == most_cells(cell_counts(case)):
@@ -354,8 +437,10 @@ def first_cells(case, rows: Plan, refine: str | None, levels: int | None, agains
     It is not halved below `LEAST_CELLS`, nor if patches or holes of a basin would then not end between cells.
     rows : plan with the cells of the case
     """
-    own_counts, exact = cell_counts(case), case.exact is not None or against != "auto" or bool(basins(case))
-    cells, seconds = most_cells(own_counts), rhs_seconds(study_model(case)) / total_cells(case, own_counts)
+    own_counts = cell_counts(case)
+    exact = case.exact is not None or against != "auto" or bool(basins(case))
+    cells = most_cells(own_counts)
+    seconds = rhs_seconds(study_model(case)) / total_cells(case, own_counts)
     while cells >= 2 * LEAST_CELLS and cpu_time(case, rows, seconds, exact) > CPU_BUDGET:
         if not is_valid(case, scaled(own_counts, (cells // 2) / most_cells(own_counts))):
             break
@@ -372,7 +457,10 @@ def cpu_time(case, rows: Plan, seconds: float, exact: bool) -> float:
     """
     numerics = case.numerics
     stages = method_named(automatic.first_method(numerics.method)).stages
-    row_times = [level.cells * (numerics.end - numerics.start) / level.step * seconds for level in rows.levels]
+    row_times = [
+        level.cells * (numerics.end - numerics.start) / level.step * seconds
+        for level in rows.levels
+    ]
     if any(math.isnan(seconds_of_row) for seconds_of_row in row_times):
         return 0.0
     return stages * sum(row_times) + (0.0 if exact else REFERENCE_COST * row_times[-1])

@@ -39,7 +39,9 @@ class Crossing:
         return self.coarser != self.finer
 
 
-def find_crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
+def find_crossing(
+    errors: Sequence[float], costs: Sequence[float], target: float
+) -> Crossing | None:
     """Crossing of a curve with the target error, such that all finer points have errors of at most `target`.
 
     errors, costs : of the points of the curve, from coarse to fine. None if the error of the finest point exceeds the
@@ -146,15 +148,23 @@ def front_row(points: Sequence[Point], target: float, floor: float, default: str
     target : trajectory error [-]; floor : smaller errors count as this error
     default : name of the default scheme and method, such as "weno5 rk4"
     """
-    by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
+    by_time, by_work = (
+        cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates")
+    )
     name, best = by_time or (None, None)
     by_cost = (target_crossings(points, target, floor, cost) for cost in ("seconds", "updates"))
     default_time, default_work = (crossings.get(default) for crossings in by_cost)
     return FrontRow(
-        target, name, fineness_text(points, name, best), best and best.cost, by_work and by_work[0],
-        by_work and by_work[1].cost, fineness_text(points, default, default_time), default_time and default_time.cost,
+        target,
+        name,
+        fineness_text(points, name, best),
+        best and best.cost,
+        by_work and by_work[0],
+        by_work and by_work[1].cost,
+        fineness_text(points, default, default_time),
+        default_time and default_time.cost,
         default_work and default_work.cost,
-    )  # fmt: skip
+    )
 
 
 def good_errors(points: Sequence[Point]) -> list[float]:
@@ -162,7 +172,9 @@ def good_errors(points: Sequence[Point]) -> list[float]:
     return [point.trajectory for point in points if point.ok]
 
 
-def target_crossings(points: Sequence[Point], target: float, floor: float, cost: str) -> dict[str, Crossing]:
+def target_crossings(
+    points: Sequence[Point], target: float, floor: float, cost: str
+) -> dict[str, Crossing]:
     """Crossing of each curve (scheme and method) with a target error, by name of the curve.
 
     target : trajectory error [-]; cost : "seconds" or "updates"; errors below the floor count as the floor
@@ -176,17 +188,29 @@ def target_crossings(points: Sequence[Point], target: float, floor: float, cost:
     return by_name
 
 
-def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: str) -> tuple[str, Crossing] | None:
+def cheapest_curve(
+    points: Sequence[Point], target: float, floor: float, cost: str
+) -> tuple[str, Crossing] | None:
     """Name and crossing of the curve with the least cost at a target, or None; arguments as for `target_crossings`."""
-    return min(target_crossings(points, target, floor, cost).items(), key=lambda item: item[1].cost, default=None)
+    return min(
+        target_crossings(points, target, floor, cost).items(),
+        key=lambda item: item[1].cost,
+        default=None,
+    )
 
 
-def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
+def interpolated_setting(
+    case: Case, coarse: MethodSetting, fine: MethodSetting, share: float
+) -> MethodSetting:
     """Setting between two settings of a curve; share : its position in logarithms, 0 at `coarse` and 1 at `fine`."""
     if coarse.cells is not None:
         cells = math.ceil(interpolate_log(coarse.cells, fine.cells, share))
         return cells_setting(case, coarse.scheme, coarse.method, cells)
-    return lumped_setting(coarse.method, float(f"{interpolate_log(coarse.size, fine.size, share):.2g}"), coarse.control)
+    return lumped_setting(
+        coarse.method,
+        float(f"{interpolate_log(coarse.size, fine.size, share):.2g}"),
+        coarse.control,
+    )
 
 
 def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
@@ -195,7 +219,11 @@ def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
     None for a single cell, for tolerances above `GREATEST_RTOL`, and for steps above the duration of the run.
     """
     if setting.cells is not None:
-        return cells_setting(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
+        return (
+            cells_setting(case, setting.scheme, setting.method, setting.cells // 2)
+            if setting.cells > 1
+            else None
+        )
     size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")
     most = GREATEST_RTOL if setting.control == "rtol" else case.numerics.end - case.numerics.start
     return lumped_setting(setting.method, size, setting.control) if size <= most else None
@@ -213,9 +241,21 @@ def fineness_text(points, name: str | None, where: Crossing | None) -> str:
 
 
 TABLE_COLUMNS = (
-    "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
-    "steps", "ok", "reason",
-)  # fmt: skip
+    "scheme",
+    "method",
+    "cells",
+    "size",
+    "trajectory",
+    "greatest",
+    "end",
+    "overshoot",
+    "worst",
+    "seconds",
+    "updates",
+    "steps",
+    "ok",
+    "reason",
+)
 
 
 @dataclass(frozen=True)
@@ -312,15 +352,35 @@ def toml_value(value) -> str:
 
 
 CHART_COLUMNS = columns(
-    scheme="scheme", method="method", control="control", size="size", cells="cells", ok="ok",
-    trajectory="trajectory error", greatest="greatest error", end="end error", overshoot="overshoot", worst="worst",
-    seconds="cpu [s]", rhs="rhs", updates="cell updates", steps="steps", below="below floor",
-    by_seconds="front by cpu", by_updates="front by updates", reason="reason",
-)  # fmt: skip
-ERROR_LABELS = ("mean error over the run [fraction of the range]", "error at the end [fraction of the range]")
+    scheme="scheme",
+    method="method",
+    control="control",
+    size="size",
+    cells="cells",
+    ok="ok",
+    trajectory="trajectory error",
+    greatest="greatest error",
+    end="end error",
+    overshoot="overshoot",
+    worst="worst",
+    seconds="cpu [s]",
+    rhs="rhs",
+    updates="cell updates",
+    steps="steps",
+    below="below floor",
+    by_seconds="front by cpu",
+    by_updates="front by updates",
+    reason="reason",
+)
+ERROR_LABELS = (
+    "mean error over the run [fraction of the range]",
+    "error at the end [fraction of the range]",
+)
 
 
-def write_chart(chart: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:
+def write_chart(
+    chart: Chart, folder: Path, title: str = "", dpi: float | None = None
+) -> list[Path]:
     """Write the table and both pictures of a chart; returns their paths."""
     from fvsolve.report.draw.accuracy_pictures import save_picture
 
@@ -355,12 +415,21 @@ def chart_picture(chart: Chart, title: str = ""):
     curves = []
     for name, points in chart.curves().items():
         setting = points[0].setting
-        errors = [np.array([getattr(point, key) for point in points]) for key in ("trajectory", "end")]
-        costs = [np.array([getattr(point, key) for point in points], float) for key in ("seconds", "updates")]
+        errors = [
+            np.array([getattr(point, key) for point in points]) for key in ("trajectory", "end")
+        ]
+        costs = [
+            np.array([getattr(point, key) for point in points], float)
+            for key in ("seconds", "updates")
+        ]
         failed = np.array([not point.ok for point in points])
         first = setting.scheme or setting.method
         curves.append(Curve(first, setting.method, errors, costs, failed, name == chart.default))
-    work = "cell updates" if any(point.setting.cells for point in chart.points) else "rates evaluated x states"
+    work = (
+        "cell updates"
+        if any(point.setting.cells for point in chart.points)
+        else "rates evaluated x states"
+    )
     floors = [chart.floor[key] or 0.0 for key in ("trajectory", "end")]
     title = title or f"{chart.case}: error against cost"
     return chart_figure(curves, ERROR_LABELS, ("CPU time [s]", work), floors, title)

@@ -23,9 +23,12 @@ QUIET_PER_DECADE = 10  # frequencies per decade of the search for the last one o
 SCALING_TURNS = 20  # of the scaling of a matrix
 TURNS_POINTS = 200_000  # greatest number of frequencies for turns of delays
 CHEBYSHEV_POINTS = 48  # of each delay, for estimates of poles
-LEAST_POINTS, COLLOCATED_SIZE = 6, 1000  # least number of these points, and greatest size of the matrix with them
-MANY_STATES, RIGHTMOST = 200, 3  # beyond, only this multiple of the poles that are needed is estimated
-FEW, CHUNK = 4, 2_000_000  # frequencies that are solved one by one; greatest number of entries of an array of many
+# least number of these points, and greatest size of the matrix with them
+LEAST_POINTS, COLLOCATED_SIZE = 6, 1000
+# beyond, only this multiple of the poles that are needed is estimated
+MANY_STATES, RIGHTMOST = 200, 3
+# frequencies that are solved one by one; greatest number of entries of an array of many
+FEW, CHUNK = 4, 2_000_000
 BLOCK = 48  # rows of a triangular matrix that are solved together
 EIGENVALUE_OPERATIONS = 25.0  # over n^3
 RESPONSE_RATE = 5e9  # operations in responses on one core of 2020 [1/s]
@@ -56,7 +59,9 @@ class DelaySystem:
     inputs: int
     outputs: int
     delays: np.ndarray
-    work: WorkLimit = field(default_factory=lambda: WorkLimit("responses of a loop with delays", FEWER_DELAYS))
+    work: WorkLimit = field(
+        default_factory=lambda: WorkLimit("responses of a loop with delays", FEWER_DELAYS)
+    )
 
     @cached_property
     def schur(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -78,13 +83,17 @@ class DelaySystem:
         """D + C (s - A)^-1 B with all delays cut : complex128[len(s), rows, columns]."""
         left = self.schur[1]
         with np.errstate(divide="ignore", invalid="ignore"):
-            return self.d + np.moveaxis(np.tensordot(left, self.states_at(s, self.schur[2]), 1), 0, 1)
+            return self.d + np.moveaxis(
+                np.tensordot(left, self.states_at(s, self.schur[2]), 1), 0, 1
+            )
 
     def states_at(self, s: np.ndarray, right: np.ndarray) -> np.ndarray:
         """Solution (s - T)^-1 of a matrix, or of one for each s : complex128[states, len(s), columns]."""
         t = self.schur[0]
         n = t.shape[0]
-        right = np.broadcast_to(right if right.ndim == 3 else right[:, None, :], (n, s.size, right.shape[-1]))
+        right = np.broadcast_to(
+            right if right.ndim == 3 else right[:, None, :], (n, s.size, right.shape[-1])
+        )
         x = np.zeros(right.shape, complex)
         if s.size <= FEW and 0 < n <= MANY_STATES:
             from scipy.linalg.lapack import ztrtrs
@@ -98,7 +107,9 @@ class DelaySystem:
         flat = x.reshape(n, s.size * right.shape[-1])
         for end in range(n, 0, -BLOCK):  # products of matrices for most of the sum
             start = max(0, end - BLOCK)
-            known = right[start:end] + (t[start:end, end:] @ flat[end:]).reshape(end - start, *right.shape[1:])
+            known = right[start:end] + (t[start:end, end:] @ flat[end:]).reshape(
+                end - start, *right.shape[1:]
+            )
             for i in reversed(range(start, end)):
                 within = (t[i, i + 1 : end] @ flat[i + 1 : end]).reshape(right.shape[1:])
                 x[i] = (known[i - start] + within) / (s - t[i, i])[:, None]
@@ -121,7 +132,9 @@ class DelaySystem:
 
     def response_at_once(self, s: np.ndarray) -> np.ndarray:
         """Transfer functions of `response`, with arrays for all s together."""
-        cut, m, p = self.cut_response(s), self.inputs, self.outputs
+        cut = self.cut_response(s)
+        m = self.inputs
+        p = self.outputs
         if not self.delays.size:
             return cut
         closed = np.eye(self.delays.size) - cut[:, p:, m:] * self.decay(s)[:, None, :]
@@ -130,13 +143,21 @@ class DelaySystem:
 
     def closed(self, gain: float = 1.0) -> DelaySystem:
         """System in which each input u is `gain` times the output y of the same number, without inputs and outputs."""
-        m, p, n = self.inputs, self.outputs, self.a.shape[0]
-        back = np.linalg.solve(np.eye(p) - gain * self.d[:p, :m], gain * np.hstack([self.c[:p], self.d[:p, m:]]))
+        m = self.inputs
+        p = self.outputs
+        n = self.a.shape[0]
+        back = np.linalg.solve(
+            np.eye(p) - gain * self.d[:p, :m], gain * np.hstack([self.c[:p], self.d[:p, m:]])
+        )
         return replace(
-            self, a=self.a + self.b[:, :m] @ back[:, :n], b=self.b[:, m:] + self.b[:, :m] @ back[:, n:],
-            c=self.c[p:] + self.d[p:, :m] @ back[:, :n], d=self.d[p:, m:] + self.d[p:, :m] @ back[:, n:],
-            inputs=0, outputs=0,
-        )  # fmt: skip
+            self,
+            a=self.a + self.b[:, :m] @ back[:, :n],
+            b=self.b[:, m:] + self.b[:, :m] @ back[:, n:],
+            c=self.c[p:] + self.d[p:, :m] @ back[:, :n],
+            d=self.d[p:, m:] + self.d[p:, :m] @ back[:, n:],
+            inputs=0,
+            outputs=0,
+        )
 
     @property
     def fastest(self) -> float:
@@ -205,7 +226,9 @@ class DelaySystem:
         """
         high = FAR * self.fastest
         count = int(QUIET_PER_DECADE * np.log10(high / self.slowest)) + 2
-        grid = np.unique(np.concatenate([np.geomspace(self.slowest, high, count), np.abs(self.rates.imag)]))
+        grid = np.unique(
+            np.concatenate([np.geomspace(self.slowest, high, count), np.abs(self.rates.imag)])
+        )
         size = self.in_chunks(self.scaled_norms, shift + 1j * grid)
         loud = np.flatnonzero(size >= 0.5 * (1.0 + size[-1]))
         if size[-1] >= 1.0 or not loud.size:
@@ -251,21 +274,32 @@ class DelaySystem:
         """
         from scipy.linalg import expm
 
-        n, h, m, p, k = self.a.shape[0], float(times[1] - times[0]), self.inputs, self.outputs, self.delays.size
+        n = self.a.shape[0]
+        h = float(times[1] - times[0])
+        m = self.inputs
+        p = self.outputs
+        k = self.delays.size
         drive = np.hstack([self.b[:, :1], self.b[:, m:]])
         blocks = np.zeros((n + 2 * (1 + k), n + 2 * (1 + k)))
         blocks[:n, :n], blocks[:n, n : n + 1 + k] = self.a, drive
         blocks[n : n + 1 + k, n + 1 + k :] = np.eye(1 + k) / h
         power = expm(blocks * h)
-        step, held, ramp = power[:n, :n], power[:n, n : n + 1 + k], power[:n, n + 1 + k :]
-        x, sent, result = np.zeros(n), np.zeros((times.size, k)), np.zeros((times.size, p))
+        step = power[:n, :n]
+        held = power[:n, n : n + 1 + k]
+        ramp = power[:n, n + 1 + k :]
+        x = np.zeros(n)
+        sent = np.zeros((times.size, k))
+        result = np.zeros((times.size, p))
         late = self.delays / h
         before = np.zeros(1 + k)
         for i in range(times.size):
             place = i - late
             low = np.floor(place + 1e-9).astype(int)
             share = np.clip(place - low, 0.0, 1.0)
-            known = [sent[np.clip(low + side, 0, max(i - 1, 0)), np.arange(k)] * (low + side >= 0) for side in (0, 1)]
+            known = [
+                sent[np.clip(low + side, 0, max(i - 1, 0)), np.arange(k)] * (low + side >= 0)
+                for side in (0, 1)
+            ]
             now = np.concatenate([[1.0], (1.0 - share) * known[0] + share * known[1]])
             if i > 0:
                 x = step @ x + held @ before + ramp @ (now - before)
@@ -290,7 +324,8 @@ class DelaySystem:
             estimates = sorted_poles(estimates)[: RIGHTMOST * most]
         for guess in estimates[np.argsort(np.abs(estimates))]:
             pole = self.newton(complex(guess))
-            if pole is None or abs(pole - guess) > NEAR * abs(guess):  # beyond the resolution of the collocation
+            # beyond the resolution of the collocation
+            if pole is None or abs(pole - guess) > NEAR * abs(guess):
                 break
             if all(abs(pole - other) > 1e-8 * (abs(pole) + self.slowest) for other in found):
                 found.append(pole)
@@ -301,7 +336,11 @@ class DelaySystem:
 
         All poles without delays; no estimates if there are too many delays.
         """
-        return np.linalg.eigvals(self.collocated()) if self.collocation_points or not self.delays.size else np.zeros(0)
+        return (
+            np.linalg.eigvals(self.collocated())
+            if self.collocation_points or not self.delays.size
+            else np.zeros(0)
+        )
 
     @property
     def collocated_size(self) -> int:
@@ -311,7 +350,9 @@ class DelaySystem:
     @property
     def collocation_points(self) -> int:
         """Number of Chebyshev points of each delay, so few that the matrix is not too large; 0 for too many delays."""
-        points = min(CHEBYSHEV_POINTS, (COLLOCATED_SIZE - self.a.shape[0]) // max(1, self.delays.size))
+        points = min(
+            CHEBYSHEV_POINTS, (COLLOCATED_SIZE - self.a.shape[0]) // max(1, self.delays.size)
+        )
         return points if points >= LEAST_POINTS else 0
 
     def collocated(self) -> np.ndarray:
@@ -343,8 +384,12 @@ class DelaySystem:
 
         f'/f = sum of 1 / (s - rates) + trace((1 - P E)^-1 (P T - P') E), with P' = -C (s - A)^-2 B and the delays T.
         """
-        m, p, start = self.inputs, self.outputs, s
-        left, right, d = self.schur[1][p:], self.schur[2][:, m:], self.d[p:, m:]
+        m = self.inputs
+        p = self.outputs
+        start = s
+        left = self.schur[1][p:]
+        right = self.schur[2][:, m:]
+        d = self.d[p:, m:]
         for _ in range(NEWTON_TURNS):
             if np.any(self.rates == s):
                 return s
@@ -352,7 +397,9 @@ class DelaySystem:
             x = self.states_at(here, right)
             p_here, slope = d + left @ x[:, 0], -left @ self.states_at(here, x)[:, 0]
             try:
-                change = np.linalg.solve(np.eye(d.shape[0]) - p_here * decay, (p_here * self.delays - slope) * decay)
+                change = np.linalg.solve(
+                    np.eye(d.shape[0]) - p_here * decay, (p_here * self.delays - slope) * decay
+                )
                 step = 1.0 / (np.sum(1.0 / (s - self.rates)) + np.trace(change))
             except np.linalg.LinAlgError:
                 return s
@@ -366,5 +413,7 @@ class DelaySystem:
 
 def sorted_poles(poles: np.ndarray) -> np.ndarray:
     """Poles by falling real part, then by rising frequency, the one above the axis first."""
-    digits = [[float(f"{part:.9g}") for part in values] for values in (poles.real, np.abs(poles.imag))]
+    digits = [
+        [float(f"{part:.9g}") for part in values] for values in (poles.real, np.abs(poles.imag))
+    ]
     return poles[np.lexsort((-poles.imag, np.array(digits[1]), -np.array(digits[0])))]

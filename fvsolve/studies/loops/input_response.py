@@ -42,13 +42,31 @@ class InputResponse:
         """Values for JSON with the names of `studies.ports.response.Response`; `port` and `verdict` are None."""
         residues = None if self.system.delays.size else residues_of(self.system, self.poles)
         return {
-            "case": self.case, "when": self.when, "port": None, "kind": "response", "input": self.input,
-            "output": self.output, "scheme": self.scheme, "input_unit": self.units[0], "output_unit": self.units[1],
-            "states": self.states, "state_units": self.state_units, "A": self.system.a, "B": self.system.b[:, 0],
-            "C": self.system.c[0], "D": float(self.system.d[0, 0]), "delays": self.system.delays, "error": self.error,
-            "poles": [[float(s.real), float(s.imag)] for s in self.poles], "residues": residues,
-            "frequency": self.w, "real": self.h.real, "imaginary": self.h.imag, "moving": self.moving, "verdict": None,
-        }  # fmt: skip
+            "case": self.case,
+            "when": self.when,
+            "port": None,
+            "kind": "response",
+            "input": self.input,
+            "output": self.output,
+            "scheme": self.scheme,
+            "input_unit": self.units[0],
+            "output_unit": self.units[1],
+            "states": self.states,
+            "state_units": self.state_units,
+            "A": self.system.a,
+            "B": self.system.b[:, 0],
+            "C": self.system.c[0],
+            "D": float(self.system.d[0, 0]),
+            "delays": self.system.delays,
+            "error": self.error,
+            "poles": [[float(s.real), float(s.imag)] for s in self.poles],
+            "residues": residues,
+            "frequency": self.w,
+            "real": self.h.real,
+            "imaginary": self.h.imag,
+            "moving": self.moving,
+            "verdict": None,
+        }
 
 
 def residues_of(system: DelaySystem, poles: np.ndarray) -> list:
@@ -68,9 +86,14 @@ def residues_of(system: DelaySystem, poles: np.ndarray) -> list:
 @declared("study")
 @validated(input=TEXT, output=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def input_response(
-    case, input: str, output: str, at: float | None = None, before: bool = False, scheme: str | None = None,
+    case,
+    input: str,
+    output: str,
+    at: float | None = None,
+    before: bool = False,
+    scheme: str | None = None,
     set: Mapping | None = None,
-) -> InputResponse:  # fmt: skip
+) -> InputResponse:
     """Compute the transfer function from an input of a case to a probe, linearised as by `linearise`.
 
     input : such as "valve.opening" or "controls.NAME.setpoint"; output : probe; at, before, scheme, set : as for
@@ -83,9 +106,18 @@ def input_response(
     point = linear.at
     w = frequencies(system, lambda x: system.response(1j * x)[:, 0, 0])
     return InputResponse(
-        point.model.case.name, point.when, input, output, (linear.input_units[0], linear.output_units[0]),
-        point.model.case.numerics.scheme if point.model.cells else None, tuple(linear.states),
-        tuple(linear.state_units), system, max(linear.error.values()), system.poles(MOST_POLES), w,
+        point.model.case.name,
+        point.when,
+        input,
+        output,
+        (linear.input_units[0], linear.output_units[0]),
+        point.model.case.numerics.scheme if point.model.cells else None,
+        tuple(linear.states),
+        tuple(linear.state_units),
+        system,
+        max(linear.error.values()),
+        system.poles(MOST_POLES),
+        w,
         system.response(1j * w)[:, 0, 0],
         float(np.max(np.abs(point.rate) / point.model.scale)),
-    )  # fmt: skip
+    )

@@ -61,10 +61,15 @@ class Loop(PlainData):
         own = {name: plain(getattr(self, name)) for name in ("case", "control", "when", "stable")}
         own |= {field.name: plain(getattr(self.margins, field.name)) for field in fields(Margins)}
         return own | {
-            "gain_range": list(self.gain_range), "delays": list(self.delays), "period": self.period,
-            "poles": [[float(s.real), float(s.imag)] for s in self.poles], "frequency": plain(self.frequency),
-            "real": plain(self.ratio.real), "imaginary": plain(self.ratio.imag), "moving": self.moving,
-        }  # fmt: skip
+            "gain_range": list(self.gain_range),
+            "delays": list(self.delays),
+            "period": self.period,
+            "poles": [[float(s.real), float(s.imag)] for s in self.poles],
+            "frequency": plain(self.frequency),
+            "real": plain(self.ratio.real),
+            "imaginary": plain(self.ratio.imag),
+            "moving": self.moving,
+        }
 
 
 STAGES = 4  # of a study, for `progress`
@@ -73,7 +78,11 @@ STAGES = 4  # of a study, for `progress`
 @declared("study")
 @validated(name=TEXT, at=NUMBER, set=TABLE, progress=FUNCTION)
 def loop(
-    case, name: str, at: float | None = None, set: Mapping | None = None, progress: Progress | None = None
+    case,
+    name: str,
+    at: float | None = None,
+    set: Mapping | None = None,
+    progress: Progress | None = None,
 ) -> Loop:
     """Study the loop of a control of a case, linearised at its start or at the time `at` [s].
 
@@ -101,9 +110,20 @@ def loop(
     report(3, STAGES, "poles")
     closed = system.closed()
     return Loop(
-        case.name, name, point.when, stable, margins, gain_range, tuple(system.delays.tolist()), None,
-        closed.poles(MOST_POLES), w, ratio(w), system, float(np.max(np.abs(point.rate) / point.model.scale)),
-    )  # fmt: skip
+        case.name,
+        name,
+        point.when,
+        stable,
+        margins,
+        gain_range,
+        tuple(system.delays.tolist()),
+        None,
+        closed.poles(MOST_POLES),
+        w,
+        ratio(w),
+        system,
+        float(np.max(np.abs(point.rate) / point.model.scale)),
+    )
 
 
 def sampled_loop(case, name: str, at: float | None, report: Progress) -> Loop:
@@ -113,13 +133,22 @@ def sampled_loop(case, name: str, at: float | None, report: Progress) -> Loop:
     """
     sampled = SampledLoop(case, name, at)
     report(1, STAGES, f"return ratio of {sampled.size} numbers and {len(sampled.events)} events")
-    w, values, gains = np.zeros(0), np.zeros(0, complex), np.zeros(0)
+    w = np.zeros(0)
+    values = np.zeros(0, complex)
+    gains = np.zeros(0)
     margins = Margins(*[None] * len(fields(Margins)))
     if sampled.acts_once:
         fastest = np.pi / sampled.period
-        parts = [np.geomspace(LOWEST * fastest, fastest, LOW_POINTS), np.linspace(0.0, fastest, LINEAR_POINTS)]
+        parts = [
+            np.geomspace(LOWEST * fastest, fastest, LOW_POINTS),
+            np.linspace(0.0, fastest, LINEAR_POINTS),
+        ]
         w = np.unique(np.concatenate(parts))[1:-1]  # without both ends
-        ends = {at: value for at, value in zip((0.0, fastest), sampled.real_ends(), strict=True) if value is not None}
+        ends = {
+            at: value
+            for at, value in zip((0.0, fastest), sampled.real_ends(), strict=True)
+            if value is not None
+        }
         margins, gains = find_margins(sampled.ratio, w, ends)
         values = sampled.ratio(w)
         if not np.any(values):
@@ -131,10 +160,20 @@ def sampled_loop(case, name: str, at: float | None, report: Progress) -> Loop:
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
     point = sampled.point
     return Loop(
-        case.name, name, point.when, sampled.radius(1.0) < 1.0 - STABLE, margins, sampled.gain_range(gains),
-        tuple(sampled.delays.values()), sampled.period, poles, w, values, sampled,
+        case.name,
+        name,
+        point.when,
+        sampled.radius(1.0) < 1.0 - STABLE,
+        margins,
+        sampled.gain_range(gains),
+        tuple(sampled.delays.values()),
+        sampled.period,
+        poles,
+        w,
+        values,
+        sampled,
         float(np.max(np.abs(point.rate) / point.model.scale)),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -162,7 +201,11 @@ def frequencies(system: DelaySystem, ratio: Callable[[np.ndarray], np.ndarray]) 
         large = grid[np.abs(ratio(grid)) > SMALL]
         last = min(float(large.max(initial=low)), MOST_TURNS * 2.0 * np.pi / longest)
         parts.append(
-            np.arange(1, int(PER_TURN * last * longest / (2.0 * np.pi)) + 2) * 2.0 * np.pi / longest / PER_TURN
+            np.arange(1, int(PER_TURN * last * longest / (2.0 * np.pi)) + 2)
+            * 2.0
+            * np.pi
+            / longest
+            / PER_TURN
         )
     return np.unique(np.concatenate(parts))
 
@@ -181,7 +224,11 @@ def stable_gains(
 
     def stable(low: float, high: float) -> bool:
         gain = gain_within(low, high)
-        report(2, STAGES, f"stability with {gain:.4g} times the gain, one of up to {len(limits) - 1} ranges")
+        report(
+            2,
+            STAGES,
+            f"stability with {gain:.4g} times the gain, one of up to {len(limits) - 1} ranges",
+        )
         return bool(is_stable_at(system, gain))
 
     return nearest_range(limits, stable, distance), own

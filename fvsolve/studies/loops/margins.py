@@ -10,8 +10,10 @@ import numpy as np
 from fvsolve.core.output.result_table import PlainData
 
 ReturnRatio = Callable[[np.ndarray], np.ndarray]  # frequencies [rad/s] -> L(j w)
-POLE = 1e6  # of |L| at the frequencies beside it: a greater |L| is a pole of L, at which its sign changes too
-ROOT_TURNS, ROOT_ROUNDING = 60, 1e-15  # greatest number of turns of a search; relative change at which it ends
+# of |L| at the frequencies beside it: a greater |L| is a pole of L, at which its sign changes too
+POLE = 1e6
+# greatest number of turns of a search; relative change at which it ends
+ROOT_TURNS, ROOT_ROUNDING = 60, 1e-15
 REAL = 1e-9  # of |L|: imaginary parts below are zero where L is real
 
 
@@ -36,7 +38,9 @@ class Margins(PlainData):
     stability_crossover: float | None
 
 
-def find_margins(ratio: ReturnRatio, w: np.ndarray, ends: dict[float, complex]) -> tuple[Margins, np.ndarray]:
+def find_margins(
+    ratio: ReturnRatio, w: np.ndarray, ends: dict[float, complex]
+) -> tuple[Margins, np.ndarray]:
     """(margins, gains 1 / |L| at all frequencies where L is real and negative) of a return ratio.
 
     w : increasing frequencies [rad/s], between which L turns little; ends : values of L where it is real and finite at
@@ -77,7 +81,10 @@ def roots(f: ReturnRatio, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     for _ in range(ROOT_TURNS):
         if not active.size:
             break
-        left, right, f_left, f_right = a[active], b[active], fa[active], fb[active]
+        left = a[active]
+        right = b[active]
+        f_left = fa[active]
+        f_right = fb[active]
         middle = 0.5 * (left + right)
         f_middle = f(middle)
         size = np.maximum(np.abs(f_middle), np.maximum(np.abs(f_left), np.abs(f_right)))
@@ -94,7 +101,11 @@ def roots(f: ReturnRatio, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         fb[active] = np.where(is_left[1], f_right, np.where(is_left[0], f_points[1], f_points[0]))
         moved = np.abs(x - found[active])
         found[active] = x
-        near = (moved <= ROOT_ROUNDING * x) | (fx == 0.0) | (b[active] - a[active] <= ROOT_ROUNDING * x)
+        near = (
+            (moved <= ROOT_ROUNDING * x)
+            | (fx == 0.0)
+            | (b[active] - a[active] <= ROOT_ROUNDING * x)
+        )
         active = active[~(near | ~np.isfinite(fx))]
     return found
 
@@ -109,12 +120,20 @@ def closest(
     if not np.isfinite(size).any():
         return None, None
     k = int(np.nanargmin(size))
-    at_end = min(((float(abs(1.0 + value)), at) for at, value in ends.items()), default=(np.inf, 0.0))
+    at_end = min(
+        ((float(abs(1.0 + value)), at) for at, value in ends.items()), default=(np.inf, 0.0)
+    )
     if at_end[0] <= size[k]:
         return at_end[1], at_end[0]
     if k in (0, w.size - 1):  # it only tends to this value
         return None, None
     low, high = w[max(k - 1, 0)], w[min(k + 1, w.size - 1)]
-    found = minimize_scalar(lambda x: float(np.abs(1.0 + ratio(np.array([x])))[0]), bounds=(low, high),
-                            method="bounded", options={"xatol": 1e-10 * high})  # fmt: skip
-    return (float(found.x), float(found.fun)) if found.fun < size[k] else (float(w[k]), float(size[k]))
+    found = minimize_scalar(
+        lambda x: float(np.abs(1.0 + ratio(np.array([x])))[0]),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-10 * high},
+    )
+    return (
+        (float(found.x), float(found.fun)) if found.fun < size[k] else (float(w[k]), float(size[k]))
+    )

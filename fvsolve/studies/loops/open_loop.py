@@ -24,8 +24,11 @@ from fvsolve.studies.stability.delay_line_limits import reflected_share
 from fvsolve.units import DIMENSIONS, show
 
 MAX_STATES = 800  # greatest number of states
-SAME_OUTPUT = 1e-9  # distance of an output from its limit, relative to the range of the output, that is rounding
-ANOTHER_POINT = "expected an output between its limits: another time (--at), initial output or setpoint"
+# distance of an output from its limit, relative to the range of the output, that is rounding
+SAME_OUTPUT = 1e-9
+ANOTHER_POINT = (
+    "expected an output between its limits: another time (--at), initial output or setpoint"
+)
 
 
 def block_of(case, name: str) -> str:
@@ -33,12 +36,16 @@ def block_of(case, name: str) -> str:
     name = name.removeprefix(BLOCK_PREFIX)
     if name not in case.controls:
         hint = did_you_mean(name, case.controls) or (
-            f"; controls are {listing(case.controls)}" if case.controls else "; the case has no [controls]"
+            f"; controls are {listing(case.controls)}"
+            if case.controls
+            else "; the case has no [controls]"
         )
         raise FvsolveError(f"no control named {show(name)}{hint}")
     if case.controls[name].control.switches:
         kind = case.controls[name].control.kind
-        raise FvsolveError(f"controls.{name} is a {kind}, whose output has no slope; expected another type of control")
+        raise FvsolveError(
+            f"controls.{name} is a {kind}, whose output has no slope; expected another type of control"
+        )
     return name
 
 
@@ -82,7 +89,9 @@ def delayed_system(case, set, input: str, output: str, at: float | None, before:
 def outputs_at_limits(point: OperatingPoint) -> dict[str, float]:
     """Controls whose output is at a limit, up to rounding : name -> limit; without those that only switch."""
     result = {}
-    for k, (name, row) in enumerate(zip(point.model.block_names, blocks_of(point.model), strict=True)):
+    for k, (name, row) in enumerate(
+        zip(point.model.block_names, blocks_of(point.model), strict=True)
+    ):
         block, span = point.model.case.controls[name], row["greatest"] - row["least"]
         for limit in (float(row["least"]), float(row["greatest"])):
             size = span if np.isfinite(span) else max(abs(limit), small_change(block.dimensions[1]))
@@ -100,9 +109,13 @@ def refuse_limits(point: OperatingPoint, cut: str | None) -> None:
     for name, limit in outputs_at_limits(point).items():
         block = point.model.case.controls[name]
         if name == cut or block.control.kind == "delay":
-            effect = "so its loop is open" if name == cut else "so it passes only a rise or only a fall"
-            raise FvsolveError(f"the output of controls.{name} is at a limit, {limit_text(block, limit)}, at "
-                               f"{point.when}, {effect}; {ANOTHER_POINT}")  # fmt: skip
+            effect = (
+                "so its loop is open" if name == cut else "so it passes only a rise or only a fall"
+            )
+            raise FvsolveError(
+                f"the output of controls.{name} is at a limit, {limit_text(block, limit)}, at "
+                f"{point.when}, {effect}; {ANOTHER_POINT}"
+            )
 
 
 def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
@@ -111,13 +124,18 @@ def linear_with_names(point: OperatingPoint, inputs, outputs: int) -> Linear:
         return linearise_at(point, inputs, outputs)
     except FvsolveError as error:
         if stopped := outputs_at_limits(point):
-            raise FvsolveError(f"{error}; at a limit: {at_limits(point, stopped)}; {ANOTHER_POINT}") from None
+            raise FvsolveError(
+                f"{error}; at a limit: {at_limits(point, stopped)}; {ANOTHER_POINT}"
+            ) from None
         raise
 
 
 def at_limits(point: OperatingPoint, stopped: dict[str, float]) -> str:
     """Text of controls and their limits; stopped : as from `outputs_at_limits`."""
-    return listing(f"controls.{key} ({limit_text(point.model.case.controls[key], stopped[key])})" for key in stopped)
+    return listing(
+        f"controls.{key} ({limit_text(point.model.case.controls[key], stopped[key])})"
+        for key in stopped
+    )
 
 
 def limit_text(block, limit: float) -> str:
@@ -151,8 +169,13 @@ def with_delays(system, cut: str, output: str, delays: dict[str, float]) -> Dela
     a = system.a if isinstance(system.a, np.ndarray) else system.a.toarray()
     waves = [f"{BLOCK_PREFIX}{key}" for key in delays]
     columns = [system.inputs.index(cut), *(system.inputs.index(f"{wave}.output") for wave in waves)]
-    rows = [system.outputs.index(output), *(system.outputs.index(f"{wave}.input") for wave in waves)]
-    b, c, d = system.b[:, columns].copy(), system.c[rows], system.d[np.ix_(rows, columns)].copy()
+    rows = [
+        system.outputs.index(output),
+        *(system.outputs.index(f"{wave}.input") for wave in waves),
+    ]
+    b = system.b[:, columns].copy()
+    c = system.c[rows]
+    d = system.d[np.ix_(rows, columns)].copy()
     if cut.removesuffix(".output") in waves:  # the held output acts in place of what arrives
         k = 1 + waves.index(cut.removesuffix(".output"))
         b[:, k], d[:, k] = 0.0, 0.0
@@ -183,29 +206,53 @@ def with_lines(linear, system: DelaySystem, inputs: list[str], probes: list[str]
     at, rows = linear.at, lines_of(linear.at.model)
     model = seen_by_jumps(at.model)  # short lines need their travel time
     keep = np.setdiff1d(np.arange(len(system.a)), model.tables.pipes["y"][rows["pipe"]])
-    evaluate = line_function(replace(at, model=model), keep, [linear.outputs.index(probe) for probe in probes])
-    y, none, n, p = at.y, np.zeros(2 * len(rows)), keep.size, len(probes)
+    evaluate = line_function(
+        replace(at, model=model), keep, [linear.outputs.index(probe) for probe in probes]
+    )
+    y = at.y
+    none = np.zeros(2 * len(rows))
+    n = keep.size
+    p = len(probes)
     sizes = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2) * BAR_PRESSURE
     states, waves = np.eye(y.size)[keep], np.eye(none.size)
-    by_state = [slope(lambda h, e=e: evaluate(y + h * e, none, {}), model.scale @ e) for e in states]
+    by_state = [
+        slope(lambda h, e=e: evaluate(y + h * e, none, {}), model.scale @ e) for e in states
+    ]
     by_wave = np.array([slope(lambda h, e=e: evaluate(y, h * e, {}), sizes @ e) for e in waves]).T
-    values = zip(inputs, (linear.input_values[linear.inputs.index(name)] for name in inputs), strict=True)
-    by_input = [slope(lambda h, name=name, value=value: evaluate(y, none, {name: value + h}), max(0.01, abs(value)))
-                for name, value in values]  # fmt: skip
+    values = zip(
+        inputs, (linear.input_values[linear.inputs.index(name)] for name in inputs), strict=True
+    )
+    by_input = [
+        slope(
+            lambda h, name=name, value=value: evaluate(y, none, {name: value + h}),
+            max(0.01, abs(value)),
+        )
+        for name, value in values
+    ]
     sent_by_state = np.array(by_state).reshape(n, -1).T[n + p :]
     sent_by_input = np.array(by_input).T[n + p :]
     read = by_wave[n : n + p]
     for k, probe in enumerate(probes):  # the output of a delay does not depend on present waves
-        read[k] *= not (probe.endswith(".output") and f"{probe.removesuffix('.output')}.input" in probes)
+        read[k] *= not (
+            probe.endswith(".output") and f"{probe.removesuffix('.output')}.input" in probes
+        )
     arriving, sent, chain = stretches(
         rows, [reflected_share(model.tables.pipes[row["pipe"]], row["tau"]) for row in rows]
     )
     return DelaySystem(
-        system.a[np.ix_(keep, keep)], np.hstack([system.b[keep], by_wave[:n] @ arriving]),
+        system.a[np.ix_(keep, keep)],
+        np.hstack([system.b[keep], by_wave[:n] @ arriving]),
         np.vstack([system.c[:, keep], sent @ sent_by_state]),
-        np.block([[system.d, read @ arriving], [sent @ sent_by_input, sent @ by_wave[n + p :] @ arriving + chain]]),
-        1, 1, np.concatenate([system.delays, np.repeat(rows["tau"], 2 * rows["stretches"])]),
-    )  # fmt: skip
+        np.block(
+            [
+                [system.d, read @ arriving],
+                [sent @ sent_by_input, sent @ by_wave[n + p :] @ arriving + chain],
+            ]
+        ),
+        1,
+        1,
+        np.concatenate([system.delays, np.repeat(rows["tau"], 2 * rows["stretches"])]),
+    )
 
 
 def line_function(at: OperatingPoint, keep: np.ndarray, probes: list[int]):
@@ -213,7 +260,9 @@ def line_function(at: OperatingPoint, keep: np.ndarray, probes: list[int]):
 
     Its values are the rates of the states `keep`, the probes with these numbers, and the waves that nodes send.
     """
-    model, t, rows = at.model, float(at.t), lines_of(at.model)
+    model = at.model
+    t = float(at.t)
+    rows = lines_of(at.model)
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     both = np.stack([first, first + rows["stretches"] - 1], axis=1)
@@ -240,7 +289,9 @@ def stretches(rows: np.ndarray, shares: list[float]) -> tuple[np.ndarray, np.nda
     nodes send; waves that enter delays over delayed waves, at joints of stretches.
     """
     count, channels = len(rows), 2 * int(rows["stretches"].sum())
-    arriving, sent, chain = np.zeros((2 * count, channels)), np.zeros((channels, 2 * count)), np.zeros((channels,) * 2)
+    arriving = np.zeros((2 * count, channels))
+    sent = np.zeros((channels, 2 * count))
+    chain = np.zeros((channels,) * 2)
     k = 0
     for i, (number, share) in enumerate(zip(rows["stretches"].tolist(), shares, strict=True)):
         forward, backward = k + 2 * np.arange(number), k + 2 * np.arange(number) + 1

@@ -73,9 +73,13 @@ class SampledLoop:
     def __init__(self, case, name: str, at: float | None) -> None:
         self.case, self.name = case, name
         blocks = case.controls
-        self.sampled = {key: block.control for key, block in blocks.items() if block.control.period is not None}
+        self.sampled = {
+            key: block.control for key, block in blocks.items() if block.control.period is not None
+        }
         if late := [key for key in self.sampled if blocks[key].control.kind == "delay"]:
-            raise FvsolveError(f"controls.{late[0]} is a delay with `period`; expected a delay that acts at all times")
+            raise FvsolveError(
+                f"controls.{late[0]} is a delay with `period`; expected a delay that acts at all times"
+            )
         delays = [key for key, block in blocks.items() if block.control.kind == "delay"]
         self.period, self.ticks = common_period(self.sampled)
         own = f"{BLOCK_PREFIX}{name}.output"
@@ -83,7 +87,11 @@ class SampledLoop:
         self.point = operating_point(case, None, at, False, probes)
         refuse_limits(self.point, name)
         self.delays, self.flows, self.flows_gain = delay_blocks(self.point.model), {}, np.nan
-        inputs = list(dict.fromkeys([own, *(f"{BLOCK_PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]))
+        inputs = list(
+            dict.fromkeys(
+                [own, *(f"{BLOCK_PREFIX}{key}.output" for key in (*self.sampled, *self.delays))]
+            )
+        )
         system = linear_with_names(self.point, inputs, len(probes))
         if len(system.states) > MAX_STATES:
             raise state_limit_error(len(system.states))
@@ -95,18 +103,31 @@ class SampledLoop:
             for text, row, direct in zip(system.outputs, system.c, system.d, strict=False)
         }
         self.column = dict(zip(controls, system.b.T, strict=True))
-        held = [*self.delays, *([name] if name not in self.sampled and name not in self.delays else [])]
+        held = [
+            *self.delays,
+            *([name] if name not in self.sampled and name not in self.delays else []),
+        ]
         if held and name in held and name not in self.delays:
-            self.point = replace(self.point, model=hold(self.point.model, {own: float(self.point.outputs[
-                self.point.model.block_names.index(name)])}))  # fmt: skip
-        self.differences = without_idle_numbers(tick_differences(self.point, list(self.sampled), held))
+            self.point = replace(
+                self.point,
+                model=hold(
+                    self.point.model,
+                    {own: float(self.point.outputs[self.point.model.block_names.index(name)])},
+                ),
+            )
+        self.differences = without_idle_numbers(
+            tick_differences(self.point, list(self.sampled), held)
+        )
         self.events, self.registers = self.all_events()
         n, self.places = len(self.a), {}
         for key in self.sampled:
             count = self.differences[key][0].shape[0]
             self.places[key], n = n + np.arange(count), n + count
         for key in self.delays:  # w, then registers from the newest
-            self.places[key], n = n + np.arange(1 + self.registers[key]), n + 1 + self.registers[key]
+            self.places[key], n = (
+                n + np.arange(1 + self.registers[key]),
+                n + 1 + self.registers[key],
+            )
         self.size = n
         self.work = WorkLimit(f"maps of {n} numbers with {len(self.events)} events", REMEDY)
 
@@ -122,7 +143,8 @@ class SampledLoop:
 
     def all_events(self) -> tuple[list[LoopEvent], dict[str, int]]:
         """(events of the common period in their order, number of registers of each delay)."""
-        events, registers = [LoopEvent(time, TICK, key) for key, times in self.ticks.items() for time in times], {}
+        events = [LoopEvent(time, TICK, key) for key, times in self.ticks.items() for time in times]
+        registers = {}
         instants = sorted({self.within(time) for times in self.ticks.values() for time in times})
         for key, tau in self.delays.items():
             if self.is_held(key):
@@ -130,15 +152,23 @@ class SampledLoop:
             elif not self.feeds_states(key):
                 sends, arrivals = [time - tau for time in instants], instants
             else:
-                raise FvsolveError(f"controls.{key} delays what changes between samples, and drives what moves between "
-                                   "samples: such a loop has no finite map; expected a delay at a sampled control, or "
-                                   "loops without samples")  # fmt: skip
-            ages = [1 + sum(count_within(send, arrival - tau, arrival, self.period) for send in sends)
-                    for arrival in arrivals]  # fmt: skip
-            events += [LoopEvent(time, ARRIVE, key, age) for time, age in zip(arrivals, ages, strict=True)]
+                raise FvsolveError(
+                    f"controls.{key} delays what changes between samples, and drives what moves between "
+                    "samples: such a loop has no finite map; expected a delay at a sampled control, or "
+                    "loops without samples"
+                )
+            ages = [
+                1 + sum(count_within(send, arrival - tau, arrival, self.period) for send in sends)
+                for arrival in arrivals
+            ]
+            events += [
+                LoopEvent(time, ARRIVE, key, age) for time, age in zip(arrivals, ages, strict=True)
+            ]
             events += [LoopEvent(time, SEND, key) for time in sends]
             registers[key] = max(ages)
-        return sorted((replace(event, time=self.place(event)) for event in events), key=self.rank), registers
+        return sorted(
+            (replace(event, time=self.place(event)) for event in events), key=self.rank
+        ), registers
 
     def rank(self, event: LoopEvent) -> tuple:
         """Order of an event: time, kind, then order in which controls decide."""
@@ -157,7 +187,8 @@ class SampledLoop:
         """
         if self.name not in self.sampled:
             return self.within(event.time)
-        time, names = self.within(event.time - self.ticks[self.name][0]), self.point.model.block_names
+        time = self.within(event.time - self.ticks[self.name][0])
+        names = self.point.model.block_names
         later = event.kind == TICK and names.index(event.control) > names.index(self.name)
         return time if time > SAME * self.period or event.kind == SEND or later else self.period
 
@@ -179,7 +210,9 @@ class SampledLoop:
             for key in (*self.sampled, *self.delays):
                 rates[:n, self.places[key][0]] += self.factor(key, gain) * self.column[key]
             if self.name not in self.places:
-                rates[:n] += gain * np.outer(self.column[self.name], self.signal_row(self.name, gain))
+                rates[:n] += gain * np.outer(
+                    self.column[self.name], self.signal_row(self.name, gain)
+                )
             self.work.spend(EXPONENTIAL_OPERATIONS * self.size**3 / DENSE_RATE)
             self.flows[length] = expm(rates * length)
         return self.flows[length]
@@ -260,7 +293,9 @@ class SampledLoop:
     def open_system(self) -> DelaySystem:
         """System with the transfer function -L(z) of a control that is sampled once."""
         row = np.eye(1, self.size, self.places[self.name][0])
-        return DelaySystem(self.open_matrix, self.drive[:, None], row, np.zeros((1, 1)), 1, 1, np.zeros(0))
+        return DelaySystem(
+            self.open_matrix, self.drive[:, None], row, np.zeros((1, 1)), 1, 1, np.zeros(0)
+        )
 
     def radius(self, gain: float) -> float:
         """Spectral radius of the map."""
@@ -273,7 +308,9 @@ class SampledLoop:
         for z in (1.0, -1.0):
             matrix = z * np.eye(self.size) - self.open_matrix
             singular = np.linalg.cond(matrix) > SINGULAR
-            result.append(None if singular else complex(-np.linalg.solve(matrix, self.drive)[place]))
+            result.append(
+                None if singular else complex(-np.linalg.solve(matrix, self.drive)[place])
+            )
         return result[0], result[1]
 
     def gain_range(self, limits: np.ndarray) -> tuple[float | None, float | None]:
@@ -286,19 +323,31 @@ class SampledLoop:
         if not self.acts_once:
             gains = np.concatenate([np.geomspace(1e-6, 1.0, 241), np.geomspace(1.0, 1e6, 241)[1:]])
             stable = [self.radius(gain) < 1.0 - STABLE for gain in gains]
-            limits = [self.limit(*gains[k : k + 2]) for k in range(gains.size - 1) if stable[k] != stable[k + 1]]
+            limits = [
+                self.limit(*gains[k : k + 2])
+                for k in range(gains.size - 1)
+                if stable[k] != stable[k + 1]
+            ]
         bounds = [0.0, *sorted({float(limit) for limit in limits}), np.inf]
-        return nearest_range(bounds, lambda low, high: self.radius(gain_within(low, high)) < 1.0 - STABLE, distance_of)
+        return nearest_range(
+            bounds,
+            lambda low, high: self.radius(gain_within(low, high)) < 1.0 - STABLE,
+            distance_of,
+        )
 
     def limit(self, low: float, high: float) -> float:
         """Gain between two others at which the spectral radius is 1."""
         from scipy.optimize import brentq
 
-        return float(brentq(lambda gain: self.radius(gain) - 1.0, low, high, xtol=1e-15, rtol=1e-14))
+        return float(
+            brentq(lambda gain: self.radius(gain) - 1.0, low, high, xtol=1e-15, rtol=1e-14)
+        )
 
     def step_response(self, periods: int) -> tuple[np.ndarray, np.ndarray]:
         """(times [s], response of L / (1 + L) at samples to a step of 1) of a control that is sampled once."""
-        place, z, values = self.places[self.name][0], np.zeros(self.size), []
+        place = self.places[self.name][0]
+        z = np.zeros(self.size)
+        values = []
         for _ in range(periods):
             values.append(-z[place])
             z = self.open_matrix @ z + self.drive * (1.0 + z[place])
@@ -306,7 +355,9 @@ class SampledLoop:
 
 
 def nearest_range(
-    bounds: list[float], stable: Callable[[float, float], bool], distance: Callable[[float, float], float]
+    bounds: list[float],
+    stable: Callable[[float, float], bool],
+    distance: Callable[[float, float], float],
 ) -> tuple[float | None, float | None]:
     """Ends of the range of gains around 1 that is stable, or of the nearest one that is; None for an open end.
 
@@ -352,25 +403,42 @@ def common_period(sampled: dict) -> tuple[float, dict[str, list[float]]]:
     """
     names = list(sampled)
     first = sampled[names[0]].period
-    ratios = {name: Fraction(sampled[name].period / first).limit_denominator(RATIONAL) for name in names}
-    if odd := [name for name in names if abs(float(ratios[name]) * first / sampled[name].period - 1.0) > 1e-12]:
-        raise FvsolveError(f"the periods of {listing([names[0], odd[0]])} have no common period; expected whole ratios")
+    ratios = {
+        name: Fraction(sampled[name].period / first).limit_denominator(RATIONAL) for name in names
+    }
+    if odd := [
+        name
+        for name in names
+        if abs(float(ratios[name]) * first / sampled[name].period - 1.0) > 1e-12
+    ]:
+        raise FvsolveError(
+            f"the periods of {listing([names[0], odd[0]])} have no common period; expected whole ratios"
+        )
     whole = Fraction(1)
     for ratio in ratios.values():
-        whole = Fraction(np.lcm(whole.numerator * ratio.denominator, ratio.numerator * whole.denominator),
-                         whole.denominator * ratio.denominator)  # fmt: skip
+        whole = Fraction(
+            np.lcm(whole.numerator * ratio.denominator, ratio.numerator * whole.denominator),
+            whole.denominator * ratio.denominator,
+        )
     counts = {name: int(whole / ratio) for name, ratio in ratios.items()}
     if sum(counts.values()) > MOST_TICKS:
-        raise FvsolveError(f"the common period of {listing(names)} has {sum(counts.values())} samples; expected "
-                           f"{MOST_TICKS} or fewer")  # fmt: skip
-    ticks = {name: [sampled[name].offset + k * sampled[name].period for k in range(counts[name])] for name in names}
+        raise FvsolveError(
+            f"the common period of {listing(names)} has {sum(counts.values())} samples; expected "
+            f"{MOST_TICKS} or fewer"
+        )
+    ticks = {
+        name: [sampled[name].offset + k * sampled[name].period for k in range(counts[name])]
+        for name in names
+    }
     return float(whole) * first, ticks
 
 
 def count_within(time: float, begin: float, end: float, period: float) -> int:
     """Number of the times `time` + k `period`, k whole, between two times, without these [s]."""
     slack = SAME * period
-    return int(np.ceil((end - slack - time) / period) - np.floor((begin + slack - time) / period)) - 1
+    return (
+        int(np.ceil((end - slack - time) / period) - np.floor((begin + slack - time) / period)) - 1
+    )
 
 
 def without_idle_numbers(differences: dict[str, tuple]) -> dict[str, tuple]:
@@ -383,16 +451,26 @@ def without_idle_numbers(differences: dict[str, tuple]) -> dict[str, tuple]:
         others = [by_number[key] for other, (_, by_number) in differences.items() if other != key]
         inner = own[key] - np.diag(np.diag(own[key]))
         effect = np.any(np.vstack([inner, *others]) != 0.0, axis=0)
-        cause = np.any(np.hstack([states, inner, *(own[other] for other in own if other != key)]) != 0.0, axis=1)
+        cause = np.any(
+            np.hstack([states, inner, *(own[other] for other in own if other != key)]) != 0.0,
+            axis=1,
+        )
         used[key] = [j for j in range(states.shape[0]) if j == 0 or (effect[j] and cause[j])]
     return {
-        key: (states[used[key]], {other: columns[np.ix_(used[key], used.get(other, range(columns.shape[1])))]
-                                  for other, columns in by_number.items()})
+        key: (
+            states[used[key]],
+            {
+                other: columns[np.ix_(used[key], used.get(other, range(columns.shape[1])))]
+                for other, columns in by_number.items()
+            },
+        )
         for key, (states, by_number) in differences.items()
-    }  # fmt: skip
+    }
 
 
-def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str]) -> dict[str, tuple]:
+def tick_differences(
+    point: OperatingPoint, sampled: list[str], others: list[str]
+) -> dict[str, tuple]:
     """Derivatives of the numbers of each sampled control at one of its samples.
 
     Result: name -> (matrix by the states, {name of a control: matrix by its numbers, or by its held output}). The
@@ -405,9 +483,15 @@ def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str
     for name in sampled:
         controls["held"][names.index(name)] = np.nan
     model = with_blocks(model, controls)
-    sizes = {name: control_rows_of(type(model.case.controls[name].control)).sampled_numbers(
-        model.case.controls[name].control) for name in sampled}  # fmt: skip
-    numbers = {name: int(rows[name]["memory"]) + np.r_[0, 2 + np.arange(sizes[name])] for name in sampled}
+    sizes = {
+        name: control_rows_of(type(model.case.controls[name].control)).sampled_numbers(
+            model.case.controls[name].control
+        )
+        for name in sampled
+    }
+    numbers = {
+        name: int(rows[name]["memory"]) + np.r_[0, 2 + np.arange(sizes[name])] for name in sampled
+    }
 
     def after(due: str, y: np.ndarray, discrete: np.ndarray, held: dict[str, float]) -> np.ndarray:
         table = controls.copy()
@@ -431,49 +515,71 @@ def tick_differences(point: OperatingPoint, sampled: list[str], others: list[str
     for due in sampled:
         quotients = partial(checked_slope, point, due)
         by_state = [
-            quotients(partial(after_state, after, due, y, base, j), scale) for j, scale in enumerate(model.scale)
+            quotients(partial(after_state, after, due, y, base, j), scale)
+            for j, scale in enumerate(model.scale)
         ]
         state = np.array(by_state).reshape(-1, len(numbers[due])).T
         by_number = {}
         for name in sampled:
-            columns = [quotients(partial(after_number, after, due, y, base, place), max(1.0, abs(float(base[place]))))
-                       for place in numbers[name]]  # fmt: skip
+            columns = [
+                quotients(
+                    partial(after_number, after, due, y, base, place),
+                    max(1.0, abs(float(base[place]))),
+                )
+                for place in numbers[name]
+            ]
             by_number[name] = np.array(columns).T
         for name in others:
             size = max(1.0, abs(float(controls["held"][names.index(name)])))
-            by_number[name] = quotients(partial(after_output, after, due, y, base, name), size)[:, None]
+            by_number[name] = quotients(partial(after_output, after, due, y, base, name), size)[
+                :, None
+            ]
         result[due] = state, by_number
     return result
 
 
-def checked_slope(point: OperatingPoint, name: str, f: Callable[[float], np.ndarray], size: float) -> np.ndarray:
+def checked_slope(
+    point: OperatingPoint, name: str, f: Callable[[float], np.ndarray], size: float
+) -> np.ndarray:
     """Derivative at 0 of the numbers of a sampled control after a sample, by Richardson's differences.
 
     size : of a small deviation of the argument of f. Raises FvsolveError if the slopes for a rise and a fall differ.
     """
     widths, base = np.array(WIDTHS)[:, None] * size, f(0.0)
-    rise, fall = (np.array([side * (f(side * w) - base) / w for w in widths[:, 0]]) for side in (1.0, -1.0))
+    rise, fall = (
+        np.array([side * (f(side * w) - base) / w for w in widths[:, 0]]) for side in (1.0, -1.0)
+    )
     sides, greatest = rise - fall, np.maximum(np.abs(rise), np.abs(fall))[1]
-    kink = (np.abs(sides[1]) > KINK * greatest) & (np.abs(sides[1] - sides[0]) <= ALIKE * np.abs(sides[1]))
+    kink = (np.abs(sides[1]) > KINK * greatest) & (
+        np.abs(sides[1] - sides[0]) <= ALIKE * np.abs(sides[1])
+    )
     if np.any(kink & (greatest * widths[1] > KINK_ROUNDING * np.abs(base) + LEAST_KINK)):
         stopped = outputs_at_limits(point)
         reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
-        raise FvsolveError(f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
-                           f"and a fall differ{reason}; {ANOTHER_POINT}")  # fmt: skip
+        raise FvsolveError(
+            f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
+            f"and a fall differ{reason}; {ANOTHER_POINT}"
+        )
     coarse, fine = 0.5 * (rise + fall)
     return (4.0 * fine - coarse) / 3.0
 
 
-def after_state(after, due: str, y: np.ndarray, discrete: np.ndarray, j: int, h: float) -> np.ndarray:
+def after_state(
+    after, due: str, y: np.ndarray, discrete: np.ndarray, j: int, h: float
+) -> np.ndarray:
     """Result of `after` with a deviation h of state j."""
     return after(due, y + h * np.eye(1, y.size, j)[0], discrete, {})
 
 
-def after_number(after, due: str, y: np.ndarray, discrete: np.ndarray, place: int, h: float) -> np.ndarray:
+def after_number(
+    after, due: str, y: np.ndarray, discrete: np.ndarray, place: int, h: float
+) -> np.ndarray:
     """Result of `after` with a deviation h of a number of a control."""
     return after(due, y, discrete + h * np.eye(1, discrete.size, place)[0], {})
 
 
-def after_output(after, due: str, y: np.ndarray, discrete: np.ndarray, name: str, h: float) -> np.ndarray:
+def after_output(
+    after, due: str, y: np.ndarray, discrete: np.ndarray, name: str, h: float
+) -> np.ndarray:
     """Result of `after` with a deviation h of a held output."""
     return after(due, y, discrete, {name: h})

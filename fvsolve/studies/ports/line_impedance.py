@@ -6,7 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.argument_checks import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
+from fvsolve.argument_checks import (
+    COMPLEX,
+    FUNCTION,
+    NUMBER,
+    POSITIVE,
+    Kind,
+    instance_of,
+    is_number,
+    validated,
+)
 from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
@@ -55,13 +64,21 @@ class LineImpedance:
         It is the greatest 4 Z0 T u / |1 - g e|^2 there, with u = |g e| and e = exp(-2 s T).
         """
         u = abs(self.reflection) * math.exp(-2.0 * self.time * shift)
-        phase = 2.0 * self.time * np.asarray([low, high]) + (math.pi if self.reflection < 0.0 else 0.0)
+        phase = 2.0 * self.time * np.asarray([low, high]) + (
+            math.pi if self.reflection < 0.0 else 0.0
+        )
         # angle between g e and the positive real axis
         phase_distance = np.min(np.abs((phase + math.pi) % (2.0 * math.pi) - math.pi), axis=0)
         contains_axis = np.floor(phase[1] / (2.0 * math.pi)) > np.floor(phase[0] / (2.0 * math.pi))
         phase_distance = np.where(contains_axis, 0.0, phase_distance)
         with np.errstate(divide="ignore"):
-            return 4.0 * self.z0 * self.time * u / ((1.0 - u) ** 2 + 4.0 * u * np.sin(0.5 * phase_distance) ** 2)
+            return (
+                4.0
+                * self.z0
+                * self.time
+                * u
+                / ((1.0 - u) ** 2 + 4.0 * u * np.sin(0.5 * phase_distance) ** 2)
+            )
 
     @property
     def rightmost(self) -> float:
@@ -91,19 +108,32 @@ class SweepVerdict(PlainData):
 
 
 SLOPE_BOUND = Kind(
-    lambda given: callable(given) or (is_number(given) and given >= 0), "a number from 0 on, or a function"
+    lambda given: callable(given) or (is_number(given) and given >= 0),
+    "a number from 0 on, or a function",
 )
 NOT_NEGATIVE = Kind(lambda given: is_number(given) and given >= 0, "a number from 0 on")
 
-POLE_ABSCISSA = Kind(lambda given: is_number(given) or str(given) == "-inf", "a finite number, or -infinity")
+POLE_ABSCISSA = Kind(
+    lambda given: is_number(given) or str(given) == "-inf", "a finite number, or -infinity"
+)
 
 
 @declared("study")
 @validated(
-    h=FUNCTION, slope=SLOPE_BOUND, high=POSITIVE, shift=NOT_NEGATIVE, tolerance=POSITIVE, rightmost=POLE_ABSCISSA
+    h=FUNCTION,
+    slope=SLOPE_BOUND,
+    high=POSITIVE,
+    shift=NOT_NEGATIVE,
+    tolerance=POSITIVE,
+    rightmost=POLE_ABSCISSA,
 )
 def sweep_positive_real(
-    h: Callable, slope, high: float, shift: float = 0.0, tolerance: float = 1e-6, rightmost: float = -math.inf
+    h: Callable,
+    slope,
+    high: float,
+    shift: float = 0.0,
+    tolerance: float = 1e-6,
+    rightmost: float = -math.inf,
 ) -> SweepVerdict:
     """Test if Re H >= 0 on the line Re s = shift from w = 0 to w = high, with a lower bound between the samples.
 
@@ -131,9 +161,14 @@ def sweep_positive_real(
             break
         middle = 0.5 * (w[:-1] + w[1:])[wide]
         order = np.argsort(np.concatenate([w, middle]), kind="stable")
-        w, value = (np.concatenate(pair)[order] for pair in ((w, middle), (value, _sampled(h, shift, middle))))
+        w, value = (
+            np.concatenate(pair)[order]
+            for pair in ((w, middle), (value, _sampled(h, shift, middle)))
+        )
     k = int(np.argmin(real))
-    least, worst, floor = float(real[k]), float(w[k]), float(min(bound.min(), real.min()))
+    least = float(real[k])
+    worst = float(w[k])
+    floor = float(min(bound.min(), real.min()))
     holds = False if violated.any() else True if proven.all() else None
     text = _verdict_text(holds, least, worst, floor, shift, high)
     return SweepVerdict(holds, text, least, worst, floor, shift, high, len(w))
@@ -144,7 +179,9 @@ def _value_per_point(name: str, given, shape: tuple, kind: type) -> np.ndarray:
     try:
         return np.broadcast_to(np.asarray(given, kind), shape)
     except (TypeError, ValueError):
-        raise FvsolveError(f"{name} returned {show(given)} for {shape[0]} points; expected a number for each") from None
+        raise FvsolveError(
+            f"{name} returned {show(given)} for {shape[0]} points; expected a number for each"
+        ) from None
 
 
 def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
@@ -160,7 +197,9 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
 
 @declared("study")
 @validated(line=instance_of(LineImpedance), shift=NOT_NEGATIVE, tolerance=POSITIVE)
-def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
+def line_positive_real(
+    line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6
+) -> SweepVerdict:
     """Test if the impedance H of a lossless pipe has Re H >= 0 along Re s = shift [1/s], over a whole period of H.
 
     line : impedance of the pipe
@@ -170,15 +209,22 @@ def line_positive_real(line: LineImpedance, shift: float | None = None, toleranc
     """
     shift = 1e-3 / line.time if shift is None else shift
     return sweep_positive_real(
-        line, lambda low, high: line.slope(shift, low, high), line.period, shift, tolerance, line.rightmost
-    )  # fmt: skip
+        line,
+        lambda low, high: line.slope(shift, low, high),
+        line.period,
+        shift,
+        tolerance,
+        line.rightmost,
+    )
 
 
 def _sampled(h: Callable, shift: float, w: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         value = _value_per_point("H", h(shift + 1j * w), w.shape, complex)
     if not np.all(np.isfinite(value)):
-        raise FvsolveError(f"H is not finite on Re s = {shift:g} 1/s; use a shift to the right of its poles")
+        raise FvsolveError(
+            f"H is not finite on Re s = {shift:g} 1/s; use a shift to the right of its poles"
+        )
     return value
 
 

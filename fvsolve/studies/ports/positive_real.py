@@ -26,13 +26,21 @@ def coefficients(given, name: str) -> Polynomial:
     fraction: 0.1 is 3602879701896397 / 2^55. Raises FvsolveError for an invalid coefficient; name : name of the
     polynomial in the error message
     """
-    if isinstance(given, (str, Real, Decimal, complex)) or np.ndim(given) == 0 and isinstance(given, np.ndarray):
+    if (
+        isinstance(given, (str, Real, Decimal, complex))
+        or np.ndim(given) == 0
+        and isinstance(given, np.ndarray)
+    ):
         given = [given[()] if isinstance(given, np.ndarray) else given]
     if isinstance(given, (bytes, Mapping)) or not isinstance(given, Iterable):
-        raise FvsolveError(f"{name} = {given!r} is not a polynomial; expected its coefficients, highest power first")
+        raise FvsolveError(
+            f"{name} = {given!r} is not a polynomial; expected its coefficients, highest power first"
+        )
     values = [_exact(x, f"{name}[{k}]") for k, x in enumerate(given)]
     if not values:
-        raise FvsolveError(f"{name} has no coefficients; expected at least one, highest power first")
+        raise FvsolveError(
+            f"{name} has no coefficients; expected at least one, highest power first"
+        )
     return Polynomial(values[::-1])
 
 
@@ -83,7 +91,8 @@ def locate_roots(p: Polynomial) -> RootLocations:
     axis = zero + 2 * sum(order for _, order in pairs)
     signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
     u, v = (Polynomial(x if k % 2 == odd else 0 for k, x in enumerate(signed)) for odd in (0, 1))
-    more_left = -cauchy_index(v, u) if p.degree % 2 == 0 else cauchy_index(u, v)  # left roots minus right roots
+    # left roots minus right roots
+    more_left = -cauchy_index(v, u) if p.degree % 2 == 0 else cauchy_index(u, v)
     right = (p.degree - axis - more_left) // 2
     return RootLocations(right, axis, right + more_left, zero, pairs)
 
@@ -112,7 +121,9 @@ def cauchy_index(top: Polynomial, below: Polynomial) -> int:
     remainders = [below, top] if top.degree >= 0 else [below]
     while len(remainders) > 1 and (remainder := -(remainders[-2] % remainders[-1])).degree >= 0:
         remainders.append(remainder / abs(remainder.coefficients[-1]))
-    left, right = (_sign_changes(_sign_at_infinity(q, side) for q in remainders) for side in (-1, 1))
+    left, right = (
+        _sign_changes(_sign_at_infinity(q, side) for q in remainders) for side in (-1, 1)
+    )
     return left - right
 
 
@@ -196,7 +207,9 @@ def positive_roots(p: Polynomial) -> list[Root]:
 
 def count_roots(sequence: list[Polynomial], low: Fraction, high: Fraction) -> int:
     """Number of distinct roots with low < x <= high of the polynomial whose Sturm chain is `sequence`."""
-    return _sign_changes(sign(q(low)) for q in sequence) - _sign_changes(sign(q(high)) for q in sequence)
+    return _sign_changes(sign(q(low)) for q in sequence) - _sign_changes(
+        sign(q(high)) for q in sequence
+    )
 
 
 def estimates(p: Polynomial) -> list[complex]:
@@ -322,11 +335,17 @@ def positive_real(numerator, denominator) -> Verdict:
     n, d = coefficients(numerator, "numerator"), coefficients(denominator, "denominator")
     refuse_digits(n, d)
     if d.degree < 0:
-        raise FvsolveError("the denominator is zero; expected at least one coefficient other than 0")
+        raise FvsolveError(
+            "the denominator is zero; expected at least one coefficient other than 0"
+        )
     common = n.gcd(d)
     n, d = n // common, d // common
     where = locate_roots(d)
-    axis = [*_infinity(n, d), *_origin(n, d, where), *(_pair(n, d, x, order) for x, order in where.pairs)]
+    axis = [
+        *_infinity(n, d),
+        *_origin(n, d, where),
+        *(_pair(n, d, x, order) for x, order in where.pairs),
+    ]
     # polynomials E (even) and P (below) in x = w^2 with Re H(jw) = E / P, where P = |d(jw)|^2
     (n_even, n_odd), (d_even, d_odd), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
     even = n_even * d_even + x * n_odd * d_odd
@@ -334,7 +353,11 @@ def positive_real(numerator, denominator) -> Verdict:
     bands, zeros = _bands(even, below), _zeros(even, below)
     hidden = _root_places(common, locate_roots(common))
     poles = _root_places(d, where)
-    faults = _unstable_text(poles) + [pole.fault for pole in axis if pole.fault] + [_band_text(band) for band in bands]
+    faults = (
+        _unstable_text(poles)
+        + [pole.fault for pole in axis if pole.fault]
+        + [_band_text(band) for band in bands]
+    )
     holds = not faults
     lossless = holds and even.degree < 0 and n.degree >= 0
     # strictly: no pole on the axis, Re H(jw) > 0 at every w, and a slow decay of Re H to infinity: w^2 Re H must not
@@ -343,22 +366,37 @@ def positive_real(numerator, denominator) -> Verdict:
     strictly = holds and where.axis == 0 and not zeros and even.degree >= 0 and slow_decay
     reasons = faults or _proof_text(axis, zeros, lossless, n)
     return Verdict(
-        holds, strictly, lossless, (*reasons, *_hidden_text(hidden)), poles,
-        tuple(axis), tuple(bands), tuple(zeros), hidden, n.coefficients[::-1] or (Fraction(0),), d.coefficients[::-1],
-    )  # fmt: skip
+        holds,
+        strictly,
+        lossless,
+        (*reasons, *_hidden_text(hidden)),
+        poles,
+        tuple(axis),
+        tuple(bands),
+        tuple(zeros),
+        hidden,
+        n.coefficients[::-1] or (Fraction(0),),
+        d.coefficients[::-1],
+    )
 
 
-MOST_DIGITS = 50_000  # binary digits of the longest coefficient times the squared degree, about 10 s
+# binary digits of the longest coefficient times the squared degree, about 10 s
+MOST_DIGITS = 50_000
 
 
 def refuse_digits(n: Polynomial, d: Polynomial) -> None:
     """Raise FvsolveError if the degree and the digits of coefficients are too great for exact arithmetic."""
-    values = [part for x in (*n.coefficients, *d.coefficients) for part in (x.numerator, x.denominator)]
-    degree, digits = max(n.degree, d.degree), max((value.bit_length() for value in values), default=0)
+    values = [
+        part for x in (*n.coefficients, *d.coefficients) for part in (x.numerator, x.denominator)
+    ]
+    degree = max(n.degree, d.degree)
+    digits = max((value.bit_length() for value in values), default=0)
     if degree**2 * digits > MOST_DIGITS:
-        raise FvsolveError(f"coefficients of degree {degree} with up to {digits} binary digits take too long in exact "
-                           f"arithmetic; expected {MOST_DIGITS // digits} or less for the squared degree: give rounded "
-                           "coefficients as texts, or the state-space form to state_positive_real")  # fmt: skip
+        raise FvsolveError(
+            f"coefficients of degree {degree} with up to {digits} binary digits take too long in exact "
+            f"arithmetic; expected {MOST_DIGITS // digits} or less for the squared degree: give rounded "
+            "coefficients as texts, or the state-space form to state_positive_real"
+        )
 
 
 # poles ----------------------------------------------------------------------------------------------------------
@@ -367,7 +405,9 @@ def refuse_digits(n: Polynomial, d: Polynomial) -> None:
 def _root_places(p: Polynomial, locations: RootLocations) -> tuple[RootPlace, ...]:
     names = ["right"] * locations.right + ["axis"] * locations.axis + ["left"] * locations.left
     pairs = zip(estimates(p), names, strict=True)
-    return tuple(RootPlace(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in pairs)
+    return tuple(
+        RootPlace(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in pairs
+    )
 
 
 def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
@@ -390,7 +430,9 @@ def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[Axis
         fault = f"the pole at s = 0 has order {locations.zero}; expected a simple pole"
         return [AxisPole(0.0, locations.zero, None, fault)]
     residue = n.coefficients[0] / d.coefficients[1]
-    fault = f"the pole at s = 0 has the negative residue {_float(residue):.6g}" if residue < 0 else None
+    fault = (
+        f"the pole at s = 0 has the negative residue {_float(residue):.6g}" if residue < 0 else None
+    )
     return [AxisPole(0.0, 1, complex(_float(residue)), fault)]
 
 
@@ -401,7 +443,9 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
     """
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
-        return AxisPole(x.frequency, order, None, f"{name} has order {order}; expected a simple pole")
+        return AxisPole(
+            x.frequency, order, None, f"{name} has order {order}; expected a simple pole"
+        )
     c = axis_factor(d)
     (ne, no), (de, do) = even_odd_parts(n), even_odd_parts(d)
     re, ro = de // c, do // c
@@ -412,7 +456,9 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
     imaginary = 0.0 if real else -_float(turned(x_value) / below) / float_root(x_value)
     residue = complex(_float(straight(x_value) / below), imaginary)
     if not real:
-        return AxisPole(x.frequency, 1, residue, f"{name} has the residue {residue:.6g}, which is not real")
+        return AxisPole(
+            x.frequency, 1, residue, f"{name} has the residue {residue:.6g}, which is not real"
+        )
     negative = x.sign_of(straight) * x.sign_of(slope) > 0
     fault = f"{name} has the negative residue {residue.real:.6g}" if negative else None
     return AxisPole(x.frequency, 1, residue, fault)
@@ -446,7 +492,9 @@ def _band(even: Polynomial, below: Polynomial, low: Root | None, high: Root | No
     return Band(a, b, width, worst, least)
 
 
-def _least(even: Polynomial, below: Polynomial, left: Fraction, right: Fraction | None) -> tuple[float, float]:
+def _least(
+    even: Polynomial, below: Polynomial, left: Fraction, right: Fraction | None
+) -> tuple[float, float]:
     """Frequency [rad/s] and value of the infimum of E / P between x = left and x = right, x the squared frequency.
 
     even, below : polynomials E and P as in `positive_real`; right : None for infinity
@@ -462,7 +510,11 @@ def _least(even: Polynomial, below: Polynomial, left: Fraction, right: Fraction 
     candidates += _between(slope, left, right) + ([(left + right) / 2] if right is not None else [])
     values = [(_float(top(x) / below(x)), float_root(x)) for x in candidates]
     if right is None:
-        limit = top.coefficients[-1] / below.coefficients[-1] if top.degree == below.degree else Fraction(0)
+        limit = (
+            top.coefficients[-1] / below.coefficients[-1]
+            if top.degree == below.degree
+            else Fraction(0)
+        )
         values.append((_float(limit), math.inf))
     least, worst = min(values)
     return worst, least
@@ -477,7 +529,10 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
     if even.degree < 0:
         return []
     top = even // even.gcd(below)
-    return [*([0.0] if top.coefficients[0] == 0 else []), *(x.frequency for x in positive_roots(top))]
+    return [
+        *([0.0] if top.coefficients[0] == 0 else []),
+        *(x.frequency for x in positive_roots(top)),
+    ]
 
 
 # words ----------------------------------------------------------------------------------------------------------
@@ -500,7 +555,9 @@ def _band_text(band: Band) -> str:
     return f"Re H(jw) < 0 {where}, least {band.least:.6g} at {worst}"
 
 
-def _proof_text(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynomial) -> list[str]:
+def _proof_text(
+    axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynomial
+) -> list[str]:
     if n.degree < 0:
         return ["H = 0: positive real, neither supplies nor absorbs energy"]
     texts = ["no pole in the right half plane"]
@@ -511,7 +568,9 @@ def _proof_text(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Pol
         texts.append(f"Re H(jw) >= 0 at every w{zeros_text}")
     for pole in axis:
         place = "infinity" if math.isinf(pole.frequency) else f"w = {pole.frequency:.12g} rad/s"
-        texts.append(f"the pole at {place} is simple with the positive residue {pole.residue.real:.6g}")
+        texts.append(
+            f"the pole at {place} is simple with the positive residue {pole.residue.real:.6g}"
+        )
     return texts
 
 
@@ -521,7 +580,9 @@ def _hidden_text(hidden: tuple[RootPlace, ...]) -> list[str]:
         roots = [mode.near for mode in hidden if mode.side == side]
         if roots:
             poles = "pole" if len(roots) == 1 else "poles"
-            texts.append(f"hidden: {len(roots)} cancelled {poles} near s = {_roots_text(roots)}, {where}")
+            texts.append(
+                f"hidden: {len(roots)} cancelled {poles} near s = {_roots_text(roots)}, {where}"
+            )
     return texts
 
 

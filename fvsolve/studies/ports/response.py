@@ -9,20 +9,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.argument_checks import COMPLEX, FLAG, MATRIX, NUMBER, POSITIVE, SERIES, TABLE, TEXT, instance_of, validated
+from fvsolve.argument_checks import (
+    COMPLEX,
+    FLAG,
+    MATRIX,
+    NUMBER,
+    POSITIVE,
+    SERIES,
+    TABLE,
+    TEXT,
+    instance_of,
+    validated,
+)
 from fvsolve.core.output.result_table import PlainData
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 
-TOLERANCE = 1e-9  # values of Re H / |H| closer to zero are undecided, because of differences and rounding
-DECADES = 1.0  # searched below the slowest and above the fastest pole; more if Re H changes sign beyond
+# values of Re H / |H| closer to zero are undecided, because of differences and rounding
+TOLERANCE = 1e-9
+# searched below the slowest and above the fastest pole; more if Re H changes sign beyond
+DECADES = 1.0
 FARTHEST = 1e4  # ratio to the slowest and fastest pole beyond which a change of sign is rounding
 GRID = 40  # frequencies per decade, in addition to those at which Re H can change sign
-POLE_DISTANCE = 100.0  # distance to a pole on the axis, in shifts, within which Re H is not linear in Re s
+# distance to a pole on the axis, in shifts, within which Re H is not linear in Re s
+POLE_DISTANCE = 100.0
 # distances of frequencies from a pole on the axis, in shifts
-POLE_NEIGHBOURS = np.concatenate([-np.geomspace(100.0, 0.01, 13), [0.0], np.geomspace(0.01, 100.0, 13)])
+POLE_NEIGHBOURS = np.concatenate(
+    [-np.geomspace(100.0, 0.01, 13), [0.0], np.geomspace(0.01, 100.0, 13)]
+)
 ROUNDING = 1e-13  # rounding error of H relative to the sum of absolute terms
-HIDDEN_RESIDUE = 1e-10  # a mode is hidden if its residue is below this fraction of the bound from norms of B and C
+# a mode is hidden if its residue is below this fraction of the bound from norms of B and C
+HIDDEN_RESIDUE = 1e-10
 DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for defective poles
 
 
@@ -45,7 +62,9 @@ class Transfer:
 
         sizes = (*np.shape(a), np.size(b), np.size(c))
         if len({*sizes}) > 1:
-            sizes_text = f"A of {sizes[0]} x {sizes[1]}, {sizes[2]} numbers in B and {sizes[3]} in C"
+            sizes_text = (
+                f"A of {sizes[0]} x {sizes[1]}, {sizes[2]} numbers in B and {sizes[3]} in C"
+            )
             raise FvsolveError(f"{sizes_text} do not match; expected n x n, n and n")
         self.error = float(error)
         self.a, self.b, self.c, self.d = (np.asarray(x, float) for x in (a, b, c, d))
@@ -68,7 +87,12 @@ class Transfer:
         moved = (10 * len(poles) * np.finfo(float).eps + self.error) * norm / np.abs(overlap)
         residues = (self.c @ right) * (left.conj().T @ self.b) / overlap
         most = np.linalg.norm(self.b) * np.linalg.norm(self.c) / np.abs(overlap)
-        return poles, residues, np.minimum(moved, DEFECT * norm), np.abs(residues) > HIDDEN_RESIDUE * most
+        return (
+            poles,
+            residues,
+            np.minimum(moved, DEFECT * norm),
+            np.abs(residues) > HIDDEN_RESIDUE * most,
+        )
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Transfer function H at complex numbers s [1/s] : complex128[k]; infinity at a pole."""
@@ -89,7 +113,9 @@ class Transfer:
             values = self.d + self.left @ x
             size = abs(self.d) + np.abs(self.left) @ np.abs(x)
         finite = np.isfinite(values)
-        return np.where(finite, values, np.inf), np.where(finite, (ROUNDING + self.error) * size, np.inf)
+        return np.where(finite, values, np.inf), np.where(
+            finite, (ROUNDING + self.error) * size, np.inf
+        )
 
     @validated(s=COMPLEX)
     def angle(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +180,9 @@ class StateVerdict(PlainData):
     @property
     def answer(self) -> str:
         """Text "yes" or "no", or "undecided within" followed by the tolerance."""
-        return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[self.positive_real]
+        return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[
+            self.positive_real
+        ]
 
 
 @declared("study")
@@ -178,13 +206,25 @@ def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdi
     right = h.poles.real > reach
     unstable, hidden = h.poles[right & h.visible], h.poles[right & ~h.visible]
     dips = _dips(h, shift, w, _certain_part(raw, doubt), tolerance)
-    margin, worst = (0.0, 0.0) if zero else _margin(h, near, shift, w, raw, doubt, (low <= w) & (w <= high))
+    margin, worst = (
+        (0.0, 0.0) if zero else _margin(h, near, shift, w, raw, doubt, (low <= w) & (w <= high))
+    )
     holds = False if len(unstable) or dips else True if margin > tolerance or zero else None
     reasons = tuple(_reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift))
     return StateVerdict(
-        holds, reasons, margin, worst, tolerance, shift, low, high, tuple(dips), _listed(unstable),
-        _listed(h.poles[near]), _listed(hidden),
-    )  # fmt: skip
+        holds,
+        reasons,
+        margin,
+        worst,
+        tolerance,
+        shift,
+        low,
+        high,
+        tuple(dips),
+        _listed(unstable),
+        _listed(h.poles[near]),
+        _listed(hidden),
+    )
 
 
 def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:
@@ -198,7 +238,9 @@ def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:
     """
     angle = _certain_part(raw, doubt)
     if shift:
-        within = within & (np.min(np.abs(w[:, None] - np.abs(h.poles.imag[near])), axis=1) > POLE_DISTANCE * shift)
+        within = within & (
+            np.min(np.abs(w[:, None] - np.abs(h.poles.imag[near])), axis=1) > POLE_DISTANCE * shift
+        )
         angle = _certain_part(2.0 * raw - h.angle(2.0 * shift + 1j * w)[0], 3.0 * doubt)
     k = int(np.argmin(np.where(within, angle, np.inf)))
     return float(angle[k]), float(w[k])
@@ -227,16 +269,25 @@ def frequencies(h: Transfer, near: np.ndarray, shift: float, slow: float, quick:
     shift : real part of the line on which Re H is tested [1/s]; slow, quick : slowest and fastest rate of H [1/s]
     """
     zeros = crossings(h.a - shift * np.eye(len(h.poles)), h.b, h.c, float(h.d))
-    real = np.abs(zeros.imag[np.abs(zeros.real) <= 1e-6 * np.abs(zeros)])  # imaginary eigenvalues: changes of sign
+    # imaginary eigenvalues: changes of sign
+    real = np.abs(zeros.imag[np.abs(zeros.real) <= 1e-6 * np.abs(zeros)])
     real = real[(slow / FARTHEST < real) & (real < quick * FARTHEST)]
     low = min(slow * 10.0**-DECADES, np.min(real, initial=np.inf) / 3.0)
     high = max(quick * 10.0**DECADES, np.max(real, initial=0.0) * 3.0)
     marks = np.concatenate([np.abs(h.poles.imag), np.abs(zeros.imag)])
     count = max(2, int(GRID * np.log10(high / low)))
     neighbours = (np.abs(near.imag)[:, None] + shift * POLE_NEIGHBOURS).ravel()
-    parts = [np.geomspace(low, high, count), marks[(low < marks) & (marks < high)], neighbours[neighbours >= 0.0]]
+    parts = [
+        np.geomspace(low, high, count),
+        marks[(low < marks) & (marks < high)],
+        neighbours[neighbours >= 0.0],
+    ]
     marks = np.unique(np.concatenate(parts))
-    return np.unique(np.concatenate([marks, np.sqrt(marks[1:] * marks[:-1])])), float(low), float(high)
+    return (
+        np.unique(np.concatenate([marks, np.sqrt(marks[1:] * marks[:-1])])),
+        float(low),
+        float(high),
+    )
 
 
 def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarray:
@@ -252,16 +303,22 @@ def crossings(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float) -> np.ndarr
     flow = np.linalg.norm(b) * np.linalg.norm(c)
     if abs(d) * np.linalg.norm(a) > 1e-13 * flow:
         first = a - np.outer(b, c) / (2.0 * d)
-        matrix = np.block([[first, -np.outer(b, b) / (2.0 * d)], [np.outer(c, c) / (2.0 * d), -first.T]])
+        matrix = np.block(
+            [[first, -np.outer(b, b) / (2.0 * d)], [np.outer(c, c) / (2.0 * d), -first.T]]
+        )
         return np.linalg.eigvals(matrix)
     gain = float(c @ b)
     if abs(gain) <= 1e-13 * flow:
-        return np.zeros(0, complex)  # relative degree two or more: not positive real; Re H < 0 or H = 0 at high w
+        # relative degree two or more: not positive real; Re H < 0 or H = 0 at high w
+        return np.zeros(0, complex)
     inside = np.linalg.svd(c[None, :])[2][1:].T  # null space of the output
     follow = inside.T - np.outer(inside.T @ b, c) / gain
     return crossings(
-        follow @ a @ inside, follow @ a @ b / gain, -(c @ a @ inside) / gain, -float(c @ a @ b) / gain**2
-    )  # fmt: skip
+        follow @ a @ inside,
+        follow @ a @ b / gain,
+        -(c @ a @ inside) / gain,
+        -float(c @ a @ b) / gain**2,
+    )
 
 
 def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
@@ -276,7 +333,15 @@ def _dips(h, shift, w, angle, tolerance) -> list[Dip]:
         worst = start + int(np.argmin(angle[start:stop]))
         low = _edge(h, shift, w[start - 1], w[start]) if start else 0.0
         high = _edge(h, shift, w[stop], w[stop - 1]) if stop < len(w) else np.inf
-        dips.append(Dip(low, high, float(w[worst]), float(h(shift + 1j * w[worst])[0].real), float(angle[worst])))
+        dips.append(
+            Dip(
+                low,
+                high,
+                float(w[worst]),
+                float(h(shift + 1j * w[worst])[0].real),
+                float(angle[worst]),
+            )
+        )
     return dips
 
 
@@ -297,26 +362,36 @@ def _listed(poles: np.ndarray) -> tuple[complex, ...]:
 def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift) -> list[str]:
     texts = []
     if len(unstable):
-        texts.append(f"{_poles(unstable)} in the right half plane, greatest Re s at s = {_listed(unstable)[0]:.6g} 1/s")
+        texts.append(
+            f"{_poles(unstable)} in the right half plane, greatest Re s at s = {_listed(unstable)[0]:.6g} 1/s"
+        )
     for dip in dips[:8]:
         high = f"< {dip.high:.9g}" if np.isfinite(dip.high) else "to infinity"
-        texts.append(f"Re H < 0 for {dip.low:.9g} < w {high} rad/s, least Re H / |H| = {dip.angle:.4g} "
-                    f"at w = {dip.worst:.9g} rad/s")  # fmt: skip
+        texts.append(
+            f"Re H < 0 for {dip.low:.9g} < w {high} rad/s, least Re H / |H| = {dip.angle:.4g} "
+            f"at w = {dip.worst:.9g} rad/s"
+        )
     if len(dips) > 8:
         texts.append(f"and in {len(dips) - 8} more bands")
     where = f"for Re s >= {shift:.3g} 1/s (H has poles on the axis)" if shift else "on the axis"
     if holds and worst == 0.0:
         texts.append("H = 0")
     elif holds:
-        texts.append(f"no pole in the right half plane, Re H > 0 {where}: least {margin:.4g} |H| in the searched "
-                     f"range, at w = {worst:.6g}; Re H does not change sign outside this range")  # fmt: skip
+        texts.append(
+            f"no pole in the right half plane, Re H > 0 {where}: least {margin:.4g} |H| in the searched "
+            f"range, at w = {worst:.6g}; Re H does not change sign outside this range"
+        )
     elif holds is None:
-        texts.append(f"at the limit of positive realness: Re H >= -{tolerance:.0e} |H| at every w {where}, "
-                     f"and within {tolerance:.0e} |H| of zero at w = {worst:.6g} ({margin:.1e}), "
-                     "as for a lossless system")  # fmt: skip
+        texts.append(
+            f"at the limit of positive realness: Re H >= -{tolerance:.0e} |H| at every w {where}, "
+            f"and within {tolerance:.0e} |H| of zero at w = {worst:.6g} ({margin:.1e}), "
+            "as for a lossless system"
+        )
     if len(hidden):
-        texts.append(f"hidden: {_poles(hidden)} in the right half plane that H does not show, "
-                    f"greatest Re s at s = {_listed(hidden)[0]:.6g} 1/s")  # fmt: skip
+        texts.append(
+            f"hidden: {_poles(hidden)} in the right half plane that H does not show, "
+            f"greatest Re s at s = {_listed(hidden)[0]:.6g} 1/s"
+        )
     return texts
 
 
@@ -375,21 +450,41 @@ class Response:
         pairs = zip(self.transfer.poles, self.transfer.residues, strict=True)
         poles = sorted(pairs, key=lambda pair: (abs(pair[0]), pair[0].imag))
         return {
-            "case": self.case, "when": self.when, "port": self.port, "kind": self.kind, "scheme": self.scheme,
-            "input_unit": self.units[0], "output_unit": self.units[1], "states": self.states,
-            "state_units": self.state_units, "A": self.a, "B": self.b, "C": self.c, "D": self.d, "error": self.error,
-            "poles": [[s.real, s.imag] for s, _ in poles], "residues": [[r.real, r.imag] for _, r in poles],
-            "frequency": self.w, "real": self.h.real, "imaginary": self.h.imag, "moving": self.moving,
+            "case": self.case,
+            "when": self.when,
+            "port": self.port,
+            "kind": self.kind,
+            "scheme": self.scheme,
+            "input_unit": self.units[0],
+            "output_unit": self.units[1],
+            "states": self.states,
+            "state_units": self.state_units,
+            "A": self.a,
+            "B": self.b,
+            "C": self.c,
+            "D": self.d,
+            "error": self.error,
+            "poles": [[s.real, s.imag] for s, _ in poles],
+            "residues": [[r.real, r.imag] for _, r in poles],
+            "frequency": self.w,
+            "real": self.h.real,
+            "imaginary": self.h.imag,
+            "moving": self.moving,
             "verdict": self.verdict.plain(),
-        }  # fmt: skip
+        }
 
 
 @declared("study")
 @validated(port=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def response(
-    case, port: str, at: float | None = None, before: bool = False, scheme: str | None = None,
-    set: Mapping | None = None, frequencies: np.ndarray | None = None,
-) -> Response:  # fmt: skip
+    case,
+    port: str,
+    at: float | None = None,
+    before: bool = False,
+    scheme: str | None = None,
+    set: Mapping | None = None,
+    frequencies: np.ndarray | None = None,
+) -> Response:
     """Compute the transfer function between pressure and flow at a node of a case, linearised by `linearise`.
 
     port : name of a reservoir (for an admittance), or of a junction, inflow, chamber or tank (for an impedance)
@@ -403,15 +498,23 @@ def response(
 
     case = load(case, dict(set or {}))
     if not any(node.domain == "hydraulic" for node in case.places.values()):
-        raise FvsolveError(f"{case.name} has no port, because no node has a pressure; expected a reservoir, junction, "
-                           "inflow, chamber or tank")  # fmt: skip
+        raise FvsolveError(
+            f"{case.name} has no port, because no node has a pressure; expected a reservoir, junction, "
+            "inflow, chamber or tank"
+        )
     if port not in case.places:
         hint = did_you_mean(port, case.places) or f". Ports are {listing(case.places)}"
         raise FvsolveError(f'no port named "{port}"{hint}')
     basin = port.partition(".")[0]
-    if basin != port and getattr(case.nodes.get(basin), "kind", "") == "basin" and not port_flows(case, port):
-        raise FvsolveError(f"{port} joins no link, so nothing can flow into it there; expected a patch with a link; "
-                           "the inputs and outputs of a driven patch are given by: fvsolve linearise")  # fmt: skip
+    if (
+        basin != port
+        and getattr(case.nodes.get(basin), "kind", "") == "basin"
+        and not port_flows(case, port)
+    ):
+        raise FvsolveError(
+            f"{port} joins no link, so nothing can flow into it there; expected a patch with a link; "
+            "the inputs and outputs of a driven patch are given by: fvsolve linearise"
+        )
     system, flows = _linear_system(case, port, at, before, scheme)
     a, b, c, d = system
     model = flows.at.model
@@ -420,7 +523,8 @@ def response(
     transfer = Transfer(form.seen(a), form.forward @ b, c @ form.back, d, error)
     verdict = state_positive_real(transfer, max(TOLERANCE, 10.0 * error))
     w = np.asarray(frequencies, float) if frequencies is not None else None
-    if w is None:  # a logarithmic grid, |Im s| of the poles off the imaginary axis, and the worst frequency of each dip
+    # a logarithmic grid, |Im s| of the poles off the imaginary axis, and the worst frequency of each dip
+    if w is None:
         low, high = verdict.low, verdict.high
         grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
         poles = np.abs(transfer.poles.imag[~np.isin(transfer.poles, verdict.axis)])
@@ -429,10 +533,24 @@ def response(
     driven = case.places[port].driven
     kind = "admittance" if driven is not None and driven[1] == 0.0 else "impedance"
     return Response(
-        case.name, flows.at.when, port, kind, model.case.numerics.scheme if model.cells else None,
-        tuple(flows.states), tuple(flows.state_units), a, b, c, d, error, transfer, w, transfer(1j * w), verdict,
+        case.name,
+        flows.at.when,
+        port,
+        kind,
+        model.case.numerics.scheme if model.cells else None,
+        tuple(flows.states),
+        tuple(flows.state_units),
+        a,
+        b,
+        c,
+        d,
+        error,
+        transfer,
+        w,
+        transfer(1j * w),
+        verdict,
         float(np.max(np.abs(flows.at.rate) / model.scale)),
-    )  # fmt: skip
+    )
 
 
 def _linear_system(case, port: str, at, before, scheme):
@@ -445,16 +563,27 @@ def _linear_system(case, port: str, at, before, scheme):
         signs = port_flows(case, port)
         system = linear([f"{port}.{driven[0]}"], list(signs))
         weights = np.array(list(signs.values()))
-        return (_dense(system.a), system.b[:, 0], weights @ system.c, float(weights @ system.d[:, 0])), system
+        return (
+            _dense(system.a),
+            system.b[:, 0],
+            weights @ system.c,
+            float(weights @ system.d[:, 0]),
+        ), system
     pressure = f"nodes.{port}.pressure" if port in case.nodes else f"{port}.pressure"
     if driven is not None:
         key, sign = driven
         system = linear([f"{port}.{key}"], [pressure])
-        return (_dense(system.a), sign * system.b[:, 0], system.c[0], sign * float(system.d[0, 0])), system
+        return (
+            _dense(system.a),
+            sign * system.b[:, 0],
+            system.c[0],
+            sign * float(system.d[0, 0]),
+        ), system
     system = linear([], [pressure])
     row = system.at.model.tables.nodes[system.at.model.node_names.index(port)]
     b = np.zeros(len(system.states))
-    b[row["y"]] = float(system.at.model.case.law.density(system.output_values[0]))  # at the pressure of the port
+    # at the pressure of the port
+    b[row["y"]] = float(system.at.model.case.law.density(system.output_values[0]))
     return (_dense(system.a), b, system.c[0], 0.0), system
 
 
@@ -466,7 +595,9 @@ def port_flows(case, port: str) -> dict[str, float]:
             if node != port:
                 continue
             if link.kind == "pipe":
-                signs[f"links.{name}.flow@{0 if end == 'from' else 1}"] = 1.0 if end == "from" else -1.0
+                signs[f"links.{name}.flow@{0 if end == 'from' else 1}"] = (
+                    1.0 if end == "from" else -1.0
+                )
             elif f"flow_{end}" in link.quantities:
                 signs[f"links.{name}.flow_{end}"] = 1.0
             else:
@@ -478,6 +609,8 @@ def _dense(a) -> np.ndarray:
     """Matrix A as a full array; raises FvsolveError for more than 800 states."""
     if a.shape[0] > MAX_STATES:
         percent = math.floor(100 * MAX_STATES / a.shape[0])
-        raise FvsolveError(f"the case has {a.shape[0]} states; expected {MAX_STATES} or fewer; reduce the cells of its "
-                           f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
+        raise FvsolveError(
+            f"the case has {a.shape[0]} states; expected {MAX_STATES} or fewer; reduce the cells of its "
+            f"pipes to {percent} %: --set links.NAME.cells=..."
+        )
     return a if isinstance(a, np.ndarray) else a.toarray()

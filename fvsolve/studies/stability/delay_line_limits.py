@@ -47,7 +47,8 @@ BAR_PRESSURE = 1e5  # pressure of a wave of unit size [Pa]
 GROWTH_ROUNDS = 2  # of all steps: first with random starts, then with their ends as starts
 CALLS_TIME, WAVE_TIME = 5e-5, 1e-6  # CPU time of a stage of a step, and of a past wave [s]
 REMEDY = (
-    "use a part of the network, or fewer cells; rates far above those of waves, as of a small chamber, need short steps"
+    "use a part of the network, or fewer cells; rates far above those of waves, "
+    "as of a small chamber, need short steps"
 )
 VANISHED = 1e-100  # size of a deviation that has left the model
 
@@ -98,10 +99,16 @@ class DelayLineSystem:
             form = energy_form(model, model.start)
             rows_of_states = form.rows[:, self.states]
             self.parts = form.parts
-            self.energy_rows = rows_of_states if isinstance(rows_of_states, np.ndarray) else rows_of_states.toarray()
+            self.energy_rows = (
+                rows_of_states
+                if isinstance(rows_of_states, np.ndarray)
+                else rows_of_states.toarray()
+            )
         factor = 1.0 / (pipes["admittance"][rows["pipe"]] * model.case.properties.density)
         ages = np.arange(self.history_steps, 0, -1)
-        self.weight = np.sqrt(h * factor[line_of]) * (ages[:, None] <= np.maximum(1.0, np.round(self.delays)))
+        self.weight = np.sqrt(h * factor[line_of]) * (
+            ages[:, None] <= np.maximum(1.0, np.round(self.delays))
+        )
 
     @cached_property
     def stages(self) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -110,7 +117,9 @@ class DelayLineSystem:
         There is one matrix of arriving waves for each stage. The new states are the step matrix times x, plus the sum
         over the stages of matrix times arriving waves.
         """
-        method, n, s = self.method, self.states.size, self.method.stages
+        method = self.method
+        n = self.states.size
+        s = self.method.stages
         inverse = np.zeros((0, 0))
         if n:  # in the order of `growth.step_matrix`, then with all states of a stage together
             inverse = np.linalg.inv(np.eye(s * n) - self.h * np.kron(self.a, method.a))
@@ -157,7 +166,9 @@ class DelayLineSystem:
     def node_arrivals(self, waves: tuple) -> np.ndarray:
         """Waves (see `arrivals`) that arrive at the ends `from` and `to` of each line : float64[2 lines, m]."""
         backward, forward = waves
-        return np.stack([backward[self.first], forward[self.last]], axis=1).reshape(2 * self.first.size, -1)
+        return np.stack([backward[self.first], forward[self.last]], axis=1).reshape(
+            2 * self.first.size, -1
+        )
 
     def store_entry(self, past: np.ndarray, n: int, x: np.ndarray, waves: tuple) -> None:
         """Write the waves that nodes and stretches send, with states x and arriving `waves`, as entry n of `past`."""
@@ -172,10 +183,17 @@ class DelayLineSystem:
         x : float64[n, m]  states; history : float64[history_steps, 2, stretches, m]  past waves
         """
         waves = self.weight[:, None, :, None] * history
-        return np.sqrt(np.sum((self.energy_rows @ x) ** 2, axis=0) + np.sum(waves**2, axis=(0, 1, 2)))
+        return np.sqrt(
+            np.sum((self.energy_rows @ x) ** 2, axis=0) + np.sum(waves**2, axis=(0, 1, 2))
+        )
 
     def propagate(
-        self, x: np.ndarray, history: np.ndarray, steps: int, threshold: float, work: WorkLimit | None = None
+        self,
+        x: np.ndarray,
+        history: np.ndarray,
+        steps: int,
+        threshold: float,
+        work: WorkLimit | None = None,
     ) -> tuple:
         """Take up to `steps` steps with m deviations; ends when the growth of a deviation exceeds the threshold.
 
@@ -190,7 +208,9 @@ class DelayLineSystem:
         readings = [self.reading_weights(c) for c in self.method.c]
         at_end = self.reading_weights(1.0)
         self.store_entry(past, K, x, self.arrivals(past, K - 1, at_end))
-        first, size, after = self.size(x, history), np.ones(m), 0
+        first = self.size(x, history)
+        size = np.ones(m)
+        after = 0
         stretches, reach = np.arange(self.delays.size), np.count_nonzero(self.weight, axis=0)
         squares = np.sum(
             (self.weight[:, None, :, None] * history) ** 2, axis=(0, 1)
@@ -201,10 +221,15 @@ class DelayLineSystem:
         for n in range(steps):
             if work is not None:
                 work.spend(propagation_time(self.method, 0, 0, 1))
-            arrivals = [self.node_arrivals(self.arrivals(past, K + n, reading)) for reading in readings]
-            x = step @ x + sum((matrix @ w for matrix, w in zip(inputs, arrivals, strict=True)), np.zeros_like(x))
+            arrivals = [
+                self.node_arrivals(self.arrivals(past, K + n, reading)) for reading in readings
+            ]
+            x = step @ x + sum(
+                (matrix @ w for matrix, w in zip(inputs, arrivals, strict=True)), np.zeros_like(x)
+            )
             self.store_entry(past, K + n + 1, x, self.arrivals(past, K + n, at_end))
-            left = past[K + n - reach, :, stretches].swapaxes(0, 1)  # the sum changes by one entry at each end
+            # the sum changes by one entry at each end
+            left = past[K + n - reach, :, stretches].swapaxes(0, 1)
             squares += factor * np.sum(past[K + n] ** 2 - left**2, axis=0)
             stored = np.sum((self.energy_rows @ x) ** 2, axis=0)
             growth = np.sqrt(np.maximum(stored + squares.sum(axis=0), 0.0)) / first
@@ -225,8 +250,12 @@ class DelayLineSystem:
         stored = rng.standard_normal((self.states.size, 1)) * self.model.scale[self.states][:, None]
         sent = rng.standard_normal((self.history_steps, self.delays.size)) * BAR_PRESSURE
         sent *= np.repeat(self.model.tables.pipes["admittance"][rows["pipe"]], rows["stretches"])
-        reverse = np.concatenate([np.arange(b, a - 1, -1) for a, b in zip(self.first, self.last, strict=True)])
-        equal, opposite = (np.stack([sent, sign * sent[:, reverse]], axis=1) for sign in (1.0, -1.0))
+        reverse = np.concatenate(
+            [np.arange(b, a - 1, -1) for a, b in zip(self.first, self.last, strict=True)]
+        )
+        equal, opposite = (
+            np.stack([sent, sign * sent[:, reverse]], axis=1) for sign in (1.0, -1.0)
+        )
         x = stored * np.array([1.0, 0.0, 1.0])
         return x, np.stack([equal, opposite, np.zeros_like(equal)], axis=-1)
 
@@ -245,7 +274,9 @@ class DelayLineSystem:
                 return DelayedGrowth(np.nan, 0, *(values[..., 0] for values in (*start, *start)))
             size, after, *end = self.propagate(*start, steps, threshold, work)
             worst = int(np.argmax(np.nan_to_num(size, nan=np.inf)))
-            growth = DelayedGrowth(float(size[worst]), after, *(values[..., worst] for values in (*start, *end)))
+            growth = DelayedGrowth(
+                float(size[worst]), after, *(values[..., worst] for values in (*start, *end))
+            )
             if not size.max() <= threshold or not self.size(*end).min() > VANISHED:
                 break
             start = end
@@ -272,14 +303,20 @@ def propagation_time(method: Method, history_steps: int, stretches: int, steps: 
 def reflected_share(pipe, tau: float) -> float:
     """Fraction of a wave that friction in a stretch of a line, of travel time tau [s], reflects at the initial flow."""
     flow, width = float(pipe["flow"]), DERIVATIVE_STEP * float(pipe["admittance"]) * BAR_PRESSURE
-    slope = (drag_and_slope(pipe, flow + width)[0] - drag_and_slope(pipe, flow - width)[0]) / (2.0 * width)
+    slope = (drag_and_slope(pipe, flow + width)[0] - drag_and_slope(pipe, flow - width)[0]) / (
+        2.0 * width
+    )
     k = 0.5 * tau * float(slope)
     return k / (1.0 + k)
 
 
-def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def local_matrices(
+    model, states: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Matrices A, B, C, D of `DelayLineSystem` at the start, by central differences; states : indices of states x."""
-    t, y, rows = float(model.case.numerics.start), model.start, lines_of(model)
+    t = float(model.case.numerics.start)
+    y = model.start
+    rows = lines_of(model)
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     admittance = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2)
@@ -300,7 +337,9 @@ def local_matrices(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
         for i in states:
             width = np.zeros(y.size)
             width[i] = DERIVATIVE_STEP * (model.scale[i] + abs(y[i]))
-            slopes.append((evaluate(y + width, rest) - evaluate(y - width, rest)) / (2.0 * width[i]))
+            slopes.append(
+                (evaluate(y + width, rest) - evaluate(y - width, rest)) / (2.0 * width[i])
+            )
         for i in range(rest.size):
             width = np.zeros(rest.size)
             width[i] = DERIVATIVE_STEP * admittance[i] * BAR_PRESSURE
@@ -322,7 +361,12 @@ class DelayLineRuns(RealRuns):
     """
 
     def __init__(self, limits: DelayLineLimits, steps: int, threshold: float, end: float) -> None:
-        self.failing_step, self.first, self.far, self.system = end, limits.first, limits.far, limits.system
+        self.failing_step, self.first, self.far, self.system = (
+            end,
+            limits.first,
+            limits.far,
+            limits.system,
+        )
         self.prepare(limits.base_model.y_size, steps, threshold)
 
     def start_run(self, system: DelayLineSystem, x: np.ndarray, history: np.ndarray) -> RunLoop:
@@ -345,8 +389,12 @@ class DelayLineRuns(RealRuns):
         close because steps that do not divide the delay of a line may be safe above the limit.
         """
         if not np.isfinite(guess):
-            return limit_from(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
-        if any(self.fails(part * guess) for part in SAFE_PARTS) or not self.fails(self.failing_step):
+            return limit_from(
+                self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP
+            )
+        if any(self.fails(part * guess) for part in SAFE_PARTS) or not self.fails(
+            self.failing_step
+        ):
             return super().limit(guess)
         low = (SAFE_PARTS[-1] if self.fails(NEAR_PREDICTION * guess) else NEAR_PREDICTION) * guess
         return bisect(self.fails, low, self.failing_step)
@@ -358,20 +406,36 @@ class DelayLineRuns(RealRuns):
         """
         system = self.system(h)
         predicted, tables = system.growth(self.steps, self.threshold), system.model.tables
-        greatest_wave = BAR_PRESSURE * float(tables.pipes["admittance"][lines_of(system.model)["pipe"]].max())  # [kg/s]
+        # [kg/s]
+        greatest_wave = BAR_PRESSURE * float(
+            tables.pipes["admittance"][lines_of(system.model)["pipe"]].max()
+        )
         small = SMALL_WAVE * float(system.weight.max()) * greatest_wave
-        runs = [self.start_run(system, width * predicted.x, width * predicted.history) for width in (small, 0.0)]
+        runs = [
+            self.start_run(system, width * predicted.x, width * predicted.history)
+            for width in (small, 0.0)
+        ]
 
         def growth(k: int) -> float:
             if any(run.run(self.strides[k]) != loop_records.BUDGET_SPENT for run in runs):
                 return np.inf
-            moved, base = ((run.now[system.states], read_history(history_of(run.run_data), system)) for run in runs)
-            return float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
+            moved, base = (
+                (run.now[system.states], read_history(history_of(run.run_data), system))
+                for run in runs
+            )
+            return (
+                float(
+                    system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]
+                )
+                / small
+            )
 
         return self.greatest(growth)
 
 
-def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
+def write_history(
+    past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray
+) -> None:
     """Write past waves into the wave history `past` of delay lines, at the times t - count h, ..., t - h.
 
     history : float64[count, 2, stretches]  deviations of both waves in each stretch of a line, oldest first [kg/s]
@@ -414,8 +478,10 @@ def ring_offsets(places, delays: np.ndarray, numbers: np.ndarray):
 TRAVEL_PARTS = 32.0  # first step: at most the longest travel time over this
 TRAVEL_FACTOR = 2.0  # last step: the longest travel time times this
 RATE_MARGIN = 0.1  # greatest product of the first step and the rates of other states
-LINE_COUNT = 4  # greatest number of lines at stores for which integer parts of the delay are checked
-RISE, FINE = 1.6, 1e-3  # ratio of consecutive steps of the search, relative width of the final bracket
+# greatest number of lines at stores for which integer parts of the delay are checked
+LINE_COUNT = 4
+# ratio of consecutive steps of the search, relative width of the final bracket
+RISE, FINE = 1.6, 1e-3
 MAX_STATES = 400  # greatest number of states
 UNKNOWN_REASON = "stages of Rosenbrock methods use the slope of arriving waves, which the linear system does not model"
 NO_LIMIT_NOTE = "no step up to twice the slowest line's travel time fails"
@@ -440,8 +506,12 @@ class DelayLineLimits:
         if rates.size:
             self.first = min(self.first, RATE_MARGIN / max(1e-300, float(np.linalg.norm(rates, 2))))
         for _, i, rate in storing_nodes(self.base_model, 1.0):
-            travel = min(float(line["tau"] * line["stretches"]) for line in lines_at(self.base_model, i))
-            self.first = min(self.first, float(np.sqrt(2.0 * travel / (REFLECTION_BOUND * rate * steps))))
+            travel = min(
+                float(line["tau"] * line["stretches"]) for line in lines_at(self.base_model, i)
+            )
+            self.first = min(
+                self.first, float(np.sqrt(2.0 * travel / (REFLECTION_BOUND * rate * steps)))
+            )
 
     def model(self, h: float | None):
         """Model with schedules held at the start, and delay lines divided for steps of h [s]; None: step of the case.
@@ -452,8 +522,10 @@ class DelayLineLimits:
         step = {} if h is None else {"numerics.step": h}
         model = study_model(self.case, self.set | step)
         if model.case.numerics.scheme in LIMITED and (model.tables.pipes["cells"] > 0).any():
-            raise FvsolveError(f"numerics.scheme: {model.case.numerics.scheme} is not linear; expected a linear scheme "
-                               "for stability with delay lines, such as scheme = \"upwind5\"")  # fmt: skip
+            raise FvsolveError(
+                f"numerics.scheme: {model.case.numerics.scheme} is not linear; expected a linear scheme "
+                'for stability with delay lines, such as scheme = "upwind5"'
+            )
         if model.y_size > MAX_STATES:
             raise FvsolveError(
                 f"the case has {model.y_size} states, where each delay line counts as one; expected at most "
@@ -471,7 +543,10 @@ class DelayLineLimits:
     def fails(self, h: float) -> bool:
         """True if the growth of a deviation exceeds the threshold, or the case is refused with steps of h [s]."""
         try:
-            return not self.system(h).growth(self.steps, self.threshold, self.work).size <= self.threshold
+            return (
+                not self.system(h).growth(self.steps, self.threshold, self.work).size
+                <= self.threshold
+            )
         except CaseError as error:
             self.refused[h] = error.faults[0].message
             return True
@@ -481,7 +556,10 @@ class DelayLineLimits:
         if self.method.kind == "linear":
             return StepLimit(np.nan, np.nan)
         rough = limit_from(self.fails, self.first, self.far, RISE, FINE)
-        limits = [rough, *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough))]
+        limits = [
+            rough,
+            *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough)),
+        ]
         return min(limits, key=lambda limit: limit.fails)
 
     def delays_at_stores(self, rough: StepLimit) -> list[float]:
@@ -490,8 +568,16 @@ class DelayLineLimits:
         Waves grow most with steps that are the n-th part of one of these delays, with an integer n.
         rough : first estimate of the limit
         """
-        at_stores = [line for _, i, _ in storing_nodes(self.base_model, 1.0) for line in lines_at(self.base_model, i)]
-        delays = {float(line["tau"] * line["stretches"]) for line in at_stores} if 0.0 < rough.step < np.inf else set()
+        at_stores = [
+            line
+            for _, i, _ in storing_nodes(self.base_model, 1.0)
+            for line in lines_at(self.base_model, i)
+        ]
+        delays = (
+            {float(line["tau"] * line["stretches"]) for line in at_stores}
+            if 0.0 < rough.step < np.inf
+            else set()
+        )
         return sorted(delays, reverse=True)[:LINE_COUNT]
 
     def limit_at_parts(self, delay: float, fails: float) -> StepLimit:
@@ -513,7 +599,9 @@ class DelayLineLimits:
         if n.step == 0.0:
             return StepLimit(np.inf, np.inf)
         between = delay / (n.step + 0.5)
-        return bisect(self.fails, delay / n.fails if self.fails(between) else between, delay / n.step, FINE)
+        return bisect(
+            self.fails, delay / n.fails if self.fails(between) else between, delay / n.step, FINE
+        )
 
 
 def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:
@@ -521,14 +609,22 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
 
     It contains the limit from the linear system of a step and the limit of real runs.
     """
-    limits, left_out, notes = DelayLineLimits(case, scheme, method, steps, threshold), {}, []
+    limits = DelayLineLimits(case, scheme, method, steps, threshold)
+    left_out = {}
+    notes = []
     predicted, model = limits.predicted(), limits.base_model
     rate = float(max(model.wave_rates[model.tables.pipes["cells"] > 0], default=0.0))
     row = {
-        "scheme": scheme, "method": method.name, "when": "the start, with delay lines instead of cells",
-        "states": model.y_size, "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step,
+        "scheme": scheme,
+        "method": method.name,
+        "when": "the start, with delay lines instead of cells",
+        "states": model.y_size,
+        "steps": steps,
+        "threshold": threshold,
+        "rate": rate,
+        "predicted": predicted.step,
         "lines": True,
-    }  # fmt: skip
+    }
     if np.isnan(predicted.step):
         left_out["predicted"] = UNKNOWN_REASON
     elif np.isinf(predicted.step):
@@ -542,5 +638,7 @@ def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> Stab
         h = min(limits.refused)
         notes.append(f"steps of {h:.4g} s or more are refused: {limits.refused[h]}")
     if not limits.refused or predicted.fails not in limits.refused:
-        row |= measure_limit(DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, 0.0, left_out)
+        row |= measure_limit(
+            DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, 0.0, left_out
+        )
     return StabilityRow(**row, left_out=left_out, notes=tuple(notes))

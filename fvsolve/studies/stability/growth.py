@@ -20,19 +20,23 @@ from fvsolve.core.steppers.tableau import Method
 from fvsolve.studies.work_limit import CALL_TIME, DENSE_RATE, FEWER_CELLS, SPARSE_RATE, WorkLimit
 
 POWER_OPERATIONS = 4.0  # over n^3, of a power of a matrix and the check of its norm
-NORM_TURNS, NORM_ACCURACY = 20, 1.0 + 1e-6  # of a power iteration for a norm; greatest norm over its result
+# of a power iteration for a norm; greatest norm over its result
+NORM_TURNS, NORM_ACCURACY = 20, 1.0 + 1e-6
 
 
 def prediction_limit(states: int, steps: int, remedy: str = FEWER_CELLS) -> WorkLimit:
     """Limit of the time of a prediction of growth for this number of states over this number of steps."""
-    return WorkLimit(f"predictions for {states} states and {steps} steps", f"{remedy}, or use fewer --steps")
+    return WorkLimit(
+        f"predictions for {states} states and {steps} steps", f"{remedy}, or use fewer --steps"
+    )
 
 
 # powers of the step matrix ----------------------------------------------------------------------------------------
 
 THRESHOLD = 1e3
 STEPS = 1000
-DENSE = 500  # greatest number of states for which powers are matrices; above, vectors are propagated
+# greatest number of states for which powers are matrices; above, vectors are propagated
+DENSE = 500
 MAX_HJ = 1e4  # greatest h ||J|| of the search
 CHECKED_STEPS = 11  # steps whose powers are all checked if a few powers show no failure
 
@@ -63,12 +67,18 @@ def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
             result = e @ result
             result[np.diag_indices(n)] += x
         return result
-    a, b, s = method.a, method.b, method.stages
+    a = method.a
+    b = method.b
+    s = method.stages
     if not np.any(np.triu(a, 1)):
         stages: list[np.ndarray] = []
         for i in range(s):
-            right = e + e @ sum((a[i, j] * stages[j] for j in range(i) if a[i, j] != 0.0), np.zeros((n, n)))
-            stages.append(np.linalg.solve(np.eye(n) - a[i, i] * e, right) if a[i, i] != 0.0 else right)
+            right = e + e @ sum(
+                (a[i, j] * stages[j] for j in range(i) if a[i, j] != 0.0), np.zeros((n, n))
+            )
+            stages.append(
+                np.linalg.solve(np.eye(n) - a[i, i] * e, right) if a[i, i] != 0.0 else right
+            )
     else:
         # the stages of a state stay together: in the other order pivots grew to 1e76 for a lossless pipe of 250 cells
         solved = np.linalg.solve(np.eye(s * n) - np.kron(e, a), np.repeat(e, s, axis=0))
@@ -81,7 +91,9 @@ def step_operations(method: Method, n: int) -> float:
     if method.explicit:
         return 2.0 * n**3 * method.stages
     if np.any(np.triu(method.a, 1)):
-        return (2.0 * method.stages + 2.0 / 3.0 * method.stages**3) * n**3 + 2.0 * method.stages**2 * n**3
+        return (
+            2.0 * method.stages + 2.0 / 3.0 * method.stages**3
+        ) * n**3 + 2.0 * method.stages**2 * n**3
     return (2.0 + 8.0 / 3.0) * n**3 * method.stages
 
 
@@ -121,7 +133,8 @@ def norm_near(m: np.ndarray, v: np.ndarray) -> tuple[float, np.ndarray]:
     return float(np.linalg.norm(m, 2)) if norm_exceeds(m, NORM_ACCURACY * size) else size, v
 
 
-CONSECUTIVE_POWERS = 64  # number of first and of last powers that are all checked; between, sixteen for each doubling
+# number of first and of last powers that are all checked; between, sixteen for each doubling
+CONSECUTIVE_POWERS = 64
 ALL_POWERS_STATES = 64  # greatest number of states for which every power is checked
 
 
@@ -133,7 +146,10 @@ def checked_powers(steps: int, few: bool = False) -> list[int]:
     """
     numbers = {1 << k for k in range(64)} | {steps}
     if not few:
-        numbers |= {*range(2, CONSECUTIVE_POWERS + 1), *range(steps - CONSECUTIVE_POWERS + 1, steps)}
+        numbers |= {
+            *range(2, CONSECUTIVE_POWERS + 1),
+            *range(steps - CONSECUTIVE_POWERS + 1, steps),
+        }
         numbers |= {j << k for k in range(2, 59) for j in range(16, 32)}
     return sorted(n for n in numbers if 1 <= n <= steps)
 
@@ -145,7 +161,9 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
     up to `steps`. A power is the product of m and the power before, or of two lower powers. The first power that is not
     finite is the last pair.
     """
-    known, last, power = {1: m}, 1, m
+    known = {1: m}
+    last = 1
+    power = m
     yield 1, m
     all_powers = m.shape[0] <= ALL_POWERS_STATES and not few
     for n in range(2, steps + 1) if all_powers else checked_powers(steps, few)[1:]:
@@ -156,7 +174,9 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
         else:
             rest = n - high
             parts = (known[1 << k] for k in range(rest.bit_length()) if rest >> k & 1)
-            power = known[high] @ (known[rest] if rest in known else functools.reduce(np.matmul, parts))
+            power = known[high] @ (
+                known[rest] if rest in known else functools.reduce(np.matmul, parts)
+            )
         last = n
         if n <= CONSECUTIVE_POWERS or n & (n - 1) == 0:
             known[n] = power
@@ -167,7 +187,9 @@ def matrix_powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tupl
 
 def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
     """Greatest 2-norm of the powers m^n over the n <= steps of `matrix_powers`, with its deviation (see `Growth`)."""
-    size, after, greatest = 1.0, 0, np.eye(m.shape[0])
+    size = 1.0
+    after = 0
+    greatest = np.eye(m.shape[0])
     v = np.random.default_rng(5).standard_normal(m.shape[0])
     for n, power in matrix_powers(m, steps):
         if not np.all(np.isfinite(power)):
@@ -176,7 +198,9 @@ def power_growth(m: np.ndarray, steps: int = STEPS) -> Growth:
         if norm_exceeds(power, size):
             norm, v = norm_near(power, v)
             if norm > size:
-                size, after, greatest = norm, n, power
+                size = norm
+                after = n
+                greatest = power
     ends, _, starts = np.linalg.svd(greatest)
     return Growth(size, after, starts[0], ends[:, 0])
 
@@ -188,10 +212,18 @@ class DenseGrowth:
     """
 
     def __init__(
-        self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
+        self,
+        method: Method,
+        e: np.ndarray,
+        steps: int,
+        threshold: float = THRESHOLD,
+        work: WorkLimit | None = None,
     ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
-        self.size, self.work = float(np.linalg.norm(e, 2)), work or prediction_limit(e.shape[0], steps)
+        self.size, self.work = (
+            float(np.linalg.norm(e, 2)),
+            work or prediction_limit(e.shape[0], steps),
+        )
 
     def fails(self, h: float, few: bool = False) -> bool:
         """True if a power of the step matrix exceeds the threshold; few : only powers of two and the last power."""
@@ -229,8 +261,14 @@ class DenseGrowth:
         if rough.step == 0.0:
             return rough
         if np.isinf(rough.step):
-            fails_somewhere = any(self.fails(h) for h in np.geomspace(0.1, MAX_HJ, CHECKED_STEPS) / self.size)
-            return limit_from(self.fails, 0.1 / self.size, MAX_HJ / self.size) if fails_somewhere else rough
+            fails_somewhere = any(
+                self.fails(h) for h in np.geomspace(0.1, MAX_HJ, CHECKED_STEPS) / self.size
+            )
+            return (
+                limit_from(self.fails, 0.1 / self.size, MAX_HJ / self.size)
+                if fails_somewhere
+                else rough
+            )
         if not self.fails(rough.step):
             return rough
         return step_below(self.fails, rough.step, multiples(0.97 * rough.step, 0.9, 0.0))
@@ -261,7 +299,8 @@ class DenseGrowth:
 # vectors ----------------------------------------------------------------------------------------------------------
 
 VECTORS, PASSES = 4, 4  # vectors in a block; passes forward and back
-NORM_MARGIN = 2.0  # greatest norm of a power over that of a random block, and over the root of the number of states
+# greatest norm of a power over that of a random block, and over the root of the number of states
+NORM_MARGIN = 2.0
 
 
 class VectorGrowth:
@@ -273,7 +312,12 @@ class VectorGrowth:
     """
 
     def __init__(
-        self, method: Method, e: Any, steps: int, threshold: float = THRESHOLD, work: WorkLimit | None = None
+        self,
+        method: Method,
+        e: Any,
+        steps: int,
+        threshold: float = THRESHOLD,
+        work: WorkLimit | None = None,
     ) -> None:
         self.method, self.e, self.steps, self.threshold = method, e.tocsr(), steps, threshold
         self.work = work or prediction_limit(e.shape[0], steps)
@@ -303,7 +347,9 @@ class VectorGrowth:
         The search ends when the growth exceeds a finite `enough`, or is so far below it after a pass that the norm of
         no power can reach it. Raises TooLarge if the estimated time exceeds its limit.
         """
-        (forth, time), (back, _) = (step_function(self.method, h, e, self.work) for e in (self.e, self.transpose))
+        (forth, time), (back, _) = (
+            step_function(self.method, h, e, self.work) for e in (self.e, self.transpose)
+        )
         v, unit = self.start_block, self.start_block[:, 0] / np.linalg.norm(self.start_block[:, 0])
         best = Growth(1.0, 0, unit, unit)
         for _ in range(PASSES):
@@ -322,13 +368,18 @@ class VectorGrowth:
                 v = back(v)
         return best
 
-    def propagate(self, step: Callable, time: float, v: np.ndarray, enough: float) -> tuple[float, int, np.ndarray]:
+    def propagate(
+        self, step: Callable, time: float, v: np.ndarray, enough: float
+    ) -> tuple[float, int, np.ndarray]:
         """(greatest norm of a block v of vectors over the steps, number of steps when it is reached, block then).
 
         step, time : function that multiplies a block by the step matrix, and its time [s]
         enough : norm above which the steps end
         """
-        size, steps, block, done = 1.0, 0, v, 0
+        size = 1.0
+        steps = 0
+        block = v
+        done = 0
         with np.errstate(over="ignore", invalid="ignore"):
             for n in checked_powers(self.steps):
                 self.work.spend((n - done) * time + CALL_TIME)
@@ -339,7 +390,9 @@ class VectorGrowth:
                     return np.inf, n, block
                 norm = float(np.linalg.norm(v, 2))
                 if norm > size:
-                    size, steps, block = norm, n, v
+                    size = norm
+                    steps = n
+                    block = v
                 if norm > enough:
                     break
         return size, steps, block
@@ -352,7 +405,9 @@ def step_function(
 
     e : sparse Jacobian. The time is an estimate for `VECTORS` vectors; work : spends that of factors
     """
-    scaled, n, s = h * e, e.shape[0], method.stages
+    scaled = h * e
+    n = e.shape[0]
+    s = method.stages
     product_time = CALL_TIME + 2.0 * VECTORS * (e.nnz + n) / SPARSE_RATE
     if method.explicit:
         coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
@@ -368,10 +423,12 @@ def step_function(
     from scipy.sparse.linalg import splu
 
     scaled = scaled.tocsc()
-    factors = splu((eye_array(s * n) - kron(scaled, method.a)).tocsc())  # in the order of `step_matrix`
+    # in the order of `step_matrix`
+    factors = splu((eye_array(s * n) - kron(scaled, method.a)).tocsc())
     entries = factors.nnz
     if work is not None:
-        work.spend(entries**2 / (s * n) / SPARSE_RATE)  # less than the sum of squares over the columns
+        # less than the sum of squares over the columns
+        work.spend(entries**2 / (s * n) / SPARSE_RATE)
 
     def implicit(v: np.ndarray) -> np.ndarray:
         stages = factors.solve(np.repeat(scaled @ v, s, axis=0))
@@ -381,11 +438,17 @@ def step_function(
 
 
 def growth_method(
-    method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, work: WorkLimit | None = None
+    method: Method,
+    e: Any,
+    steps: int = STEPS,
+    threshold: float = THRESHOLD,
+    work: WorkLimit | None = None,
 ) -> Any:
     """Object that computes the growth of deviations: `DenseGrowth` for up to 500 states, `VectorGrowth` for more."""
     if e.shape[0] <= DENSE:
-        return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold, work)
+        return DenseGrowth(
+            method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold, work
+        )
     from scipy.sparse import csr_array
 
     return VectorGrowth(method, csr_array(e), steps, threshold, work)

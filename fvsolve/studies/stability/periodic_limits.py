@@ -80,14 +80,21 @@ class PeriodicPipe:
         scheme_settings(tables["settings"][0], scheme, limiter)
         tables["pipes"]["noise"] = WENO_NOISE
         self.tables = tuple(tables.values())
-        self.stepper = Integrator(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
-        self.handle, self.functions = make_handle(self.tables), (*observers(), compile_as(rhs_periodic, RHS))
+        self.stepper = Integrator(
+            method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells)
+        )
+        self.handle, self.functions = (
+            make_handle(self.tables),
+            (*observers(), compile_as(rhs_periodic, RHS)),
+        )
 
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
         """Cell values after `steps` steps at a Courant number, from the values `start`; None if not finite."""
         stepper = self.stepper
         stepper.state[:] = np.zeros(1, loop_records.STATE)
-        stepper.set_control(mode=loop_records.FIXED_STEP, size=courant, step_max=FAR_TIME, stop_at=FAR_TIME)
+        stepper.set_control(
+            mode=loop_records.FIXED_STEP, size=courant, step_max=FAR_TIME, stop_at=FAR_TIME
+        )
         stepper.set_control(end=2.0 * courant * (steps + 1), budget=steps)
         stepper.restart_segment()
         stepper.y[stepper.progress[0]["now"]] = start
@@ -100,9 +107,12 @@ class PeriodicPipe:
 @declared("study")
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def measured_limits(
-    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    cells: int = CELLS,
+    steps: int = STEPS,
     progress: Progress | None = None,
-) -> list[MeasuredLimit]:  # fmt: skip
+) -> list[MeasuredLimit]:
     """Predicted and measured Courant limits of linear schemes with explicit methods on a periodic grid.
 
     schemes, methods : names; default: all linear schemes, all explicit methods; implicit methods are left out
@@ -114,7 +124,12 @@ def measured_limits(
     report = progress or (lambda *_: None)
     schemes = name_list(schemes) or list(WEIGHTS)
     chosen = [method_named(name) for name in name_list(methods) or ()] or list(METHODS.values())
-    pairs = [(scheme, tableau.name) for tableau in dict.fromkeys(chosen) if tableau.explicit for scheme in schemes]
+    pairs = [
+        (scheme, tableau.name)
+        for tableau in dict.fromkeys(chosen)
+        if tableau.explicit
+        for scheme in schemes
+    ]
     for scheme in schemes:
         weights_of(scheme)
     limits = []
@@ -124,12 +139,15 @@ def measured_limits(
     return limits
 
 
-def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> MeasuredLimit:
+def measured_limit(
+    scheme: str, method: str, cells: int = CELLS, steps: int = STEPS
+) -> MeasuredLimit:
     """Least Courant number at which growth exceeds 1000 within `steps` steps, predicted and measured.
 
     The growth is that of the wave that grows most: from the stability function, and in a run from one impulse.
     """
-    theta, circle = 2 * np.pi * np.arange(cells // 2 + 1) / cells, PeriodicPipe(scheme, method, cells)
+    theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
+    circle = PeriodicPipe(scheme, method, cells)
     r, impulse = analyse(method).stability_function, np.zeros(cells)
     impulse[0] = 1.0
 
@@ -140,13 +158,22 @@ def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = ST
         end = circle.run(impulse, courant, steps)
         return math.inf if end is None else math.log10(np.abs(np.fft.rfft(end)).max())
 
-    return MeasuredLimit(scheme, method, cells, steps, first_failure(predicted_growth), first_failure(measured_growth))
+    return MeasuredLimit(
+        scheme,
+        method,
+        cells,
+        steps,
+        first_failure(predicted_growth),
+        first_failure(measured_growth),
+    )
 
 
 def first_failure(
-    growth: Callable[[float], float], width: float = LIMIT_TOLERANCE, smallest: float = SMALLEST_COURANT,
+    growth: Callable[[float], float],
+    width: float = LIMIT_TOLERANCE,
+    smallest: float = SMALLEST_COURANT,
     ratio: float = COURANT_RATIO,
-) -> float | None:  # fmt: skip
+) -> float | None:
     """Least Courant number whose growth exceeds 1000; None if there is none up to 20.
 
     growth : function of the Courant number, log10 of the growth
@@ -166,18 +193,25 @@ def check_size(cells: int, steps: int) -> None:
     if cells < 6:
         raise FvsolveError(f"cells = {cells}: expected 6 or more, the widest scheme uses 5 cells")
     if steps < 10:
-        raise FvsolveError(f"steps = {steps}: expected 10 or more, because failure is growth over many steps")
+        raise FvsolveError(
+            f"steps = {steps}: expected 10 or more, because failure is growth over many steps"
+        )
 
 
 # limited schemes --------------------------------------------------------------------------------------------------
 
-LIMITED_CELLS, LIMITED_STEPS, STEP_FACTORS = 50, 500, (1, 10, 100)
-LIMITED_TOLERANCE = 1e-3  # relative width of a measured limit; growth is not a smooth function of the Courant number
-SMALLEST = 0.3  # least Courant number that is run, unless a bound excludes failure up to a greater one
+LIMITED_CELLS = 50
+LIMITED_STEPS = 500
+STEP_FACTORS = (1, 10, 100)
+# relative width of a measured limit; growth is not a smooth function of the Courant number
+LIMITED_TOLERANCE = 1e-3
+# least Courant number that is run, unless a bound excludes failure up to a greater one
+SMALLEST = 0.3
 RATIO = 1.02  # of consecutive Courant numbers; above a failure, a greater one may be stable again
 LIMITED_METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")  # by default
 NORM_CHECKS = 25  # number of checks of the norm during a run
-SHARPNESS = 0.05  # relative fall of the limit from the fewest to the most steps above which it is not sharp
+# relative fall of the limit from the fewest to the most steps above which it is not sharp
+SHARPNESS = 0.05
 SEED = 1
 
 
@@ -219,7 +253,12 @@ class LimitedLimit(PlainData):
 
     def flat(self) -> dict:
         """Values as a single row of a table, without the exact limits: name of the column -> value."""
-        cells = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
+        cells = {
+            "scheme": self.scheme,
+            "limiter": self.limiter,
+            "method": self.method,
+            "monotone": self.monotone,
+        }
         cells |= {"cells": self.cells, "sharp": self.sharp}
         for start, row in self.measured.items():
             cells |= {f"{start}, {n} steps": x for n, x in zip(self.steps, row, strict=True)}
@@ -229,9 +268,12 @@ class LimitedLimit(PlainData):
 @declared("study")
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def limited_limits(
-    schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = LIMITED_CELLS,
-    steps: int = LIMITED_STEPS, progress: Progress | None = None,
-) -> list[LimitedLimit]:  # fmt: skip
+    schemes: Sequence[str] = tuple(LIMITED),
+    methods: Sequence[str] | None = None,
+    cells: int = LIMITED_CELLS,
+    steps: int = LIMITED_STEPS,
+    progress: Progress | None = None,
+) -> list[LimitedLimit]:
     """Courant limits of limited schemes (muscl with each limiter) with explicit methods on a periodic grid.
 
     cells : cells of the grid; steps : real runs have 1, 10 and 100 times this number of steps
@@ -244,12 +286,18 @@ def limited_limits(
     chosen = [method_named(name) for name in name_list(methods) or LIMITED_METHODS]
     implicit = [tableau.name for tableau in chosen if not tableau.explicit]
     if implicit:
-        raise FvsolveError(f"{implicit[0]} is implicit; expected explicit methods for runs with limited schemes")
+        raise FvsolveError(
+            f"{implicit[0]} is implicit; expected explicit methods for runs with limited schemes"
+        )
     for name in schemes:
         if name not in LIMITED:
             hint = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
             raise FvsolveError(f'no limited scheme named "{name}"{hint}')
-    kinds = [(name, limiter) for name in schemes for limiter in (LIMITERS if name == "muscl" else (None,))]
+    kinds = [
+        (name, limiter)
+        for name in schemes
+        for limiter in (LIMITERS if name == "muscl" else (None,))
+    ]
     pairs = [(*kind, tableau.name) for tableau in dict.fromkeys(chosen) for kind in kinds]
     limits = []
     for scheme, limiter, method in pairs:
@@ -259,13 +307,22 @@ def limited_limits(
 
 
 def limited_limit(
-    scheme: str, limiter: str | None, method: str, cells: int = LIMITED_CELLS, steps: int = LIMITED_STEPS
+    scheme: str,
+    limiter: str | None,
+    method: str,
+    cells: int = LIMITED_CELLS,
+    steps: int = LIMITED_STEPS,
 ) -> LimitedLimit:
     """Courant limits of a limited scheme (and the limiter of muscl) with a method, on a grid of `cells` cells."""
     counts, name = tuple(n * steps for n in STEP_FACTORS), method_named(method).name
-    frozen = {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()}
-    measured = {start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
-                for start, u in start_fields(cells).items()}  # fmt: skip
+    frozen = {
+        branch: limit_of(weights, branch, method)
+        for branch, weights in branches(scheme, limiter).items()
+    }
+    measured = {
+        start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
+        for start, u in start_fields(cells).items()
+    }
     monotone = monotone_limit(limiter or scheme, method)
     return LimitedLimit(scheme, limiter, name, frozen, monotone, cells, counts, measured)
 
@@ -280,20 +337,30 @@ def start_fields(cells: int) -> dict[str, np.ndarray]:
     """Initial cell values with mean zero, by name: a sine wave, a square wave ("front") and random noise."""
     j = np.arange(cells)
     noise = np.random.default_rng(SEED).standard_normal(cells)
-    fields = {"wave": np.sin(2 * np.pi * j / cells), "front": np.where(j < cells // 2, 1.0, -1.0), "noise": noise}
+    fields = {
+        "wave": np.sin(2 * np.pi * j / cells),
+        "front": np.where(j < cells // 2, 1.0, -1.0),
+        "noise": noise,
+    }
     return {name: u - u.mean() for name, u in fields.items()}
 
 
-def measured_courant(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
+def measured_courant(
+    scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int
+) -> float | None:
     """Least Courant number up to 20 at which the norm of a run from `start` is found to grow 1000 times, or None."""
     circle = PeriodicPipe(scheme, method, start.size, limiter or "minmod")
     smallest = monotone_limit(limiter or scheme, method) or SMALLEST
-    return first_failure(lambda courant: _growth(circle, start, courant, steps), LIMITED_TOLERANCE, smallest, RATIO)
+    return first_failure(
+        lambda courant: _growth(circle, start, courant, steps), LIMITED_TOLERANCE, smallest, RATIO
+    )
 
 
 def _growth(circle: PeriodicPipe, start: np.ndarray, courant: float, steps: int) -> float:
     """log10 of the growth of the norm in a run; inf above a growth of 1000, and if values are not finite."""
-    u, greatest, done = start, 0.0, 0
+    u = start
+    greatest = 0.0
+    done = 0
     for k in range(1, NORM_CHECKS + 1):
         count, done = steps * k // NORM_CHECKS - done, steps * k // NORM_CHECKS
         u = circle.run(u, courant, count) if count else u

@@ -13,17 +13,21 @@ from fvsolve.core.steppers import loop_records
 from fvsolve.studies.operating_point import OperatingPoint
 from fvsolve.studies.stability.growth import STEPS, THRESHOLD, checked_powers
 
-SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)  # greatest at the start, in units of the small deviation of states
-CLEAR_DEVIATION = 1e-6  # a deviation of this size at the start is above round-off and Newton residuals
+# greatest at the start, in units of the small deviation of states
+SMALL_DEVIATIONS = 10.0 ** -np.arange(6.0, 16.0)
+# a deviation of this size at the start is above round-off and Newton residuals
+CLEAR_DEVIATION = 1e-6
 DEVIATION_RATIO = 10.0  # ratio of a larger start to a smaller one
 GROWTH_AGREEMENT = 0.02  # relative difference of growth up to which both starts agree
-END_TOLERANCE = 2.0  # greatest number of steps between the ends of two runs that stop for the same reason
+# greatest number of steps between the ends of two runs that stop for the same reason
+END_TOLERANCE = 2.0
 STAGE_REACH = 10.0  # greatest deviation of stages of a step over that of states
 RANDOM_STARTS = 2  # random starts, besides the start with the greatest predicted growth
 SAFE_PARTS = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are checked to be safe
 TIME_LIMIT = 20.0  # time limit of a measured limit [s]
 UNLIMITED_STEPS = (10.0, 100.0)  # steps over 1 / ||J|| that are run if no step is predicted to fail
-MAX_WIDENINGS, MAX_REDUCTIONS = 12, 40  # greatest number of factors 1.3 up and down in the search for a bracket
+# greatest number of factors 1.3 up and down in the search for a bracket
+MAX_WIDENINGS, MAX_REDUCTIONS = 12, 40
 
 
 class RealRuns:
@@ -36,12 +40,24 @@ class RealRuns:
     a : float64[n, n]  Jacobian of the rates, for this default
     """
 
-    def __init__(self, at: OperatingPoint, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
-                 threshold: float = THRESHOLD, small: float | None = None, a=None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        at: OperatingPoint,
+        method: str,
+        form: EnergyForm,
+        worst=None,
+        steps: int = STEPS,
+        threshold: float = THRESHOLD,
+        small: float | None = None,
+        a=None,
+    ) -> None:
         self.at, self.method, self.form = at, method, form
         self.prepare(at.model.y_size, steps, threshold)
         rng = np.random.default_rng(7)
-        starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM_STARTS, form.size))]
+        starts = [
+            *([] if worst is None else [worst]),
+            *rng.standard_normal((RANDOM_STARTS, form.size)),
+        ]
         deviations = [form.back @ start for start in starts]
         # the greatest entry of each equals the small deviation of that state
         deviations = [y / np.max(np.abs(y) / at.model.scale) for y in deviations]
@@ -72,13 +88,19 @@ class RealRuns:
             return float(np.max(np.abs(change / width - slope))) / (np.max(np.abs(slope)) or 1.0)
 
         return float(
-            min(SMALL_DEVIATIONS, key=lambda width: max(nonlinearity(y, width), nonlinearity(grown, reach * width)))
+            min(
+                SMALL_DEVIATIONS,
+                key=lambda width: max(nonlinearity(y, width), nonlinearity(grown, reach * width)),
+            )
         )
 
     def loop(self, y: np.ndarray, h: float) -> RunLoop:
         """Run loop that starts from the state y with fixed steps of h [s]."""
         loop = fixed_step_loop(self.at.model, lambda: self.structure, self.method, h, self.at.t)
-        loop.now[:], loop.armed[:] = y, self.at.model.flags if self.at.armed is None else self.at.armed
+        loop.now[:], loop.armed[:] = (
+            y,
+            self.at.model.flags if self.at.armed is None else self.at.armed,
+        )
         loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return loop
 
@@ -91,13 +113,19 @@ class RealRuns:
         depend on the start; then the larger deviation is used, and the check is repeated. Raises TimeoutError at the
         time limit.
         """
-        size, after, base_at = 1.0, 0, self.base_states(h)
+        size = 1.0
+        after = 0
+        base_at = self.base_states(h)
         for start, width in self.starts:
             growth, n = self.growth_of_start(width * start, h, base_at)
             while growth > self.threshold and width < CLEAR_DEVIATION:
-                width, smaller, smaller_after = DEVIATION_RATIO * width, growth, n
+                width = DEVIATION_RATIO * width
+                smaller = growth
+                smaller_after = n
                 growth, n = self.growth_of_start(width * start, h, base_at)
-                if n == smaller_after and (growth == smaller or abs(growth - smaller) <= GROWTH_AGREEMENT * smaller):
+                if n == smaller_after and (
+                    growth == smaller or abs(growth - smaller) <= GROWTH_AGREEMENT * smaller
+                ):
                     break
             if growth > size:
                 size, after = growth, n
@@ -166,7 +194,10 @@ class RealRuns:
         ends = []
         for step in (h, 0.5 * h):
             run = self.loop(self.at.y, step)
-            reached = run.run(self.steps * h / step) in (loop_records.BUDGET_SPENT, loop_records.DONE)
+            reached = run.run(self.steps * h / step) in (
+                loop_records.BUDGET_SPENT,
+                loop_records.DONE,
+            )
             ends.append(np.inf if reached else run.t - self.at.t)
         return min(ends) if abs(ends[0] - ends[1]) <= END_TOLERANCE * h else np.inf
 
@@ -212,7 +243,10 @@ class RealRuns:
         try:
             for factor in UNLIMITED_STEPS:
                 if self.fails(factor / size):
-                    return {"measured": self.limit_below(factor / size).step, "measured_up_to": factor / size}
+                    return {
+                        "measured": self.limit_below(factor / size).step,
+                        "measured_up_to": factor / size,
+                    }
                 passed = factor / size
         except TimeoutError:
             if passed == 0.0:

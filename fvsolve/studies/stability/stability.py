@@ -24,7 +24,12 @@ from fvsolve.core.steppers.tableau import AUTO
 from fvsolve.declarations import declared
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.linearise import Linear, Spectrum, find_eigenvalues, linearise_at
-from fvsolve.studies.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
+from fvsolve.studies.operating_point import (
+    OperatingPoint,
+    has_limiter,
+    operating_point,
+    with_weights,
+)
 from fvsolve.studies.outcome import STUDY_ARGUMENTS, Progress, name_list
 from fvsolve.studies.parallel import PickledCase, TaskPool, Work
 from fvsolve.studies.resolution import delay_lines, fixed_choices
@@ -54,7 +59,8 @@ AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, and its row is that of {automatic.EXPLICIT}; a run continues with "
     f"{automatic.IMPLICIT} or {automatic.TIGHT_IMPLICIT} if that is cheaper, but the row does not include these methods"
 )
-LIMITED_DEVIATION = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
+# of the small deviation: start for limited schemes, above the round-off level of WENO
+LIMITED_DEVIATION = 1e-3
 LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with a limiter
 
 
@@ -94,7 +100,10 @@ class LinearSystem:
     @property
     def idle(self) -> list[str]:
         """Names of states with motions that store no energy."""
-        return [self.at.model.state_names[i] for i in np.flatnonzero(np.any(self.full_form.idle, axis=1))]
+        return [
+            self.at.model.state_names[i]
+            for i in np.flatnonzero(np.any(self.full_form.idle, axis=1))
+        ]
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -114,13 +123,29 @@ class LinearSystem:
 
 @declared("study")
 @validated(
-    schemes=NAMES, methods=NAMES, at=NUMBER, before=FLAG, steps=COUNT, threshold=NUMBER, out=PATH, **STUDY_ARGUMENTS
+    schemes=NAMES,
+    methods=NAMES,
+    at=NUMBER,
+    before=FLAG,
+    steps=COUNT,
+    threshold=NUMBER,
+    out=PATH,
+    **STUDY_ARGUMENTS,
 )
 def stability(
-    case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, at: float | None = None,
-    before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, out: str | Path | None = None,
-    progress: Progress | None = None, jobs: int = 1, dask: str | None = None,
-) -> Stability:  # fmt: skip
+    case,
+    schemes: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None,
+    at: float | None = None,
+    before: bool = False,
+    steps: int = STEPS,
+    threshold: float = THRESHOLD,
+    set=None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
+) -> Stability:
     """Compute the greatest stable steps of a case for each scheme and time method: a row for each pair.
 
     schemes, methods : names; default: scheme and method of the case; `auto` counts as its first method
@@ -138,11 +163,15 @@ def stability(
     case = load(case, dict(set or {}))
     case = load(case, fixed_choices(case))
     if delay_lines(case) and at is not None:
-        raise FvsolveError("stability of delay lines is computed about the start only: later waves in lines are not "
-                           'included; leave out --at, or set numerics.pipe_model = "finite-volume"')  # fmt: skip
+        raise FvsolveError(
+            "stability of delay lines is computed about the start only: later waves in lines are not "
+            'included; leave out --at, or set numerics.pipe_model = "finite-volume"'
+        )
     schemes = name_list(schemes) or [case.numerics.scheme]
     requested = name_list(methods) or [case.numerics.method]
-    methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in requested))
+    methods = list(
+        dict.fromkeys(method_named(automatic.first_method(name)).name for name in requested)
+    )
     texts = (AUTO_NOTE,) if AUTO in requested else ()
     requested = {"at": at, "before": before, "steps": steps, "threshold": threshold}
     work, pairs = RowTask(case, **requested), [*itertools.product(schemes, methods)]
@@ -152,18 +181,27 @@ def stability(
     return Stability(case.name, tuple(map(row_from_json, rows)), texts, systems)
 
 
-def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
+def cached_rows(
+    points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress
+) -> list[dict]:
     """Rows of all pairs (scheme, method); rows that are not in the cache are computed by `pool` and stored.
 
     points : cache of rows; report : progress function; options : settings that are part of the key of a row
     """
-    keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
+    keys = [
+        {"study": "stability", "scheme": scheme, "method": method, **options}
+        for scheme, method in pairs
+    ]
     rows = [points.find(case, extra) for extra in keys]
     new = [k for k, row in enumerate(rows) if row is None]
 
     def progress(count: int) -> None:
         known = len(pairs) - len(new)
-        report(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
+        report(
+            known + count,
+            len(pairs),
+            "".join(" with ".join(pairs[k]) for k in new[count : count + 1]),
+        )
 
     progress(0)
     for count, (number, row) in enumerate(pool.run([pairs[k] for k in new]), 1):
@@ -199,7 +237,9 @@ class RowTask(Work):
 class SchemeRows:
     """Computation of the rows of one scheme; data that methods share are computed once, on first use."""
 
-    def __init__(self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float) -> None:
+    def __init__(
+        self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float
+    ) -> None:
         self.case, self.scheme, self.time, self.before = case, scheme, at, before
         self.steps, self.threshold = steps, threshold
         self.states: dict[str, OperatingPoint] = {}
@@ -208,7 +248,9 @@ class SchemeRows:
     def at(self, scheme: str) -> OperatingPoint:
         """Operating point of the case with a scheme, computed on first use."""
         if scheme not in self.states:
-            self.states[scheme] = operating_point(self.case, {"numerics.scheme": scheme}, self.time, self.before)
+            self.states[scheme] = operating_point(
+                self.case, {"numerics.scheme": scheme}, self.time, self.before
+            )
         return self.states[scheme]
 
     def system(self, scheme: str) -> LinearSystem:
@@ -229,10 +271,13 @@ class SchemeRows:
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
             if name not in self.systems:
-                cells = sum(weight != 0 for weight in weights)  # which set the degree of the polynomials at pipe ends
+                # which set the degree of the polynomials at pipe ends
+                cells = sum(weight != 0 for weight in weights)
                 degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")
                 point = replace(self.at("upwind5"), y=at.y)
-                self.systems[name] = LinearSystem(with_weights(point, tuple(map(float, weights)), degree))
+                self.systems[name] = LinearSystem(
+                    with_weights(point, tuple(map(float, weights)), degree)
+                )
             yield name, self.systems[name]
 
     def row(self, name: str) -> StabilityRow:
@@ -247,26 +292,43 @@ class SchemeRows:
         limit = predicted_limit(growth)
         greatest = growth.growth(limit.fails) if np.isfinite(limit.fails) else None
         worst = greatest and greatest.start
-        runs = RealRuns(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
+        runs = RealRuns(
+            side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a
+        )
         row = self.bound_columns(side, method) | {"predicted": limit.step}
         if greatest:
             shares: dict[str, float] = {}  # of the energy of the deviation, by part
-            for part, root in zip(side.form.parts, side.form.rows @ (side.form.back @ greatest.end), strict=True):
+            for part, root in zip(
+                side.form.parts, side.form.rows @ (side.form.back @ greatest.end), strict=True
+            ):
                 shares[part] = shares.get(part, 0.0) + float(root**2)
             where = max(shares, key=shares.get)
-            row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": shares[where]}
+            row |= {
+                "growth": greatest.size,
+                "after": greatest.steps,
+                "where": where,
+                "share": shares[where],
+            }
         row |= measure_limit(runs, limit.step, growth.size, row["left_out"])
         result = StabilityRow(**row)
         notes = bound_notes(result, side, growth)
         if result.states > DENSE:
-            notes.append(f"{result.states} states are more than {DENSE}, so the limit is predicted from powers of the "
-                         f"step matrix applied to {VECTORS} start vectors")  # fmt: skip
+            notes.append(
+                f"{result.states} states are more than {DENSE}, so the limit is predicted from powers of the "
+                f"step matrix applied to {VECTORS} start vectors"
+            )
         return StabilityRow(**row | {"notes": tuple(notes)})
 
     def first_columns(self, at: OperatingPoint, method) -> dict:
         """Columns that name the pair and the operating point."""
-        return {"scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
-                "steps": self.steps, "threshold": self.threshold}  # fmt: skip
+        return {
+            "scheme": self.scheme,
+            "method": method.name,
+            "when": at.when,
+            "states": at.model.y_size,
+            "steps": self.steps,
+            "threshold": self.threshold,
+        }
 
     def bound_columns(self, side: LinearSystem, method) -> dict:
         """Columns that need no powers of the step matrix: names, sizes, bounds; side : linear system of the scheme."""
@@ -283,9 +345,13 @@ class SchemeRows:
         if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
-            left_out["field_of_values"] = f"not computed, because {model.y_size} states are more than {MAX_STATES}"
+            left_out["field_of_values"] = (
+                f"not computed, because {model.y_size} states are more than {MAX_STATES}"
+            )
         if model.cells:
-            row["von_neumann"] = von_neumann_limit(self.scheme, method) / float(model.wave_rates.max())
+            row["von_neumann"] = von_neumann_limit(self.scheme, method) / float(
+                model.wave_rates.max()
+            )
         return row | {"left_out": left_out}
 
     def limited_row(self, method) -> StabilityRow:
@@ -294,7 +360,9 @@ class SchemeRows:
         For Euler it has also the limit of runs of ten times as many steps.
         """
         at = self.at(self.scheme)
-        limits, starts, left_out = {}, {}, {}
+        limits = {}
+        starts = {}
+        left_out = {}
         work = prediction_limit(at.model.y_size, self.steps)  # of all these predictions together
         try:
             for name, side in self.frozen_systems():
@@ -308,15 +376,31 @@ class SchemeRows:
         # the middle value, between those of small and large slopes
         guess = sorted(starts)[len(starts) // 2] if starts else np.inf
         if left_out and not starts:
-            guess = von_neumann_limit(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
+            guess = (
+                von_neumann_limit(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
+            )
 
         def runs(steps: int) -> RealRuns:
-            return RealRuns(at, method.name, side.form, starts.get(guess), steps, self.threshold, LIMITED_DEVIATION)
+            return RealRuns(
+                at,
+                method.name,
+                side.form,
+                starts.get(guess),
+                steps,
+                self.threshold,
+                LIMITED_DEVIATION,
+            )
 
-        row = self.first_columns(at, method) | {"rate": side.rate, "frozen": limits, "left_out": left_out}
+        row = self.first_columns(at, method) | {
+            "rate": side.rate,
+            "frozen": limits,
+            "left_out": left_out,
+        }
         row |= measure_limit(runs(self.steps), guess, growth.size, left_out)
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
-            longer = measure_limit(runs(LONGER_FACTOR * self.steps), row["measured"], 0.0, left_out, "longer")
+            longer = measure_limit(
+                runs(LONGER_FACTOR * self.steps), row["measured"], 0.0, left_out, "longer"
+            )
             row["longer"] = longer.get("measured", np.nan)
         return StabilityRow(**row | {"notes": tuple(bound_notes(StabilityRow(**row), side, None))})
 

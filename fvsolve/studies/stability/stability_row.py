@@ -79,7 +79,14 @@ class StabilityRow:
     def plain(self) -> dict:
         """Data for JSON: steps [s] and Courant numbers; "none" if no failing step was found, null if unknown."""
         data = asdict(self) | {"difference": self.difference}
-        for name in ("predicted", "measured", "eigenvalues", "field_of_values", "von_neumann", "longer"):
+        for name in (
+            "predicted",
+            "measured",
+            "eigenvalues",
+            "field_of_values",
+            "von_neumann",
+            "longer",
+        ):
             data[name] = json_number(getattr(self, name))
             data[f"{name}_courant"] = json_number(self.courant(getattr(self, name)))
         data["frozen"] = {name: json_number(step) for name, step in self.frozen.items()}
@@ -150,13 +157,16 @@ def field_of_values(e: np.ndarray) -> np.ndarray:
     points = []
     for angle in np.linspace(0.0, np.pi, TANGENTS):
         rotated = np.exp(-1j * angle) * e
-        hermitian = 0.5 * (rotated + rotated.conj().T)  # LAPACK's search for one value can lose a multiple eigenvalue
+        # LAPACK's search for one value can lose a multiple eigenvalue
+        hermitian = 0.5 * (rotated + rotated.conj().T)
         x = eigh(hermitian, check_finite=False, driver="evd")[1][:, -1]
         points.append(np.vdot(x, e @ x))
     upper = np.array(points)
     corners = np.concatenate([upper, upper[::-1].conj()])
     share = np.arange(POINTS_PER_SIDE) / POINTS_PER_SIDE
-    return np.concatenate([a + (b - a) * share for a, b in zip(corners, np.roll(corners, -1), strict=True)])
+    return np.concatenate(
+        [a + (b - a) * share for a, b in zip(corners, np.roll(corners, -1), strict=True)]
+    )
 
 
 # notes ------------------------------------------------------------------------------------------------------------
@@ -173,23 +183,31 @@ def bound_notes(row, side, system) -> list[str]:
     if not np.isfinite(row.predicted):
         texts.append("in linearised form no step up to 1e4 / ||J|| fails (J: Jacobian)")
         if np.isfinite(row.measured):
-            texts.append(f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in "
-                         f"{row.steps} such steps the solution leaves the linearised state, and nonlinear laws "
-                         "determine the growth")  # fmt: skip
+            texts.append(
+                f"only the linear system never fails; real runs fail from h = {row.measured:.5g} s on: in "
+                f"{row.steps} such steps the solution leaves the linearised state, and nonlinear laws "
+                "determine the growth"
+            )
         return texts
     if "eigenvalues" not in row.left_out:
         texts += eigenvalue_notes(row, system)
     texts += field_of_values_notes(row, side)
     texts += von_neumann_notes(row)
     if np.isinf(row.measured):
-        texts.append(f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from the "
-                     "linearised state, or nonlinear laws stop the growth")  # fmt: skip
+        texts.append(
+            f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from the "
+            "linearised state, or nonlinear laws stop the growth"
+        )
     if np.isfinite(row.difference) and abs(row.difference) > 0.01:
         reason = "the deviation does not stay linear"
         if state_moves(side):
-            reason = (f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile "
-                      "the state leaves the linearised state; the prediction is for that state only")  # fmt: skip
-        texts.append(f"prediction and measurement differ by {100 * row.difference:+.1f} %: {reason}")
+            reason = (
+                f"{row.steps} steps of the predicted limit take {row.steps * row.predicted:.3g} s, and meanwhile "
+                "the state leaves the linearised state; the prediction is for that state only"
+            )
+        texts.append(
+            f"prediction and measurement differ by {100 * row.difference:+.1f} %: {reason}"
+        )
     return texts
 
 
@@ -197,20 +215,35 @@ def case_notes(row, side) -> list[str]:
     """Notes on the operating point and the case, which do not depend on the method."""
     texts = []
     growing = row.greatest_real > 0.0
-    if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
+    if growing and row.greatest_real > GROWTH_FLOOR * max(
+        row.rate, np.abs(side.spectrum.values).max(initial=0.0)
+    ):
         rate = f"{row.greatest_real:.3g} 1/s"
-        texts.append(f"the case itself is unstable, with a growth rate of {rate}, not because of long steps")
+        texts.append(
+            f"the case itself is unstable, with a growth rate of {rate}, not because of long steps"
+        )
     if side.full_form is not side.form:
-        texts.append(f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it; "
-                     "the norm includes this motion, with the least weight of all states")  # fmt: skip
+        texts.append(
+            f"{listing(side.idle)}: free motion stores no energy, but states with energy depend on it; "
+            "the norm includes this motion, with the least weight of all states"
+        )
     elif side.idle:
         texts.append(f"{listing(side.idle)}: free motion stores no energy and is left out")
     model = side.at.model
-    if model.cells and model.case.scalars and model.case.numerics.scheme != "upwind" and not has_limiter(model):
-        texts.append("scalars in pipes are computed without slopes in cells, because their limiter has no derivative")
+    if (
+        model.cells
+        and model.case.scalars
+        and model.case.numerics.scheme != "upwind"
+        and not has_limiter(model)
+    ):
+        texts.append(
+            "scalars in pipes are computed without slopes in cells, because their limiter has no derivative"
+        )
     if state_moves(side):
-        texts.append("the state is not steady: deviations are measured from a run that starts at this state, with "
-                     "schedules held constant")  # fmt: skip
+        texts.append(
+            "the state is not steady: deviations are measured from a run that starts at this state, with "
+            "schedules held constant"
+        )
     return texts
 
 
@@ -223,18 +256,26 @@ def eigenvalue_notes(row, system) -> list[str]:
     """Notes on the bound by eigenvalues, compared with the predicted limit."""
     if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
         if np.isinf(row.eigenvalues):
-            return ["eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"]
+            return [
+                "eigenvalues allow every step, but deviations grow at some steps: the Jacobian J is not normal"
+            ]
         try:
             after = system.failing_after(0.99 * row.eigenvalues)
         except TooLarge:
             after = 0
         if after:
-            return [f"eigenvalues are misleading: the Jacobian J is not normal; 1 % below their limit growth exceeds "
-                    f"{row.threshold:g} after {after} steps"]  # fmt: skip
-        return ["eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"]
+            return [
+                f"eigenvalues are misleading: the Jacobian J is not normal; 1 % below their limit growth exceeds "
+                f"{row.threshold:g} after {after} steps"
+            ]
+        return [
+            "eigenvalues allow longer steps than the growth of deviations does: the Jacobian J is not normal"
+        ]
     if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
-        return [f"above the limit of the eigenvalues a mode grows, but by less than a factor of {row.threshold:g} in "
-                f"{row.steps} steps: longer runs fail at smaller steps"]  # fmt: skip
+        return [
+            f"above the limit of the eigenvalues a mode grows, but by less than a factor of {row.threshold:g} in "
+            f"{row.steps} steps: longer runs fail at smaller steps"
+        ]
     return []
 
 
@@ -245,9 +286,11 @@ def field_of_values_notes(row, side) -> list[str]:
     if row.field_of_values == 0.0:
         reach = float(side.field.real.max())
         if reach > GROWTH_FLOOR * np.abs(side.field).max():
-            return [f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
-                    "can grow at first (pipe ends with a scheme above first order, or a gain in the case). This is not "
-                    "a failure"]  # fmt: skip
+            return [
+                f"the field of values allows no step: it reaches {reach:.3g} 1/s into the right half plane; energy "
+                "can grow at first (pipe ends with a scheme above first order, or a gain in the case). This is not "
+                "a failure"
+            ]
         touches = "it touches the imaginary axis at points outside the stability region"
         return [f"the field of values allows no step: {touches}"]
     return ["the bound by the field of values is below the predicted limit here"]
@@ -258,10 +301,14 @@ def von_neumann_notes(row) -> list[str]:
     if np.isnan(row.von_neumann):
         return []
     if row.von_neumann > (1.0 + AGREEMENT) * row.predicted:
-        return ["von Neumann's limit is misleading: pipe ends, nodes or other parts limit the step, not the interior"]
+        return [
+            "von Neumann's limit is misleading: pipe ends, nodes or other parts limit the step, not the interior"
+        ]
     if row.von_neumann < (1.0 - AGREEMENT) * row.predicted:
-        return ["von Neumann's limit holds for any number of steps and any wavelength; in this case growth remains "
-                f"below the threshold of {row.threshold:g} in {row.steps} steps"]  # fmt: skip
+        return [
+            "von Neumann's limit holds for any number of steps and any wavelength; in this case growth remains "
+            f"below the threshold of {row.threshold:g} in {row.steps} steps"
+        ]
     return []
 
 
@@ -272,9 +319,13 @@ def limiter_notes(row, model) -> list[str]:
         frozen = "in pipes with cavities only the weights of upwind are used"
     elif model.meshed:
         frozen = "in basins only the weights of upwind are used"
-    texts = [f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
-             f"weights are held constant: {frozen}"]  # fmt: skip
+    texts = [
+        f"{row.scheme} has no derivative at a constant state, so its limit is measured; in predictions its "
+        f"weights are held constant: {frozen}"
+    ]
     if np.isfinite(row.longer):
-        texts.append(f"Euler with a limiter has no sharp limit: Courant number {row.courant(row.measured):.3g} in "
-                     f"{row.steps} steps, {row.courant(row.longer):.3g} in {10 * row.steps} steps")  # fmt: skip
+        texts.append(
+            f"Euler with a limiter has no sharp limit: Courant number {row.courant(row.measured):.3g} in "
+            f"{row.steps} steps, {row.courant(row.longer):.3g} in {10 * row.steps} steps"
+        )
     return texts

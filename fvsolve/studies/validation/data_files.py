@@ -27,7 +27,9 @@ _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 
 def missing_files(validation: Validation, data: Path | None) -> list[str]:
     """Texts on files of a validation that are missing in the data folder, or differ from their sums."""
-    return [text for name, given in validation.files.items() if (text := file_fault(name, given, data))]
+    return [
+        text for name, given in validation.files.items() if (text := file_fault(name, given, data))
+    ]
 
 
 def file_fault(name: str, given: str, data: Path | None) -> str:
@@ -70,9 +72,16 @@ def write_profile(given: Mapping[str, Any], folder: Path) -> None:
         return
     x = np.linspace(0.0, float(given["length"]), PROFILE_POINTS)
     flow = measures.profile(given, x, 0.0)
-    for name, unit, values in (("bed", "m", flow.bed), ("level", "m", flow.surface), ("u", "m/s", flow.u)):
-        rows = {"x [m]": np.tile(x, 2), "y [m]": np.repeat([0.0, PROFILE_WIDTH], len(x)),
-                f"{name} [{unit}]": np.tile(values, 2)}  # fmt: skip
+    for name, unit, values in (
+        ("bed", "m", flow.bed),
+        ("level", "m", flow.surface),
+        ("u", "m/s", flow.u),
+    ):
+        rows = {
+            "x [m]": np.tile(x, 2),
+            "y [m]": np.repeat([0.0, PROFILE_WIDTH], len(x)),
+            f"{name} [{unit}]": np.tile(values, 2),
+        }
         write_table(folder / f"exact-{name}.csv", rows)
 
 
@@ -88,19 +97,38 @@ def derived_table(
     number are left out. Raises FvsolveError for an invalid formula, or if no row is left.
     """
     lines = read_lines(path)[skip:]
-    cells = [_SEPARATOR.split(line.strip()) for line in lines if line.strip() and not line.startswith("#")]
+    cells = [
+        _SEPARATOR.split(line.strip())
+        for line in lines
+        if line.strip() and not line.startswith("#")
+    ]
     if matrix:
-        cells = [[str(i), str(j), row[j]] for i, row in enumerate(cells) for j in range(0, len(row), every)
-                 if i % every == 0]  # fmt: skip
+        cells = [
+            [str(i), str(j), row[j]]
+            for i, row in enumerate(cells)
+            for j in range(0, len(row), every)
+            if i % every == 0
+        ]
     names = tuple(f"c{k + 1}" for k in range(max(map(len, cells), default=0)))
-    formulas = {header: formula_of(text, names, f"{path.name}, column {header}") for header, text in columns.items()}
+    formulas = {
+        header: formula_of(text, names, f"{path.name}, column {header}")
+        for header, text in columns.items()
+    }
     condition = formula_of(where or "1", names, f"{path.name}, where")[0]
-    used = sorted({int(step.rule[1:]) - 1 for formula in (condition, *(pair[0] for pair in formulas.values()))
-                   for step in formula.steps if step.count == 0 and step.rule in names})  # fmt: skip
+    used = sorted(
+        {
+            int(step.rule[1:]) - 1
+            for formula in (condition, *(pair[0] for pair in formulas.values()))
+            for step in formula.steps
+            if step.count == 0 and step.rule in names
+        }
+    )
     numbers = [[number(row[k]) if k < len(row) else None for k in used] for row in cells]
     rows = np.array([row for row in numbers if None not in row], float).reshape(-1, len(used))
     if not len(rows):
-        raise FvsolveError(f"{path.name}: no row has numbers in columns {', '.join(names[k] for k in used)}")
+        raise FvsolveError(
+            f"{path.name}: no row has numbers in columns {', '.join(names[k] for k in used)}"
+        )
     known = {names[k]: rows[:, j] for j, k in enumerate(used)}
     counts = condition.evaluate(known)[0] != 0.0
     known = {name: column[counts] for name, column in known.items()}
@@ -141,7 +169,11 @@ def read_lines(path: Path) -> list[str]:
     """Lines of a text file, also of one packed by gzip. Raises FvsolveError if it is not text."""
     try:
         content = path.read_bytes()
-        return (gzip.decompress(content) if path.suffix == ".gz" else content).decode("utf-8-sig").splitlines()
+        return (
+            (gzip.decompress(content) if path.suffix == ".gz" else content)
+            .decode("utf-8-sig")
+            .splitlines()
+        )
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path.name} cannot be read: {error}") from None
 

@@ -14,7 +14,15 @@ import numpy as np
 from fvsolve.case import load, shipped
 from fvsolve.case import text as toml
 from fvsolve.case.reading import Raw, Reading, read_raw
-from fvsolve.case.validation_table import DIFFERENCE, EXACT, OF_ERROR, OF_SERIES, Row, Validation, read_validation
+from fvsolve.case.validation_table import (
+    DIFFERENCE,
+    EXACT,
+    OF_ERROR,
+    OF_SERIES,
+    Row,
+    Validation,
+    read_validation,
+)
 from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.core.output.unit_columns import UnitColumn
 from fvsolve.core.run import model_of, solved
@@ -22,12 +30,20 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.parallel import TaskPool, Work
 from fvsolve.studies.resolution import refined_keys
 from fvsolve.studies.validation import data_files, measures
-from fvsolve.studies.validation.row_verdicts import DIFFERS, OUTSIDE, VERDICTS, WITHIN, judge, known_values
+from fvsolve.studies.validation.row_verdicts import (
+    DIFFERS,
+    OUTSIDE,
+    VERDICTS,
+    WITHIN,
+    judge,
+    known_values,
+)
 
 FOLDER = "validation"  # below the shipped cases
 LACKING, FAULTY = "data lacking", "not run"
 COARSER = 0.5  # resolution of the run from which the numerical error follows
-CODES = {FAULTY: 2, OUTSIDE: 1, LACKING: 3, DIFFERS: 0, WITHIN: 0}  # exit codes of the command, first one first
+# exit codes of the command, first one first
+CODES = {FAULTY: 2, OUTSIDE: 1, LACKING: 3, DIFFERS: 0, WITHIN: 0}
 PROGRAMS = {  # name in a case file -> module of this package with the function `compute`
     "ode-problems": "ode_problems",
     "epanet-networks": "epanet_networks",
@@ -84,16 +100,33 @@ class RowResult:
 
     def in_unit(self, value: float) -> float:
         """Convert a value of the row from SI to the unit of its tables."""
-        return self.shown.span_from_si(value) if self.is_difference else float(self.shown.from_si(value))
+        return (
+            self.shown.span_from_si(value)
+            if self.is_difference
+            else float(self.shown.from_si(value))
+        )
 
     def plain(self) -> dict[str, Any]:
         """Plain data of the row."""
         row, others = self.row, [{"code": code, "value": value} for code, value in self.others]
-        return {"what": row.what, "computed": row.computed, "value": self.value,
-                "numerical_error": self.error, "measured": row.measured, "others": [*row.others, *others],
-                "exact": row.exact if self.converged is None else {**(row.exact or {}), "value": self.converged},
-                "gate": row.gate, "tolerance": self.tolerance, "verdict": self.verdict, "reason": self.text,
-                "shift": self.shift, "because": row.because, "coarser": self.coarser}  # fmt: skip
+        return {
+            "what": row.what,
+            "computed": row.computed,
+            "value": self.value,
+            "numerical_error": self.error,
+            "measured": row.measured,
+            "others": [*row.others, *others],
+            "exact": row.exact
+            if self.converged is None
+            else {**(row.exact or {}), "value": self.converged},
+            "gate": row.gate,
+            "tolerance": self.tolerance,
+            "verdict": self.verdict,
+            "reason": self.text,
+            "shift": self.shift,
+            "because": row.because,
+            "coarser": self.coarser,
+        }
 
 
 @dataclass(frozen=True)
@@ -117,10 +150,19 @@ class ValidationResult:
     def plain(self) -> dict[str, Any]:
         """Plain data of the validation."""
         about = self.validation
-        return {"name": self.name, "title": self.title, "verdict": self.verdict, "source": about.source,
-                "licence": about.licence, "get": about.get, "note": about.note, "seconds": self.seconds,
-                "lacking": list(self.lacking), "fault": self.fault,
-                "rows": [row.plain() for row in self.rows]}  # fmt: skip
+        return {
+            "name": self.name,
+            "title": self.title,
+            "verdict": self.verdict,
+            "source": about.source,
+            "licence": about.licence,
+            "get": about.get,
+            "note": about.note,
+            "seconds": self.seconds,
+            "lacking": list(self.lacking),
+            "fault": self.fault,
+            "rows": [row.plain() for row in self.rows],
+        }
 
 
 def exit_code(results: Iterable[ValidationResult]) -> int:
@@ -132,22 +174,32 @@ def exit_code(results: Iterable[ValidationResult]) -> int:
 def paths() -> dict[str, Path]:
     """Shipped cases with a validation : name -> path of the case file, sorted by name."""
     files = [*shipped.folder().glob("*.toml"), *(shipped.folder() / FOLDER).glob("*.toml")]
-    return {path.stem: path for path in sorted(files, key=lambda path: path.stem) if "[validation]" in path.read_text()}
+    return {
+        path.stem: path
+        for path in sorted(files, key=lambda path: path.stem)
+        if "[validation]" in path.read_text()
+    }
 
 
 def find(names: Iterable[str]) -> dict[str, Path]:
     """Case files by name; all shipped ones without names. Raises FvsolveError for each unknown name."""
-    known, chosen, unknown = paths(), {}, []
+    known = paths()
+    chosen = {}
+    unknown = []
     for name in names:
         path = Path(name) if Path(name).is_file() else known.get(name)
         if path is None:
             unknown.append(f"{name}{did_you_mean(name, known)}")
         elif path.stem in chosen:
-            raise FvsolveError(f"{chosen[path.stem]} and {path} have the same name; run each in a command of its own")
+            raise FvsolveError(
+                f"{chosen[path.stem]} and {path} have the same name; run each in a command of its own"
+            )
         else:
             chosen[path.stem] = path
     if unknown:
-        raise FvsolveError(f"no file and no shipped validation {', '.join(unknown)}; validations are {listing(known)}")
+        raise FvsolveError(
+            f"no file and no shipped validation {', '.join(unknown)}; validations are {listing(known)}"
+        )
     return chosen or known
 
 
@@ -205,13 +257,17 @@ def read_table(raw: Raw) -> Validation:
     """Table `[validation]` of a case whose parts are not read. Raises CaseError."""
     reading = Reading(raw)
     if "validation" not in raw.table:
-        reading.fault((), "has no table [validation]; expected source, compare and a gate for each row")
+        reading.fault(
+            (), "has no table [validation]; expected source, compare and a gate for each row"
+        )
     validation = read_validation(reading, None, {})
     reading.stop()
     return validation
 
 
-def validate_file(path: Path, data: Path | None = None, out: Path | None = None) -> ValidationResult:
+def validate_file(
+    path: Path, data: Path | None = None, out: Path | None = None
+) -> ValidationResult:
     """Validate one case file; arguments as for `validate`."""
     raw = read_raw(path)
     validation, title = read_table(raw), raw.table.get("title", "")
@@ -236,8 +292,12 @@ def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
     """Rows of a validation whose values a program of this package computes."""
     name = validation.program
     if name not in PROGRAMS:
-        raise FvsolveError(f"validation.program: {name} is unknown; programs are {listing(PROGRAMS)}")
-    found = importlib.import_module(f"fvsolve.studies.validation.{PROGRAMS[name]}").compute(validation, folder)
+        raise FvsolveError(
+            f"validation.program: {name} is unknown; programs are {listing(PROGRAMS)}"
+        )
+    found = importlib.import_module(f"fvsolve.studies.validation.{PROGRAMS[name]}").compute(
+        validation, folder
+    )
     rows = []
     for row in validation.compare:
         if row.computed not in found:
@@ -247,11 +307,17 @@ def program_rows(validation: Validation, folder: Path) -> list[RowResult]:
         judged = judge(row, value, error, known_values(row, [number for _, number in others]))
         text = "; ".join(filter(None, (judged.text, further)))
         shown, (verdict, tolerance, _) = UnitColumn("", "number", row.unit), judged
-        rows.append(RowResult(row, shown, value, error, verdict, tolerance, text, others=others, lines=lines))
+        rows.append(
+            RowResult(
+                row, shown, value, error, verdict, tolerance, text, others=others, lines=lines
+            )
+        )
     return rows
 
 
-def scene_rows(raw: Raw, validation: Validation, folder: Path) -> tuple[Validation, list[RowResult], float]:
+def scene_rows(
+    raw: Raw, validation: Validation, folder: Path
+) -> tuple[Validation, list[RowResult], float]:
     """(validation with its measures, rows, seconds of stepping) of a scene; rows with equal overrides share runs."""
     table = data_files.completed(raw.table, validation, folder)
     raw = Raw(table, raw.name, raw.path, folder, raw.text)
@@ -266,7 +332,9 @@ def scene_rows(raw: Raw, validation: Validation, folder: Path) -> tuple[Validati
         runs = Runs(raw, whole.validation.compare[numbers[0]].set)
         for number in numbers:
             results[number] = scene_row(runs.own.case.validation.compare[number], runs)
-        seconds += sum(result.summary["seconds"] for result in runs.results.values() if result is not None)
+        seconds += sum(
+            result.summary["seconds"] for result in runs.results.values() if result is not None
+        )
     return whole.validation, [results[number] for number in range(len(results))], seconds
 
 
@@ -318,17 +386,37 @@ def scene_row(row: Row, runs: Runs) -> RowResult:
         )
     second = np.nan if other is None else measures.value_of(row, other)
     error = float(abs(value - second)) if np.isfinite(second) else None
-    if error is not None and finer is None and row.gate["of"] == EXACT and row.measure.function in OF_ERROR:
+    if (
+        error is not None
+        and finer is None
+        and row.gate["of"] == EXACT
+        and row.measure.function in OF_ERROR
+    ):
         error = max(value, second)  # the value is the numerical error itself
-    converged, coarser = (second, None) if finer else (None, float(second) if np.isfinite(second) else None)
+    converged, coarser = (
+        (second, None) if finer else (None, float(second) if np.isfinite(second) else None)
+    )
     judged = judge(row, value, error, known_values(row, converged=converged))
-    lines, shift, text = measures.lines_of(row, runs.own), 0.0, judged.text
+    lines = measures.lines_of(row, runs.own)
+    shift = 0.0
+    text = judged.text
     if row.measure.function in OF_SERIES:
         shift, left = measures.best_shift(row, runs.own)
         if shift and judged.verdict != WITHIN:
             text += f"; arrival: the computed series is {abs(shift):.3g} s {'early' if shift > 0 else 'late'}"
             text += f", and differs by {left:.3g} without that"
     shown = measures.shown_in(row, runs.own.case)
-    return RowResult(row, shown, value, error, judged.verdict, judged.tolerance, text, converged, shift=shift,
-                     coarser=coarser, lines=lines,
-                     unit_of_lines=measures.unit_of_lines(row, runs.own.case))  # fmt: skip
+    return RowResult(
+        row,
+        shown,
+        value,
+        error,
+        judged.verdict,
+        judged.tolerance,
+        text,
+        converged,
+        shift=shift,
+        coarser=coarser,
+        lines=lines,
+        unit_of_lines=measures.unit_of_lines(row, runs.own.case),
+    )

@@ -52,7 +52,9 @@ def value_of(row: Row, run: Any) -> float:
         return difference(series_of(row, run), measure.function)
     if measure.run_up is not None:
         return run_up(measure, run)
-    if measure.extent is not None or (measure.function in ("max", "min") and row.from_ is None and row.to is None):
+    if measure.extent is not None or (
+        measure.function in ("max", "min") and row.from_ is None and row.to is None
+    ):
         return extreme(row, run)
     t, values = window(row, run.seconds, run.si(measure.probe.text))
     if not len(t):
@@ -60,7 +62,11 @@ def value_of(row: Row, run: Any) -> float:
     if measure.function == CROSSING:
         return crossing_time(t, values, measure.argument)
     if measure.function == "at":
-        return float(np.interp(measure.argument, t, values)) if t[0] <= measure.argument <= t[-1] else np.nan
+        return (
+            float(np.interp(measure.argument, t, values))
+            if t[0] <= measure.argument <= t[-1]
+            else np.nan
+        )
     if measure.function == "mean":
         return float(trapezoid(values, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(values[-1])
     return {"max": values.max, "min": values.min, "final": lambda: values[-1]}[measure.function]()
@@ -81,9 +87,14 @@ def extreme(row: Row, run: Any) -> float:
     """Extreme of a probe over all steps, or of a quantity over parts [SI]."""
     measure, side = row.measure, {"max": "maximum", "min": "minimum"}[row.measure.function]
     if measure.extent is None:
-        return float(run.column(measure.probe.text).to_si(getattr(run.extremes[measure.probe.text], side)))
-    found = [getattr(run.extremes[probe.text], side) for probe in measure.extent.probes(run.case.links)
-             if probe.text in run.extremes]  # fmt: skip
+        return float(
+            run.column(measure.probe.text).to_si(getattr(run.extremes[measure.probe.text], side))
+        )
+    found = [
+        getattr(run.extremes[probe.text], side)
+        for probe in measure.extent.probes(run.case.links)
+        if probe.text in run.extremes
+    ]
     return float(max(found) if measure.function == "max" else min(found))
 
 
@@ -117,7 +128,9 @@ def series_of(row: Row, run: Any) -> SeriesPair:
     t, measured = window(row, series.t + series.shift, series.v)
     inside = (t >= computed_t[0]) & (t <= computed_t[-1])
     if inside.sum() < 2:
-        raise FvsolveError(f"{row.what}: {series.file} has no two rows between the times that count")
+        raise FvsolveError(
+            f"{row.what}: {series.file} has no two rows between the times that count"
+        )
     t, measured = t[inside], measured[inside]
     return SeriesPair(t, measured, np.interp(t, computed_t, run.si(name)))
 
@@ -133,8 +146,14 @@ def difference(series: SeriesPair, function: str) -> float:
     if function == DIFFERENCE:
         return float(np.sqrt(np.mean(gap**2)))
     if np.ptp(series.measured) == 0.0:
-        raise FvsolveError("the measured series is constant over the times that count; expected other times")
-    size = {"mean_error": gap.mean(), "rms_error": np.sqrt(np.mean(gap**2)), "greatest_error": gap.max()}[function]
+        raise FvsolveError(
+            "the measured series is constant over the times that count; expected other times"
+        )
+    size = {
+        "mean_error": gap.mean(),
+        "rms_error": np.sqrt(np.mean(gap**2)),
+        "greatest_error": gap.max(),
+    }[function]
     return float(size / np.ptp(series.measured))
 
 
@@ -149,7 +168,10 @@ def best_shift(row: Row, run: Any) -> tuple[float, float]:
     span = MAX_SHIFT * (series.t[-1] - series.t[0])
     shifts = np.linspace(-span, span, SHIFTS)
     t, values = run.seconds, run.si(name)
-    sizes = [difference(series._replace(computed=np.interp(series.t - shift, t, values)), function) for shift in shifts]
+    sizes = [
+        difference(series._replace(computed=np.interp(series.t - shift, t, values)), function)
+        for shift in shifts
+    ]
     best = int(np.argmin(sizes))
     return (float(shifts[best]), sizes[best]) if sizes[best] <= SHIFT_SHARE * own else (0.0, own)
 
@@ -184,7 +206,10 @@ def lines_of(row: Row, run: Any) -> dict[str, np.ndarray]:
     line = np.unique(x, return_index=True)[1]  # one cell of each column
     exact = exact_field(run, x[line], quantity)
     computed = end_field(run.last_frame[basin], quantity)[line]
-    return {"exact": np.column_stack([x[line], exact]), "computed": np.column_stack([x[line], computed])}
+    return {
+        "exact": np.column_stack([x[line], exact]),
+        "computed": np.column_stack([x[line], computed]),
+    }
 
 
 def curve_of(path: Path) -> np.ndarray:
@@ -215,12 +240,16 @@ def exact_field(run: Any, x: np.ndarray, quantity: str) -> np.ndarray:
     """Exact field at places x [m] at the end of a run, nan outside the keys `from` and `to` of the profile."""
     given = run.case.validation.profile
     values = getattr(profile(given, x, run.summary["t"]), quantity)
-    return np.where((x >= given.get("from", -np.inf)) & (x <= given.get("to", np.inf)), values, np.nan)
+    return np.where(
+        (x >= given.get("from", -np.inf)) & (x <= given.get("to", np.inf)), values, np.nan
+    )
 
 
 def profile(given: Mapping[str, Any], x: np.ndarray, t: float) -> shallow_water.Flow:
     """Exact fields at places x [m] and time t [s]; given : table `profile` of a validation"""
-    data = {key: float(value) for key, value in given.items() if key not in ("solution", *PROFILE_KEYS)}
+    data = {
+        key: float(value) for key, value in given.items() if key not in ("solution", *PROFILE_KEYS)
+    }
     return shallow_water.SOLUTIONS[given["solution"]](x, t, **data)
 
 
@@ -228,7 +257,9 @@ def end_field(frame: Mapping[str, np.ndarray], quantity: str) -> np.ndarray:
     """Values of a quantity in the cells of a basin : float64[cells]; frame : fields of the basin by name"""
     u = frame["velocity"][:, 0]
     return (
-        {"u": u, "discharge": u * frame["depth"]}.get(quantity) if quantity in ("u", "discharge") else frame[quantity]
+        {"u": u, "discharge": u * frame["depth"]}.get(quantity)
+        if quantity in ("u", "discharge")
+        else frame[quantity]
     )
 
 

@@ -107,7 +107,9 @@ def compute(validation: Validation, folder: Path) -> dict[str, Computed]:
 
 def read_states(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray, tuple[float, float]]]:
     """Start, end state and times of each problem from the columns problem, t0, t1, component, start, end."""
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    lines = [
+        line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+    ]
     rows: dict[str, list[list[float]]] = {}
     for row in csv.reader(lines[1:]):
         rows.setdefault(row[0], []).append([float(cell) for cell in row[1:]])
@@ -163,5 +165,9 @@ def ratio(own: list[tuple[float, float]], peer: list[tuple[float, float]]) -> fl
     """
     seconds, error = peer[2]
     order = sorted(own, key=lambda point: -point[1])
-    found = np.interp(-np.log(error), [-np.log(point[1]) for point in order], np.log([point[0] for point in order]))
+    found = np.interp(
+        -np.log(error),
+        [-np.log(point[1]) for point in order],
+        np.log([point[0] for point in order]),
+    )
     return float(seconds / np.exp(found))

@@ -43,7 +43,12 @@ def summary_table(results: list[ValidationResult]) -> str:
     """Table with a line for each case."""
     lines = ["| case | what | rows | verdict | seconds |", "|---|---|---|---|---|"]
     for result in results:
-        cells = [f"[{result.name}](#{result.name})", result.title, str(len(result.rows)), result.verdict]
+        cells = [
+            f"[{result.name}](#{result.name})",
+            result.title,
+            str(len(result.rows)),
+            result.verdict,
+        ]
         lines.append(f"| {' | '.join(map(cell, cells))} | {result.seconds:.2g} |")
     return "\n".join([*lines, ""])
 
@@ -51,13 +56,25 @@ def summary_table(results: list[ValidationResult]) -> str:
 def section(result: ValidationResult, figures: list[str]) -> str:
     """Section of a case: source, figure, rows and reasons."""
     about = result.validation
-    lines = [f"({result.name})=", f"## {result.title or result.name}", "", f"Source: {about.source}."]
+    lines = [
+        f"({result.name})=",
+        f"## {result.title or result.name}",
+        "",
+        f"Source: {about.source}.",
+    ]
     lines += [f"Data: {about.licence}."] if about.licence else []
     lines += [about.note] if about.note else []
     if not result.rows:
-        return "\n".join([*lines, "", f"Not run: {result.fault or '; '.join(result.lacking)}. {about.get}", ""])
-    lines += ["", *(f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
-                    for theme, name in zip(THEMES, figures, strict=False))]  # fmt: skip
+        return "\n".join(
+            [*lines, "", f"Not run: {result.fault or '; '.join(result.lacking)}. {about.get}", ""]
+        )
+    lines += [
+        "",
+        *(
+            f"![{result.title}, {theme}]({name}){{.only-{theme}}}\n"
+            for theme, name in zip(THEMES, figures, strict=False)
+        ),
+    ]
     lines += [
         "| quantity | measured | computed | half resolution | error | other programs | limits | unit | verdict |",
         "|" + "---|" * 9,
@@ -77,7 +94,11 @@ def section(result: ValidationResult, figures: list[str]) -> str:
         ]
         lines.append(f"| {' | '.join(map(cell, cells))} |")
     notes = [f"- {row.row.what}: {row.text}" for row in result.rows if row.text]
-    notes += [f"- {row.row.what}: gate: {row.row.gate['reason']}" for row in result.rows if row.row.gate["reason"]]
+    notes += [
+        f"- {row.row.what}: gate: {row.row.gate['reason']}"
+        for row in result.rows
+        if row.row.gate["reason"]
+    ]
     lines += ["", *notes, "", f"`fvsolve validate {result.name}`", ""]
     return "\n".join(lines)
 
@@ -107,15 +128,23 @@ def panels_of(result: ValidationResult) -> list[LinePanel]:
             continue
         measure = row.row.measure
         if measure is None:
-            title, label, logarithmic = row.row.computed, "x [m]", "exact" not in row.lines
+            title = row.row.computed
+            label = "x [m]"
+            logarithmic = "exact" not in row.lines
             if logarithmic:
                 title, label = f"{title.rpartition('.')[0]}: error of the end state", "CPU time [s]"
         elif measure.run_up is not None:
-            title, label, logarithmic = f"run-up {measure.run_up.name} [m]", "angle [deg] or distance [m]", False
+            title = f"run-up {measure.run_up.name} [m]"
+            label = "angle [deg] or distance [m]"
+            logarithmic = False
         elif measure.field is not None:
-            title, label, logarithmic = f"{'.'.join(measure.field)} [{row.unit_of_lines}]", "x [m]", False
+            title = f"{'.'.join(measure.field)} [{row.unit_of_lines}]"
+            label = "x [m]"
+            logarithmic = False
         else:
-            title, label, logarithmic = f"{measure.probe.text} [{row.unit_of_lines}]", "t [s]", False
+            title = f"{measure.probe.text} [{row.unit_of_lines}]"
+            label = "t [s]"
+            logarithmic = False
         key = title + repr(row.row.set)
         panels.setdefault(key, LinePanel(title, label, row.lines, logarithmic))
     return list(panels.values())
@@ -126,8 +155,14 @@ def value_row(row: RowResult) -> ValueRow:
     known = known_values(row.row, [value for _, value in row.others], row.converged)
     gate, shown = limits_of(row), row.in_unit
     codes = [*(item["value"] for item in row.row.others), *(value for _, value in row.others)]
-    error = row.error if row.error is not None and math.isfinite(row.error) and not is_error(row) else 0.0
-    measured = None if is_error(row) or known.measured is None else tuple(map(shown, known.measured))
+    error = (
+        row.error
+        if row.error is not None and math.isfinite(row.error) and not is_error(row)
+        else 0.0
+    )
+    measured = (
+        None if is_error(row) or known.measured is None else tuple(map(shown, known.measured))
+    )
     value = shown(row.value) if np.isfinite(row.value) else gate[0]
     unit = "" if row.unit == "-" else row.unit
     passes = row.verdict == WITHIN

@@ -36,22 +36,49 @@ def compute(validation: Validation, folder: Path) -> dict[str, Computed]:
     result = {}
     for name, states in PROBLEMS.items():
         (error, line), (coarser, _) = (compared(*states, cells) for cells in (CELLS, CELLS // 2))
-        result[name] = Computed(error, coarser, text=f"on {CELLS // 2} cells {coarser:.2e}", lines=line)
+        result[name] = Computed(
+            error, coarser, text=f"on {CELLS // 2} cells {coarser:.2e}", lines=line
+        )
     return result
 
 
 def pipe(cells: int) -> dict:
     """Case of a stiff pipe at rest between a reservoir and a closed end."""
-    fluid = {"name": "user", "density": DENSITY, "bulk_modulus": BULK_MODULUS, "viscosity": 1e-3, "law": "mixture",
-             "vapor_pressure": VAPOR, "pressure": AMBIENT, "air_fraction": AIR, "cavitation": True}  # fmt: skip
-    main = {"type": "pipe", "from": "left", "to": "right", "length": LENGTH, "diameter": DIAMETER, "wall": "rigid",
-            "friction": {"model": "none"}, "cells": cells}  # fmt: skip
-    numerics = {"end": 10.0, "scheme": "muscl", "limiter": "minmod", "method": "ssp-rk3", "courant": 0.5}
+    fluid = {
+        "name": "user",
+        "density": DENSITY,
+        "bulk_modulus": BULK_MODULUS,
+        "viscosity": 1e-3,
+        "law": "mixture",
+        "vapor_pressure": VAPOR,
+        "pressure": AMBIENT,
+        "air_fraction": AIR,
+        "cavitation": True,
+    }
+    main = {
+        "type": "pipe",
+        "from": "left",
+        "to": "right",
+        "length": LENGTH,
+        "diameter": DIAMETER,
+        "wall": "rigid",
+        "friction": {"model": "none"},
+        "cells": cells,
+    }
+    numerics = {
+        "end": 10.0,
+        "scheme": "muscl",
+        "limiter": "minmod",
+        "method": "ssp-rk3",
+        "courant": 0.5,
+    }
     nodes = {"left": {"type": "reservoir", "pressure": HIGH}, "right": {"type": "junction"}}
     return {"fluid": fluid, "nodes": nodes, "links": {"main": main}, "numerics": numerics}
 
 
-def compared(left: tuple[float, float], right: tuple[float, float], cells: int) -> tuple[float, dict[str, np.ndarray]]:
+def compared(
+    left: tuple[float, float], right: tuple[float, float], cells: int
+) -> tuple[float, dict[str, np.ndarray]]:
     """(mean error of the mass over its range, lines of the mass per length) of a problem; left, right : states"""
     model = build(load(pipe(cells)))
     state, row = initial_state(model), model.tables.pipes[0]
@@ -59,7 +86,8 @@ def compared(left: tuple[float, float], right: tuple[float, float], cells: int) 
     half = np.arange(cells) < cells // 2
     mass = np.where(half, EXACT.m(left[0]), EXACT.m(right[0]))
     excess, flow = row["speed"] * (mass - base), mass * np.where(half, left[1], right[1])
-    state.y[:cells], state.y[cells:] = (excess + flow) / 2, (excess - flow) / 2  # the two waves of each cell
+    # the two waves of each cell
+    state.y[:cells], state.y[cells:] = (excess + flow) / 2, (excess - flow) / 2
     state = advance(model, state, END)
     found = base + (state.y[:cells] + state.y[cells:]) / row["speed"]
     x = (np.arange(cells) + 0.5) * LENGTH / cells - LENGTH / 2
@@ -67,5 +95,8 @@ def compared(left: tuple[float, float], right: tuple[float, float], cells: int) 
     for share in (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5:
         exact += EXACT.m(at((x + share * LENGTH / cells) / END)[0]) / SAMPLES
     inner = np.abs(x) < LENGTH / 4
-    lines = {name: np.column_stack([x, values])[inner] for name, values in (("exact", exact), ("computed", found))}
+    lines = {
+        name: np.column_stack([x, values])[inner]
+        for name, values in (("exact", exact), ("computed", found))
+    }
     return float(np.mean(np.abs(found - exact)[inner]) / np.ptp(exact[inner])), lines

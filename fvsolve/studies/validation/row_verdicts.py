@@ -8,7 +8,8 @@ from fvsolve.case.validation_table import EXACT, MEASURED, OF_ERROR, OTHERS, Row
 
 WITHIN, DIFFERS, OUTSIDE = VERDICTS = ("within", "equations solved, model differs", "outside")
 ROUNDING = 1e-12
-SAFETY = 2.0  # numerical errors that a gate may be wide beside the spread of the values: they are estimates
+# numerical errors that a gate may be wide beside the spread of the values: they are estimates
+SAFETY = 2.0
 
 
 class Judged(NamedTuple):
@@ -52,7 +53,9 @@ def known_values(row: Row, others: Sequence[float] = (), converged: float | None
         reference = pairs[MEASURED if row.gate["of"] == MEASURED else EXACT]
         reference += [0.0] if converged is None else []
         pairs[OTHERS] += [0.0] if codes else []
-    numbers = {key: [value for value in values if value is not None] for key, values in pairs.items()}
+    numbers = {
+        key: [value for value in values if value is not None] for key, values in pairs.items()
+    }
     return Known(*((min(values), max(values)) if values else None for values in numbers.values()))
 
 
@@ -67,20 +70,34 @@ def judge(row: Row, value: float, error: float | None, known: Known) -> Judged:
     tolerance = tolerance_of(gate, reference)
     allowed = known.span(of) + SAFETY * (error or 0.0)
     if tolerance > allowed * (1.0 + 1e-9) + ROUNDING and not gate["reason"]:
-        text = (f"the gate, {tolerance:.3g}, is wider than the spread of measurement, codes and numerical error "
-                f"together, {allowed:.3g}; narrow it, or write gate.reason")  # fmt: skip
+        text = (
+            f"the gate, {tolerance:.3g}, is wider than the spread of measurement, codes and numerical error "
+            f"together, {allowed:.3g}; narrow it, or write gate.reason"
+        )
         return Judged(OUTSIDE, tolerance, text)
     passes = beyond(value, reference) <= tolerance + ROUNDING * abs(value)
     outside_measured = 0.0 if known.measured is None else beyond(value, known.measured)
-    if passes and (of == MEASURED or outside_measured <= tolerance_of(gate, known.measured or (0.0, 0.0))):
+    if passes and (
+        of == MEASURED or outside_measured <= tolerance_of(gate, known.measured or (0.0, 0.0))
+    ):
         return Judged(WITHIN, tolerance, "")
-    supported = passes or (of == MEASURED and any(
-        pair is not None and beyond(value, pair) <= tolerance_of(gate, pair) for pair in (known.others, known.exact)
-    ))  # fmt: skip
+    supported = passes or (
+        of == MEASURED
+        and any(
+            pair is not None and beyond(value, pair) <= tolerance_of(gate, pair)
+            for pair in (known.others, known.exact)
+        )
+    )
     if not supported:
-        return Judged(OUTSIDE, tolerance, f"{beyond(value, reference):.3g} beyond the values of {of}")
+        return Judged(
+            OUTSIDE, tolerance, f"{beyond(value, reference):.3g} beyond the values of {of}"
+        )
     if not row.because:
-        return Judged(OUTSIDE, tolerance, "the model differs from the measurement without a reason; write `because`")
+        return Judged(
+            OUTSIDE,
+            tolerance,
+            "the model differs from the measurement without a reason; write `because`",
+        )
     return Judged(DIFFERS, tolerance, row.because)
 
 

@@ -18,7 +18,8 @@ NAMES = ("hose A", "hose B", "chamber A", "chamber B", "stroke", "velocity")
 PERIOD, END = 0.2, 0.2  # [s]
 SUPPLY, TANK = 1.5e7, 1e5  # [Pa]
 BETA, RHO = 1.2e9, 860.0  # bulk modulus [Pa], density [kg/m3]
-VALVE = 0.61 * 1.0e-5 * sqrt(2.0 / RHO)  # coefficient of a metering edge, fully open [m3/s/sqrt(Pa)]
+# coefficient of a metering edge, fully open [m3/s/sqrt(Pa)]
+VALVE = 0.61 * 1.0e-5 * sqrt(2.0 / RHO)
 HOSE = 0.61 * 1.5e-5 * sqrt(2.0 / RHO)  # coefficient of the port of a chamber [m3/s/sqrt(Pa)]
 SOFT = 2e4  # pressure drop below which orifices are laminar [Pa]
 UNDERLAP = 0.02  # fraction of the stroke of the valve
@@ -45,7 +46,10 @@ def edge(s):
 @numba.jit(error_model="numpy")
 def rhs(t, y, dydt):
     """Rates dydt = f(t, y) of the states in UNITS."""
-    a, b, p_a, p_b = 1e7 * y[0], 1e7 * y[1], 1e7 * y[2], 1e7 * y[3]
+    a = 1e7 * y[0]
+    b = 1e7 * y[1]
+    p_a = 1e7 * y[2]
+    p_b = 1e7 * y[3]
     x, v = 0.1 * y[4], y[5]
     s = sin(2.0 * pi / PERIOD * t)
     up, down = VALVE * edge(s), VALVE * edge(-s)
@@ -69,7 +73,9 @@ def start():
 
 def jacobian(t, y):
     """Jacobian df/dy by central differences : float64[6, 6] [1/s]."""
-    found, high, low = np.empty((6, 6)), np.empty(6), np.empty(6)
+    found = np.empty((6, 6))
+    high = np.empty(6)
+    low = np.empty(6)
     for j in range(6):
         step = np.zeros(6)
         step[j] = 1e-7
@@ -81,4 +87,6 @@ def jacobian(t, y):
 
 def greatest_eigenvalue(times, states):
     """Largest modulus of an eigenvalue of df/dy along a trajectory [1/s]."""
-    return max(np.abs(np.linalg.eigvals(jacobian(t, y))).max() for t, y in zip(times, states, strict=True))
+    return max(
+        np.abs(np.linalg.eigvals(jacobian(t, y))).max() for t, y in zip(times, states, strict=True)
+    )

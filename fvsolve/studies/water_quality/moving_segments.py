@@ -23,8 +23,16 @@ class Segments:
     source : reservoirs; given : node -> (column, value) that its water has behind it; start : values at the start
     """
 
-    def __init__(self, ends, volume, store: dict[int, float], source: set[int], given, start, count: int) -> None:
-        self.ends, self.volume, self.source, self.given, self.count = ends, volume, source, given, count
+    def __init__(
+        self, ends, volume, store: dict[int, float], source: set[int], given, start, count: int
+    ) -> None:
+        self.ends, self.volume, self.source, self.given, self.count = (
+            ends,
+            volume,
+            source,
+            given,
+            count,
+        )
         self.pipes = [deque([[v, start.copy()]]) if v > 0.0 else None for v in volume]
         self.store = {node: [v, v * start] for node, v in store.items()}
         self.values = np.tile(start, (count, 1))
@@ -105,7 +113,9 @@ class Segments:
 
     def taken(self, k: int, flow: float, volume: float) -> np.ndarray:
         """Volume times values of the water that leaves link k in a step; `volume` of it [m3]."""
-        pipe, total, rest = self.pipes[k], np.zeros(self.values.shape[1]), volume
+        pipe = self.pipes[k]
+        total = np.zeros(self.values.shape[1])
+        rest = volume
         if pipe is None:
             return volume * self.values[self.ends[k][0] if flow > 0.0 else self.ends[k][1]]
         while rest > EMPTY * volume and pipe:

@@ -46,13 +46,21 @@ class WaterQuality:
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
         shares = {name: values.tolist() for name, values in self.trace.items()}
-        return {"t": self.t.tolist(), "nodes": list(self.nodes), "age": self.age.tolist(), "trace": shares,
-                "error": self.error}  # fmt: skip
+        return {
+            "t": self.t.tolist(),
+            "nodes": list(self.nodes),
+            "age": self.age.tolist(),
+            "trace": shares,
+            "error": self.error,
+        }
 
     def write(self, folder: Path) -> list[Path]:
         """Write age.csv [h], and trace-SOURCE.csv with shares, over the time [h]; returns the paths."""
         paths = []
-        for name, values, factor in [(AGE, self.age, 3600.0), *((f"trace-{k}", v, 1.0) for k, v in self.trace.items())]:
+        for name, values, factor in [
+            (AGE, self.age, 3600.0),
+            *((f"trace-{k}", v, 1.0) for k, v in self.trace.items()),
+        ]:
             unit = " [h]" if name == AGE else ""
             heads = ["t [h]", *(f"{node}{unit}" for node in self.nodes)]
             rows = np.column_stack([self.t / 3600.0, values / factor]).tolist()
@@ -63,9 +71,12 @@ class WaterQuality:
 @declared("study")
 @validated(set=TABLE, progress=FUNCTION)
 def water_quality(
-    case, trace: Sequence[str] = (), step: float = 60.0, set: Mapping[str, Any] | None = None,
+    case,
+    trace: Sequence[str] = (),
+    step: float = 60.0,
+    set: Mapping[str, Any] | None = None,
     progress: Callable | None = None,
-) -> WaterQuality:  # fmt: skip
+) -> WaterQuality:
     """Run a network of quasi-steady pipes, and carry the age of its water and shares of sources with its flows.
 
     `case` as for `run`; trace : nodes whose water is traced: reservoirs, tanks or junctions
@@ -83,15 +94,19 @@ def water_quality(
             )
     span = loaded.numerics.end - loaded.numerics.start
     if not 0.0 < step <= span or span / step > MOST_STEPS:
-        raise FvsolveError(f"step = {step} s is out of range; expected up to the time of the run, {span:g} s, and at "
-                           f"most {MOST_STEPS} steps")  # fmt: skip
+        raise FvsolveError(
+            f"step = {step} s is out of range; expected up to the time of the run, {span:g} s, and at "
+            f"most {MOST_STEPS} steps"
+        )
     steps = int(np.ceil(span / step - 1e-9))
     probes = [f"links.{name}.flow" for name in links]
     keys = {"output.probes": probes, "output.every": span / steps, "output.units": {}, **NO_FIELDS}
     result = run(load(loaded, keys), progress=progress)
     end_if_interrupted(result.reason)
     if not result.ok:
-        raise FvsolveError(f"{loaded.name}: the run is not ok: {result.reason}. Correct the case before its quality")
+        raise FvsolveError(
+            f"{loaded.name}: the run is not ok: {result.reason}. Correct the case before its quality"
+        )
     times = np.linspace(loaded.numerics.start, loaded.numerics.end, steps + 1)
     # mean flows in each step, from the volume that passed: float64[steps, links]; two rows at a jump
     t, flow = np.asarray(result.t), np.column_stack([result[probe] for probe in probes])
@@ -113,14 +128,22 @@ def network_of(case: Case) -> tuple[list[str], dict[str, Any]]:
         if not (fits and still and "flow" in link.quantities):
             other.append(name)
         links[name] = link
-    wrong = [name for name, node in case.nodes.items() if node.kind not in ("junction", "inflow", "reservoir", "tank")]
+    wrong = [
+        name
+        for name, node in case.nodes.items()
+        if node.kind not in ("junction", "inflow", "reservoir", "tank")
+    ]
     if other or wrong:
-        raise FvsolveError(f"{listing([*other, *wrong])}: not supported; expected a network of junctions, reservoirs, "
-                           'tanks, valves, pumps and pipes with pipe_model = "quasi-steady"')  # fmt: skip
+        raise FvsolveError(
+            f"{listing([*other, *wrong])}: not supported; expected a network of junctions, reservoirs, "
+            'tanks, valves, pumps and pipes with pipe_model = "quasi-steady"'
+        )
     return list(case.nodes), links
 
 
-def carried(case: Case, nodes: list[str], links: dict[str, Any], times, flows, trace: Sequence[str]) -> WaterQuality:
+def carried(
+    case: Case, nodes: list[str], links: dict[str, Any], times, flows, trace: Sequence[str]
+) -> WaterQuality:
     """Carry the time of entry of the water and the shares of sources by the mean flows of all steps.
 
     The age at a time t is t minus the time of entry, which water keeps and mixes like a tracer.
@@ -128,13 +151,19 @@ def carried(case: Case, nodes: list[str], links: dict[str, Any], times, flows, t
     index = {name: k for k, name in enumerate(nodes)}
     ends = [(index[link.ports["from"]], index[link.ports["to"]]) for link in links.values()]
     pipes = [link if link.kind == "quasi-steady-pipe" else None for link in links.values()]
-    volumes = [0.0 if pipe is None else np.pi / 4.0 * pipe.diameter**2 * pipe.length for pipe in pipes]
-    store = {index[name]: tank_volume(node) for name, node in case.nodes.items() if node.kind == "tank"}
+    volumes = [
+        0.0 if pipe is None else np.pi / 4.0 * pipe.diameter**2 * pipe.length for pipe in pipes
+    ]
+    store = {
+        index[name]: tank_volume(node) for name, node in case.nodes.items() if node.kind == "tank"
+    }
     source = {index[name] for name, node in case.nodes.items() if node.kind == "reservoir"}
     given = {index[name]: (1 + k, 1.0) for k, name in enumerate(trace)}
     start = np.array([times[0], *[0.0] * len(trace)])
     water = Segments(ends, volumes, store, source, given, start, len(nodes))
-    middle, supply, found = 0.5 * (times[1:] + times[:-1]), start.copy(), []
+    middle = 0.5 * (times[1:] + times[:-1])
+    supply = start.copy()
+    found = []
     total, begun = np.zeros(start.size), water.contents()
     for t, flow, step in zip(middle, flows, np.diff(times), strict=True):
         supply[0] = t

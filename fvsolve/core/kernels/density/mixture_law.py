@@ -42,7 +42,9 @@ def relative_volume(st, p):
 @law_njit
 def gas_integral(st, x):
     """Integral of the volume of free gas by `free_gas` over the gas pressure up to x [Pa], except for a constant."""
-    k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
+    k = st["gas_power"]
+    at = min(x, st["saturation"])
+    s = st["saturation"]
     # Integral of x^-k (1 - x / s), of which the first term is a logarithm for k = 1.
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
@@ -119,8 +121,14 @@ def pressure_of_mass_ratio(st, compliance, share):
     is constant. This converges because the volume of gas is concave in 1 / x.
     """
     prevent_inlining()
-    floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
-    x = gas_root(st, compliance, share, gas, -gas / saturation) if st["gas_power"] == 1.0 else saturation
+    floor = st["floor"]
+    gas = st["gas"]
+    saturation = st["saturation"]
+    x = (
+        gas_root(st, compliance, share, gas, -gas / saturation)
+        if st["gas_power"] == 1.0
+        else saturation
+    )
     if x >= saturation and saturation < 1e300:
         # All gas may be dissolved: then the root without gas lies above the saturation pressure.
         x = gas_root(st, compliance, share, 0.0, 0.0)
@@ -190,7 +198,9 @@ def impedance(st, floats, pipe, p):
     """
     prevent_inlining()
     size, fall = relative_volume(st, p)
-    return sqrt(st["rho"] / (fall + size * pipe["compliance"] / area_ratio(st, pipe["compliance"], p)))
+    return sqrt(
+        st["rho"] / (fall + size * pipe["compliance"] / area_ratio(st, pipe["compliance"], p))
+    )
 
 
 # Abscissas in (0, 1) and weights of the upper four of eight Gauss points; the lower four are symmetric (Abramowitz and
@@ -205,10 +215,13 @@ def velocity_change_panel(st, floats, pipe, p_from, p_to):
 
     It is accurate if the gas pressures differ by a factor of two at most, or without free gas between them.
     """
-    middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
+    middle = 0.5 * (p_from + p_to)
+    half = 0.5 * (p_to - p_from)
+    total = 0.0
     for i in range(4):
         far = GAUSS_POINTS[i] * half
-        high, low = impedance(st, floats, pipe, middle + far), impedance(st, floats, pipe, middle - far)
+        high = impedance(st, floats, pipe, middle + far)
+        low = impedance(st, floats, pipe, middle - far)
         total += GAUSS_WEIGHTS[i] * (1.0 / high + 1.0 / low)
     return half * total
 

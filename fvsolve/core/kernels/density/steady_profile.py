@@ -45,7 +45,9 @@ def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
     for _ in range(50):
         v = flow / m
         # d/dp of h + v^2 / 2 is 1 / rho - v^2 (dm/dp) / m.
-        step = (enthalpy(st, floats, p) + 0.5 * v * v - bernoulli) / (1.0 / density(st, floats, p) - v * v * dm / m)
+        step = (enthalpy(st, floats, p) + 0.5 * v * v - bernoulli) / (
+            1.0 / density(st, floats, p) - v * v * dm / m
+        )
         p -= step
         m, dm = mass_of_pressure(st, floats, pipe, p)
         if abs(step) <= 1e-15 * abs(p):
@@ -65,7 +67,9 @@ def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
     Returns h + v^2/2 + g z at the `to` end [J/kg].
     """
     pull = pipe["drag"] * st["rho"] * pipe["area"]
-    g, half, b = st["gravity"], 0.5 * pipe["dx"], start
+    g = st["gravity"]
+    half = 0.5 * pipe["dx"]
+    b = start
     m = mass_of_bernoulli(st, floats, pipe, b - g * z, flow)
     faces[0] = m
     for i in range(2 * centers.size):

@@ -24,25 +24,38 @@ def hermite(floats, values, slopes, k, s, step):
 @njit
 def log_density(st, floats, p):
     """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at the pressure p [Pa], with density rho."""
-    n, o, step = st["table_size"], st["table"], st["table_step"]
+    n = st["table_size"]
+    o = st["table"]
+    step = st["table_step"]
     x = (p - st["table_start"]) / step
     if x <= 0.0:
         return floats[o] + floats[o + n] * x * step, floats[o + n]
     # The end belongs to the line beyond it: there is no interval number n - 1.
     if x >= n - 1.0:
-        return floats[o + n - 1] + floats[o + 2 * n - 1] * (x - (n - 1.0)) * step, floats[o + 2 * n - 1]
+        return floats[o + n - 1] + floats[o + 2 * n - 1] * (x - (n - 1.0)) * step, floats[
+            o + 2 * n - 1
+        ]
     k = int(x)
     s = x - k
     value = hermite(floats, o, o + n, k, s, step)
-    v0, v1, d0, d1 = floats[o + k], floats[o + k + 1], floats[o + n + k], floats[o + n + k + 1]
-    slope = 6.0 * s * (1.0 - s) * (v1 - v0) / step + (1.0 - s) * (1.0 - 3.0 * s) * d0 + s * (3.0 * s - 2.0) * d1
+    v0 = floats[o + k]
+    v1 = floats[o + k + 1]
+    d0 = floats[o + n + k]
+    d1 = floats[o + n + k + 1]
+    slope = (
+        6.0 * s * (1.0 - s) * (v1 - v0) / step
+        + (1.0 - s) * (1.0 - 3.0 * s) * d0
+        + s * (3.0 * s - 2.0) * d1
+    )
     return value, slope
 
 
 @njit
 def enthalpy(st, floats, p):
     """Specific enthalpy h at the pressure p: integral of dp / rho from the reference pressure [J/kg]."""
-    n, o, step = st["table_size"], st["table"], st["table_step"]
+    n = st["table_size"]
+    o = st["table"]
+    step = st["table_step"]
     x = (p - st["table_start"]) / step
     k = 0 if x <= 0.0 else (n - 1 if x >= n - 1.0 else -1)
     if k >= 0:

@@ -38,7 +38,9 @@ class StabilityFunction:
     @functools.cached_property
     def floats(self) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients of numerator and denominator in floating point, highest power first."""
-        up, down = ([float(x) for x in p.coefficients][::-1] for p in (self.numerator, self.denominator))
+        up, down = (
+            [float(x) for x in p.coefficients][::-1] for p in (self.numerator, self.denominator)
+        )
         return np.array(up), np.array(down)
 
     @functools.cached_property
@@ -46,7 +48,11 @@ class StabilityFunction:
         """Degrees (k, m) of numerator and denominator if R is a Pade approximation of e^s, otherwise None."""
         k, m = self.numerator.degree, self.denominator.degree
         pairs = zip((self.numerator, self.denominator), pade(k, m), self.doubts, strict=True)
-        return (k, m) if all(chopped(x - y, uncertainty).degree < 0 for x, y, uncertainty in pairs) else None
+        return (
+            (k, m)
+            if all(chopped(x - y, uncertainty).degree < 0 for x, y, uncertainty in pairs)
+            else None
+        )
 
     @functools.cached_property
     def error_constant(self) -> tuple[int, object]:
@@ -56,7 +62,9 @@ class StabilityFunction:
         for j in range(1, last + 1):
             series.append(series[-1] / j)
         uncertainty = self.doubts[0] + self.doubts[1] * Polynomial(series)
-        rest = chopped(self.numerator - self.denominator * Polynomial(series), uncertainty).coefficients[: last + 1]
+        rest = chopped(
+            self.numerator - self.denominator * Polynomial(series), uncertainty
+        ).coefficients[: last + 1]
         return next(((j - 1, x) for j, x in enumerate(rest) if x != 0), (last, Fraction(0)))
 
 
@@ -75,7 +83,9 @@ def _lowest(method: Method) -> StabilityFunction:
     if method.rounding:
         uncertainties = _doubts(method)
         pair = (Polynomial(map(short, p.coefficients)) for p in (numerator, denominator))
-        numerator, denominator = (chopped(p, uncertainty) for p, uncertainty in zip(pair, uncertainties, strict=True))
+        numerator, denominator = (
+            chopped(p, uncertainty) for p, uncertainty in zip(pair, uncertainties, strict=True)
+        )
     # A common factor would count as a pole that R does not have.
     common = numerator.gcd(denominator)
     numerator, denominator = numerator // common, denominator // common
@@ -94,7 +104,10 @@ def by_determinants(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Pol
 def by_resolvent(a: Sequence[Sequence], b: Sequence) -> tuple[Polynomial, Polynomial]:
     """Numerator and denominator of R(s) = 1 + s b^T (I - s A)^-1 1, equation (25) of docs/course.md."""
     down, adjugate = _leverrier(a)
-    up = [sum((x * sum(row, Fraction(0)) for x, row in zip(b, m, strict=True)), Fraction(0)) for m in adjugate]
+    up = [
+        sum((x * sum(row, Fraction(0)) for x, row in zip(b, m, strict=True)), Fraction(0))
+        for m in adjugate
+    ]
     return Polynomial(down) + Polynomial([0, *up]), Polynomial(down)
 
 
@@ -109,7 +122,10 @@ def chopped(p: Polynomial, uncertainty: Polynomial) -> Polynomial:
     uncertainty : polynomial whose coefficients are bounds of the errors of the coefficients of p
     """
     bounds = [*uncertainty.coefficients, *[Fraction(0)] * len(p.coefficients)]
-    return Polynomial(x if abs(x) > bound else Fraction(0) for x, bound in zip(p.coefficients, bounds, strict=False))
+    return Polynomial(
+        x if abs(x) > bound else Fraction(0)
+        for x, bound in zip(p.coefficients, bounds, strict=False)
+    )
 
 
 def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
@@ -118,8 +134,12 @@ def _doubts(method: Method) -> tuple[Polynomial, Polynomial]:
     They follow from the same sums with all terms positive: 1 / det(I - s |A|) for the denominator, and the product of
     it with 1 + s |b|^T (I - s |A|)^-1 1 for the numerator.
     """
-    a, b, s = np.abs(method.a), np.abs(method.b), method.stages
-    traces, moments, power = [], [1.0], np.ones(s)
+    a = np.abs(method.a)
+    b = np.abs(method.b)
+    s = method.stages
+    traces = []
+    moments = [1.0]
+    power = np.ones(s)
     for k in range(s):
         moments.append(float(b @ power))
         power = a @ power
@@ -144,7 +164,13 @@ def _leverrier(a: Sequence[Sequence]) -> tuple[list, list]:
     # Recurrence: c_k = -trace(A M_k) / k, M_(k+1) = A M_k + c_k I.
     for k in range(1, s + 1):
         adjugate.append(m)
-        m = [[sum((x * m[j][col] for j, x in row if m[j][col] != 0), Fraction(0)) for col in range(s)] for row in rows]
+        m = [
+            [
+                sum((x * m[j][col] for j, x in row if m[j][col] != 0), Fraction(0))
+                for col in range(s)
+            ]
+            for row in rows
+        ]
         characteristic.append(sum((m[i][i] for i in range(s)), Fraction(0)) / -k)
         for i in range(s):
             m[i][i] = m[i][i] + characteristic[-1]

@@ -11,8 +11,18 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.argument_checks import COUNT_FROM_ZERO, NAME, NUMBER, POINT, POSITIVE, validated
-from fvsolve.core.steppers.analysis.stability_function import StabilityFunction, chopped, stability_function
-from fvsolve.core.steppers.numbers.polynomial import Polynomial, first_sign_change, nowhere_negative, roots_right, sign
+from fvsolve.core.steppers.analysis.stability_function import (
+    StabilityFunction,
+    chopped,
+    stability_function,
+)
+from fvsolve.core.steppers.numbers.polynomial import (
+    Polynomial,
+    first_sign_change,
+    nowhere_negative,
+    roots_right,
+    sign,
+)
 from fvsolve.core.steppers.tableau import Method, method_named
 
 ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)
@@ -45,7 +55,8 @@ def l_stable(r: StabilityFunction) -> bool:
 def real_interval(r: StabilityFunction) -> float:
     """Greatest x with |R(s)| <= 1 for all real s from -x to 0; inf if unbounded, 0 if no interval is stable."""
     down, up = (
-        Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
+        Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients))
+        for p in (r.denominator, r.numerator)
     )
     # At s = -x, R <= 1 where D - N >= 0 and R >= -1 where D + N >= 0.
     edges = [chopped(p, r.doubts[0] + r.doubts[1]) for p in (down - up, down + up)]
@@ -88,7 +99,9 @@ def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
 
     cosine : cos(phi)
     """
-    if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
+    if nowhere_negative(
+        chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))
+    ):
         poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
         # Rounding must not move a pole on the ray into the sector.
         return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
@@ -104,19 +117,27 @@ def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
     coefficients = [Fraction(0)] * (2 * p.degree + 1)
     for j, x in enumerate(p.coefficients):
         for k, y in enumerate(p.coefficients):
-            coefficients[j + k] = coefficients[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
+            coefficients[j + k] = (
+                coefficients[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
+            )
     return Polynomial(coefficients)
 
 
 def _square_doubt(r: StabilityFunction) -> Polynomial:
     """Uncertainty of the coefficients of N^2 - D^2, as a polynomial, due to the rounded coefficients of R = N / D."""
     pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
-    return sum((2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs), Polynomial([]))
+    return sum(
+        (2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs),
+        Polynomial([]),
+    )
 
 
 def _modulus(p: Polynomial) -> Polynomial:
     """|p(iy)|^2 as a polynomial in x = y^2."""
-    even, odd = (Polynomial(x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients[i::2])) for i in (0, 1))
+    even, odd = (
+        Polynomial(x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients[i::2]))
+        for i in (0, 1)
+    )
     return even * even + Polynomial([0, 1]) * odd * odd
 
 
@@ -152,7 +173,9 @@ def ssp_radius(method: Method) -> float:
             high = middle
     # Most radii are simple fractions, which bisection only approaches.
     simple = low.limit_denominator(1000)
-    return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple) else low)
+    return float(
+        simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple) else low
+    )
 
 
 @functools.cache
@@ -181,7 +204,9 @@ def _has_no_fill_in(k: list[list]) -> bool:
     """True if K^2 has no nonzero entry where K has a zero; otherwise the SSP radius is 0. k : matrix K of `_used`"""
     n = len(k)
     return all(
-        k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n)) for i in range(n) for j in range(n)
+        k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n))
+        for i in range(n)
+        for j in range(n)
     )
 
 
@@ -192,7 +217,10 @@ def _monotone(k: list[list], r: Fraction) -> bool:
     """
     n = len(k)
     # Gauss-Jordan elimination of I + r K with the right-hand sides e and r K.
-    rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
+    rows = [
+        [(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]]
+        for i in range(n)
+    ]
     for i in range(n):
         pivot = next((m for m in range(i, n) if rows[m][i] != 0), None)
         if pivot is None:
@@ -202,7 +230,9 @@ def _monotone(k: list[list], r: Fraction) -> bool:
         for m in range(n):
             if m != i and rows[m][i] != 0:
                 factor = rows[m][i]
-                rows[m] = [x - factor * y if y != 0 else x for x, y in zip(rows[m], top, strict=True)]
+                rows[m] = [
+                    x - factor * y if y != 0 else x for x, y in zip(rows[m], top, strict=True)
+                ]
     return all(x >= 0 for row in rows for x in row[n:])
 
 
@@ -268,7 +298,9 @@ def analyse(method: str | Method) -> Facts:
 @functools.cache
 def _facts(m: Method) -> Facts:
     r = stability_function(m)
-    given = {field.name: getattr(m, field.name) for field in fields(Facts) if hasattr(m, field.name)}
+    given = {
+        field.name: getattr(m, field.name) for field in fields(Facts) if hasattr(m, field.name)
+    }
     return Facts(
         **given,
         a_stable=a_stable(r),
@@ -296,7 +328,9 @@ def local_error(method: str | Method, lam: complex, h: float, y: complex = 1.0) 
 
 
 @validated(method=NAME, lam=POINT, h=NUMBER, steps=COUNT_FROM_ZERO, y=POINT)
-def global_error(method: str | Method, lam: complex, h: float, steps: int, y: complex = 1.0) -> complex:
+def global_error(
+    method: str | Method, lam: complex, h: float, steps: int, y: complex = 1.0
+) -> complex:
     """Error R(h lambda)^n y - exp(n h lambda) y after n = `steps` steps from y, of order h^p at a fixed time n h.
 
     It is the sum of the propagated local errors e_k: sum_k R^(n-1-k) e_k+1 (docs/course.md, (6)).

@@ -5,7 +5,8 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-Tree = tuple  # (number of nodes, index in trees(nodes)); the size comes first, so that trees sort by size
+# (number of nodes, index in trees(nodes)); the size comes first, so that trees sort by size
+Tree = tuple
 
 ORDER_MOST = 12  # greatest order that is tested: there are 4766 trees of 12 nodes, 12486 of 13
 BITS = 256  # precision of rounded coefficients in intermediate results
@@ -48,7 +49,12 @@ class Conditions:
     as A (Hairer and Wanner 1996, theorem IV.7.3)
     """
 
-    def __init__(self, a: Sequence[Sequence], rounding: Fraction = Fraction(0), single: Sequence[Sequence] = ()):
+    def __init__(
+        self,
+        a: Sequence[Sequence],
+        rounding: Fraction = Fraction(0),
+        single: Sequence[Sequence] = (),
+    ):
         self.rounding = rounding
         self.a = self._rows(a)
         self.single = self._rows(single) if len(single) else self.a
@@ -59,7 +65,9 @@ class Conditions:
 
         If the uncertainty of the left side is not below 1 / gamma, the condition counts as not satisfied.
         """
-        left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
+        left = sum(
+            (x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0)
+        )
         residual = left - Fraction(1, density(tree))
         if self.rounding and residual != 0:
             # The sum of sizes, without cancellation, bounds the effect of rounded coefficients.
@@ -69,7 +77,9 @@ class Conditions:
                 return Fraction(0)
         return residual
 
-    def differ(self, b: Sequence, other: Sequence, nodes: int, weights: Sequence[tuple[list, list]]) -> bool:
+    def differ(
+        self, b: Sequence, other: Sequence, nodes: int, weights: Sequence[tuple[list, list]]
+    ) -> bool:
         """True if sum_i b_i phi_i differs for the weights b and `other`, by more than the rounding of coefficients.
 
         weights : pairs (phi, bounds of its size) of elementary weights of trees with at most `nodes` nodes
@@ -78,14 +88,21 @@ class Conditions:
         sizes = [short(abs(x)) + short(abs(y)) for x, y in zip(b, other, strict=True)]
         for phi, bound in weights:
             difference = sum((x * y for x, y in zip(differences, phi, strict=True)), Fraction(0))
-            size = sum((x * y for x, y in zip(sizes, bound, strict=True)), Fraction(0)) if self.rounding else 0
+            size = (
+                sum((x * y for x, y in zip(sizes, bound, strict=True)), Fraction(0))
+                if self.rounding
+                else 0
+            )
             if abs(difference) > 2 * nodes * self.rounding * size:
                 return True
         return False
 
     def all_trees(self, nodes: int) -> list[tuple[list, list]]:
         """Pairs for `differ`, of all trees with `nodes` nodes."""
-        return [tuple(self._phi((nodes, i), absolute) for absolute in (False, True)) for i in range(len(trees(nodes)))]
+        return [
+            tuple(self._phi((nodes, i), absolute) for absolute in (False, True))
+            for i in range(len(trees(nodes)))
+        ]
 
     def tall_trees(self) -> list[tuple[list, list]]:
         """Pairs for `differ`, of trees without branching points: all that act on y' = lambda y."""
@@ -120,7 +137,10 @@ class Conditions:
         return p
 
     def _rows(self, a: Sequence[Sequence]) -> list:
-        return [[(j, short(x) if self.rounding else x) for j, x in enumerate(row) if x != 0] for row in a]
+        return [
+            [(j, short(x) if self.rounding else x) for j, x in enumerate(row) if x != 0]
+            for row in a
+        ]
 
     def _phi(self, tree: Tree, absolute: bool) -> list:
         """Elementary weights phi of a tree: product of A phi(branch) over its branches.
@@ -153,7 +173,9 @@ def short(x) -> Fraction:
     return Fraction(round(x * (1 << BITS)), 1 << BITS)
 
 
-def stage_order(a: Sequence[Sequence], b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> int:
+def stage_order(
+    a: Sequence[Sequence], b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)
+) -> int:
     """Stage order of a Butcher array: order to which the stages and the new state integrate polynomials in time.
 
     It is the greatest q with sum_j a_ij c_j^(k-1) = c_i^k / k and sum_j b_j c_j^(k-1) = 1 / k for all k <= q.
@@ -170,7 +192,9 @@ def stage_order(a: Sequence[Sequence], b: Sequence, c: Sequence, rounding: Fract
     q = 0
     while q < 2 * len(b):
         k = q + 1
-        if not equal(b, k, Fraction(1, k)) or not all(equal(a[i], k, c[i] ** k / k) for i in range(len(c))):
+        if not equal(b, k, Fraction(1, k)) or not all(
+            equal(a[i], k, c[i] ** k / k) for i in range(len(c))
+        ):
             return q
         q = k
     return q

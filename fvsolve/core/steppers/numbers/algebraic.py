@@ -11,7 +11,8 @@ from math import isqrt
 from fvsolve.core.steppers.numbers.polynomial import Polynomial, count_roots, sign
 
 MIXED_ROOTS = (
-    "{} are used in one tableau; expected a single root, or decimals of 20 digits or more in place of all roots"
+    "{} are used in one tableau; expected a single root, or decimals of "
+    "20 digits or more in place of all roots"
 )
 BITS = 160  # precision of the first bracket of a square root: enough for most signs and every float
 
@@ -27,7 +28,8 @@ class Field:
         self.name = name
         self.polynomial = (polynomial // polynomial.gcd(polynomial.derivative())).monic()
         self.low, self.high = _isolated(self.polynomial, Fraction(near), name)
-        self.tail = tuple(-x for x in self.polynomial.coefficients[:-1])  # theta^n in terms of lower powers
+        # theta^n in terms of lower powers
+        self.tail = tuple(-x for x in self.polynomial.coefficients[:-1])
 
     @property
     def theta(self) -> Algebraic:
@@ -35,7 +37,9 @@ class Field:
 
     def refine(self, bits: int) -> None:
         """Refine the bounds of theta by bisection until they differ by 2^-bits at most."""
-        low, high, p = self.low, self.high, self.polynomial
+        low = self.low
+        high = self.high
+        p = self.polynomial
         rising = p(low) < 0
         while high - low > Fraction(1, 1 << bits):
             middle = (low + high) / 2
@@ -85,7 +89,10 @@ class Algebraic:
         if parts is None:
             return NotImplemented
         long, short = (self.parts, parts) if len(self.parts) >= len(parts) else (parts, self.parts)
-        return number(self.field, [x + y for x, y in zip(long, short, strict=False)] + list(long[len(short) :]))
+        return number(
+            self.field,
+            [x + y for x, y in zip(long, short, strict=False)] + list(long[len(short) :]),
+        )
 
     __radd__ = __add__
 
@@ -123,7 +130,9 @@ class Algebraic:
     def __truediv__(self, other):
         if isinstance(other, Algebraic):
             return self * other.inverse()
-        return NotImplemented if not isinstance(other, (int, Fraction)) else self * Fraction(1, other)
+        return (
+            NotImplemented if not isinstance(other, (int, Fraction)) else self * Fraction(1, other)
+        )
 
     def __rtruediv__(self, other):
         return self.inverse() * other
@@ -141,7 +150,10 @@ class Algebraic:
         modulus, polynomial = self.field.polynomial, Polynomial(self.parts)
         modulus = modulus // modulus.gcd(polynomial)  # drop the factors that do not vanish at theta
         # Invariant: r1 is s1 times the number, modulo the polynomial of theta.
-        r0, r1, s0, s1 = modulus, polynomial % modulus, Polynomial([]), Polynomial([1])
+        r0 = modulus
+        r1 = polynomial % modulus
+        s0 = Polynomial([])
+        s1 = Polynomial([1])
         while r1.degree > 0:
             quotient, rest = divmod(r0, r1)
             r0, r1, s0, s1 = r1, rest, s1, s0 - quotient * s1
@@ -152,7 +164,12 @@ class Algebraic:
         low = high = Fraction(0)
         for value in reversed(self.parts):
             # The signs are not known, so that any of the four products may be the least or the greatest.
-            ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
+            ends = [
+                low * self.field.low,
+                low * self.field.high,
+                high * self.field.low,
+                high * self.field.high,
+            ]
             low, high = min(ends) + value, max(ends) + value
         return low, high
 
@@ -229,7 +246,9 @@ def number(field: Field, parts):
 @functools.cache
 def square_root(n: int):
     """sqrt(n) of an integer n >= 0, as an integer times the root of a square-free integer."""
-    outside, inside, k = 1, n, 2
+    outside = 1
+    inside = n
+    k = 2
     # Square factors leave the root, so that equal numbers have equal forms.
     while k * k <= inside:
         while inside % (k * k) == 0:
@@ -273,7 +292,8 @@ def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fract
 TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}(?!\d))?|[A-Za-z_]\w*|[-+*/^()]")
 POWER_MOST, ROOT_MOST = 64, 10**9
 LETTERS_MOST, NESTED_MOST = 1000, 20  # greatest length of an expression, and depth of its brackets
-BITS_MOST, DEGREE_MOST = 20_000, 64  # greatest size of a value, and degree of a polynomial, in an expression
+# greatest size of a value, and degree of a polynomial, in an expression
+BITS_MOST, DEGREE_MOST = 20_000, 64
 
 
 def value_of(text: str, names: Mapping | None = None):
@@ -283,7 +303,9 @@ def value_of(text: str, names: Mapping | None = None):
     products.
     """
     if len(text) > LETTERS_MOST:
-        raise ValueError(f'"{text[:20]}..." has {len(text)} characters; expected at most {LETTERS_MOST}')
+        raise ValueError(
+            f'"{text[:20]}..." has {len(text)} characters; expected at most {LETTERS_MOST}'
+        )
     tokens = TOKEN.findall(text)
     # The search for tokens skips other characters, so they are missing in the joined text.
     if "".join(tokens) != re.sub(r"\s", "", text):
@@ -302,8 +324,14 @@ def root(name: str, polynomial: str, near: float):
     Raises ValueError for another text, and if no single root is near `near`.
     """
     p = value_of(polynomial, {"x": Polynomial([0, 1])})
-    if not isinstance(p, Polynomial) or p.degree < 2 or not all(isinstance(x, Fraction) for x in p.coefficients):
-        raise ValueError(f'"{polynomial}" is not a polynomial in x of degree 2 or more with rational coefficients')
+    if (
+        not isinstance(p, Polynomial)
+        or p.degree < 2
+        or not all(isinstance(x, Fraction) for x in p.coefficients)
+    ):
+        raise ValueError(
+            f'"{polynomial}" is not a polynomial in x of degree 2 or more with rational coefficients'
+        )
     return Field(name, p, near).theta
 
 
@@ -321,8 +349,14 @@ class _Parser:
 
     def checked(self, value):
         """The value, if it is small enough for exact arithmetic; else raises ValueError."""
-        parts = value.coefficients if isinstance(value, Polynomial) else getattr(value, "parts", (value,))
-        size = max((x.numerator.bit_length() + x.denominator.bit_length() for x in parts), default=0)
+        parts = (
+            value.coefficients
+            if isinstance(value, Polynomial)
+            else getattr(value, "parts", (value,))
+        )
+        size = max(
+            (x.numerator.bit_length() + x.denominator.bit_length() for x in parts), default=0
+        )
         if size > BITS_MOST or isinstance(value, Polynomial) and value.degree > DEGREE_MOST:
             raise ValueError(f'"{self.text}" is too large for exact arithmetic')
         return value
@@ -355,7 +389,9 @@ class _Parser:
             return base
         power = self.rest.pop() if self.rest else ""
         if not power.isdigit() or int(power) > POWER_MOST:
-            raise ValueError(f'"{self.text}": expected an integer power from 0 to {POWER_MOST} after "^"')
+            raise ValueError(
+                f'"{self.text}": expected an integer power from 0 to {POWER_MOST} after "^"'
+            )
         result = Fraction(1)
         for _ in range(int(power)):
             # Checked after every factor, before a number becomes too large to handle.
@@ -368,7 +404,9 @@ class _Parser:
             # Each bracket is a call of the parser; too many would exhaust the stack of Python.
             self.depth += 1
             if self.depth > NESTED_MOST:
-                raise ValueError(f'"{self.text}" has more than {NESTED_MOST} brackets within each other')
+                raise ValueError(
+                    f'"{self.text}" has more than {NESTED_MOST} brackets within each other'
+                )
             inside = self.sum()
             self.depth -= 1
             if not self.next(")"):
@@ -377,12 +415,18 @@ class _Parser:
         if token == "sqrt":
             n = self.atom() if self.rest and self.rest[-1] == "(" else None
             if not isinstance(n, Fraction) or n.denominator != 1 or not 0 <= n <= ROOT_MOST:
-                raise ValueError(f'"{self.text}": expected sqrt(n) of an integer n up to {ROOT_MOST:.0e}')
+                raise ValueError(
+                    f'"{self.text}": expected sqrt(n) of an integer n up to {ROOT_MOST:.0e}'
+                )
             return square_root(int(n))
         if token and (token[0].isdigit() or token[0] == "."):
             return Fraction(token)
         if token in self.names:
             return self.names[token]
         known = ", ".join(["sqrt(n)", *self.names])
-        fault = f'unknown symbol "{token}"; known are {known}' if token.isidentifier() else f'unexpected "{token}"'
+        fault = (
+            f'unknown symbol "{token}"; known are {known}'
+            if token.isidentifier()
+            else f'unexpected "{token}"'
+        )
         raise ValueError(f'"{self.text}": {fault}' if token else f'"{self.text}" ends too early')

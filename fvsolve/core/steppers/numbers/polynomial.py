@@ -48,14 +48,20 @@ class Polynomial:
 
     def __add__(self, other) -> Polynomial:
         long, short = sorted((self.coefficients, _as(other).coefficients), key=len, reverse=True)
-        return Polynomial([x + y for x, y in zip(long, short, strict=False)] + list(long[len(short) :]))
+        return Polynomial(
+            [x + y for x, y in zip(long, short, strict=False)] + list(long[len(short) :])
+        )
 
     def __sub__(self, other) -> Polynomial:
         return self + -_as(other)
 
     def __mul__(self, other) -> Polynomial:
         other = _as(other)
-        product = [Fraction(0)] * (self.degree + other.degree + 1) if self.coefficients and other.coefficients else []
+        product = (
+            [Fraction(0)] * (self.degree + other.degree + 1)
+            if self.coefficients and other.coefficients
+            else []
+        )
         for i, x in enumerate(self.coefficients):
             for j, y in enumerate(other.coefficients):
                 product[i + j] = product[i + j] + x * y
@@ -138,11 +144,14 @@ def lagrange(c: Sequence) -> list[Polynomial]:
 def integrals(c: Sequence) -> list[Polynomial]:
     """Integrals from 0 to theta of the Lagrange polynomials l_i on the nodes c, as polynomials in theta."""
     return [
-        Polynomial([0, *(x / (k + 1) for k, x in enumerate(polynomial.coefficients))]) for polynomial in lagrange(c)
+        Polynomial([0, *(x / (k + 1) for k, x in enumerate(polynomial.coefficients))])
+        for polynomial in lagrange(c)
     ]
 
 
-def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> tuple[tuple, ...]:
+def collocation(
+    a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)
+) -> tuple[tuple, ...]:
     """Coefficients dense_ij of the dense output y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1).
 
     The result is empty if a, b, c is not a collocation method, which has a_ij = int_0^c_i l_j and b_j = int_0^1 l_j
@@ -150,7 +159,9 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
     rounding : relative error of a coefficient
     """
     # Equal nodes have no Lagrange polynomials, and an explicit method is no collocation.
-    if len(set(c)) < len(c) or (len(c) > 1 and not any(x != 0 for i, row in enumerate(a) for x in row[i:])):
+    if len(set(c)) < len(c) or (
+        len(c) > 1 and not any(x != 0 for i, row in enumerate(a) for x in row[i:])
+    ):
         return ()
 
     def equal(x, y) -> bool:
@@ -159,10 +170,13 @@ def collocation(a: Sequence, b: Sequence, c: Sequence, rounding: Fraction = Frac
     integrated = integrals(c)
     # Integrals up to c_i must give the rows of A, integrals up to 1 the weights.
     for x, row in zip((*c, Fraction(1)), (*a, b), strict=True):
-        if not all(equal(value, integral(x)) for value, integral in zip(row, integrated, strict=True)):
+        if not all(
+            equal(value, integral(x)) for value, integral in zip(row, integrated, strict=True)
+        ):
             return ()
     return tuple(
-        tuple(integral.coefficients[1:]) + (Fraction(0),) * (len(c) - integral.degree) for integral in integrated
+        tuple(integral.coefficients[1:]) + (Fraction(0),) * (len(c) - integral.degree)
+        for integral in integrated
     )
 
 
@@ -225,7 +239,9 @@ def first_sign_change(p: Polynomial) -> float | None:
         p = Polynomial(p.coefficients[1:])
     if p.degree < 1:
         return None
-    polynomials, low, high = chain(p), Fraction(0), Fraction(1)
+    polynomials = chain(p)
+    low = Fraction(0)
+    high = Fraction(1)
     # Sturm: the number of roots up to x is the loss of sign changes from 0 to x.
     at_low, far = _changes(polynomials, low, 1), _changes(polynomials, None, 1)
     if at_low == far:

@@ -11,7 +11,12 @@ from math import inf, pi, sqrt
 
 from fvsolve.core.kernels.reconstruction import by_limiter, half_slopes, slope
 from fvsolve.jit import inline, njit
-from fvsolve.parts.conduit.law_section import celerity, depth_of, hydraulic_radius_power, section_at_depth
+from fvsolve.parts.conduit.law_section import (
+    celerity,
+    depth_of,
+    hydraulic_radius_power,
+    section_at_depth,
+)
 
 MOST_CELLS = 128  # of a block, whose rates are computed
 STRIDE = 136  # an odd number of cache lines, so that rows do not evict each other from the cache
@@ -21,12 +26,15 @@ FLOW, BEFORE, AFTER = (k * STRIDE for k in range(3))
 # Rows of cells: area, width and thrust integral at the faces before (LOW) and after (HIGH) a cell; speed of waves, half
 # the changes of depth, surface and velocity within the cell, these quantities, area. Loops that write a row shortly
 # after the rows that they read do not vectorise, so results stand before what they follow from.
-LOW_AREA, LOW_WIDTH, LOW_THRUST, HIGH_AREA, HIGH_WIDTH, HIGH_THRUST = (k * STRIDE for k in range(3, 9))
+LOW_AREA, LOW_WIDTH, LOW_THRUST, HIGH_AREA, HIGH_WIDTH, HIGH_THRUST = (
+    k * STRIDE for k in range(3, 9)
+)
 WAVE, D_DEPTH, D_SURFACE, D_SPEED, DEPTH, SURFACE, SPEED, AREA = (k * STRIDE for k in range(9, 17))
 NEARLY_FULL = 0.7  # share of the full section from which on steps follow the surcharge celerity
 THIN = 1e-7  # share of the full section below which velocities fade
 STEEPEST = 1.0  # greatest change of depth within a cell, over its depth
-EVEN = 1e-6  # relative change of depth within a cell below which its mean area is that at the mean depth
+# relative change of depth within a cell below which its mean area is that at the mean depth
+EVEN = 1e-6
 TINY = 1e-300
 
 
@@ -60,7 +68,8 @@ def drag_per_flow(section, rough, h, area):
 def cell_state(section, rest_area, rest_depth, rest_surface, change, flow):
     """(area, depth, surface above the level at rest, velocity) of a cell; change : deviation of the area from rest."""
     area = max(rest_area + change, 0.0)
-    h = depth_of(section, area) if change != 0.0 else rest_depth  # so that water at rest has the same depth to the bit
+    # so that water at rest has the same depth to the bit
+    h = depth_of(section, area) if change != 0.0 else rest_depth
     return area, h, rest_surface + (h - rest_depth), velocity_factor(section, area) * flow
 
 
@@ -89,9 +98,15 @@ def put_waves(section, n, b):
 def put_slopes(limiter, n, b):
     """Write half the changes of depth, surface and velocity within cells 1 to n of the block b; 0 in dry cells."""
     for i in range(n):
-        h, e, u = b[i + (DEPTH + 1)], b[i + (SURFACE + 1)], b[i + (SPEED + 1)]
+        h = b[i + (DEPTH + 1)]
+        e = b[i + (SURFACE + 1)]
+        u = b[i + (SPEED + 1)]
         dh, de = half_slopes(
-            limiter, h - b[i + DEPTH], b[i + (DEPTH + 2)] - h, e - b[i + SURFACE], b[i + (SURFACE + 2)] - e
+            limiter,
+            h - b[i + DEPTH],
+            b[i + (DEPTH + 2)] - h,
+            e - b[i + SURFACE],
+            b[i + (SURFACE + 2)] - e,
         )
         du = 0.5 * slope(limiter, u - b[i + SPEED], b[i + (SPEED + 2)] - u)
         dh = min(max(dh, -0.5 * STEEPEST * h), 0.5 * STEEPEST * h)
@@ -133,7 +148,9 @@ def put_sides(section, n, b):
     for i in range(n):
         h, change = b[i + DEPTH], b[i + D_DEPTH]
         b[i + LOW_AREA], b[i + LOW_WIDTH], b[i + LOW_THRUST] = section_at_depth(section, h - change)
-        b[i + HIGH_AREA], b[i + HIGH_WIDTH], b[i + HIGH_THRUST] = section_at_depth(section, h + change)
+        b[i + HIGH_AREA], b[i + HIGH_WIDTH], b[i + HIGH_THRUST] = section_at_depth(
+            section, h + change
+        )
 
 
 @njit(forceinline=True)
@@ -155,7 +172,11 @@ def numerical_flux(section, ul, ur, left, right):
     d_flow, per = qr - ql, 1.0 / (high - low + TINY)
     jump = (qr * ur - ql * ul) + d_thrust
     flow = ql + low * per * (high * d_area - d_flow)
-    return flow, ql * ul + low * per * (high * d_flow - jump), qr * ur + high * per * (low * d_flow - jump)
+    return (
+        flow,
+        ql * ul + low * per * (high * d_flow - jump),
+        qr * ur + high * per * (low * d_flow - jump),
+    )
 
 
 @inline
@@ -173,14 +194,24 @@ def put_fluxes(section, n, b):
         left_is_higher = el - hl >= er - hr
         h = hl + (er - el) if left_is_higher else hr + (el - er)
         area, width, thrust = section_at_depth(section, max(h, 0.0))
-        al, wide_l, thrust_l = b[i + HIGH_AREA], b[i + HIGH_WIDTH], b[i + HIGH_THRUST]
-        ar, wide_r, thrust_r = b[i + (LOW_AREA + 1)], b[i + (LOW_WIDTH + 1)], b[i + (LOW_THRUST + 1)]
+        al = b[i + HIGH_AREA]
+        wide_l = b[i + HIGH_WIDTH]
+        thrust_l = b[i + HIGH_THRUST]
+        ar = b[i + (LOW_AREA + 1)]
+        wide_r = b[i + (LOW_WIDTH + 1)]
+        thrust_r = b[i + (LOW_THRUST + 1)]
         if left_is_higher:
-            ar, wide_r, thrust_r = area, width, thrust
+            ar = area
+            wide_r = width
+            thrust_r = thrust
         else:
-            al, wide_l, thrust_l = area, width, thrust
+            al = area
+            wide_l = width
+            thrust_l = thrust
         left, right = (al, wide_l, thrust_l), (ar, wide_r, thrust_r)
-        b[i + (FLOW + 1)], b[i + (BEFORE + 1)], b[i + (AFTER + 1)] = numerical_flux(section, ul, ur, left, right)
+        b[i + (FLOW + 1)], b[i + (BEFORE + 1)], b[i + (AFTER + 1)] = numerical_flux(
+            section, ul, ur, left, right
+        )
 
 
 @inline
@@ -191,7 +222,9 @@ def put_rates(g, k, b, area_rates, flow_rates):
     k : 1 / length of cells [1/m]
     """
     for i in range(area_rates.size):
-        h, rise, change = b[i + DEPTH], 2.0 * b[i + D_SURFACE], 2.0 * b[i + D_DEPTH]
+        h = b[i + DEPTH]
+        rise = 2.0 * b[i + D_SURFACE]
+        change = 2.0 * b[i + D_DEPTH]
         mean = (b[i + HIGH_THRUST] - b[i + LOW_THRUST]) / change
         mean = mean if abs(change) > 2.0 * EVEN * h else b[i + AREA]
         force = g * mean * rise
@@ -206,7 +239,8 @@ def put_drag(section, rough, changes, b, seen, drag):
     changes : states of the area, on which alone it depends
     """
     for i in range(changes.size):
-        drag[i] = drag_per_flow(section, rough, b[i + DEPTH], b[i + AREA]) + TINY  # above 0: written
+        # above 0: written
+        drag[i] = drag_per_flow(section, rough, b[i + DEPTH], b[i + AREA]) + TINY
     for i in range(changes.size):
         seen[i] = changes[i]
 

@@ -17,16 +17,23 @@ from fvsolve.parts.conduit.law import INSIDE, end_flow, end_state, read_state, s
 from fvsolve.parts.conduit.law_section import celerity, section_at_depth
 
 OWN_CODE = physics_code(__package__)
-AREA, DEPTH, SURFACE, PLANS = range(4)  # constant data of cells at rest, the surface above the level at rest
-WORK = cells.ROWS * cells.STRIDE  # size of the block in the work array of a conduit; two rows of its cells follow
+# constant data of cells at rest, the surface above the level at rest
+AREA, DEPTH, SURFACE, PLANS = range(4)
+# size of the block in the work array of a conduit; two rows of its cells follow
+WORK = cells.ROWS * cells.STRIDE
 OF_DEPTH, OF_AREA, OF_FLOW = range(3)  # quantities of probes
 
 
 @njit(forceinline=True)
 def read_cell(tables, basin, section, y, i):
     """(area, depth, surface above the level at rest, velocity) of cell i of a conduit."""
-    n, plane, at, o = basin["n"], tables.plane, basin["plan"] + i, basin["y"] + i
-    return cell_state(section, plane[at], plane[at + DEPTH * n], plane[at + SURFACE * n], y[o], y[o + n])
+    n = basin["n"]
+    plane = tables.plane
+    at = basin["plan"] + i
+    o = basin["y"] + i
+    return cell_state(
+        section, plane[at], plane[at + DEPTH * n], plane[at + SURFACE * n], y[o], y[o + n]
+    )
 
 
 @njit
@@ -65,7 +72,9 @@ def read_ends(t, y, dydt, out, handle):
         basin = tables.basins[patch["basin"]]
         if basin["kind"] != OWN_CODE:
             continue
-        at, turn, node = patch["inside"], patch_turn(tables, patch), patch["node"]
+        at = patch["inside"]
+        turn = patch_turn(tables, patch)
+        node = patch["node"]
         section = section_at(tables.plane, basin["table"])
         h, e, u = state_inside(tables, basin, section, y, turn)
         inside = end_state(section, h, e if h > 0.0 else patch["rest"], turn * u)
@@ -81,7 +90,9 @@ def read_ends(t, y, dydt, out, handle):
 @njit
 def flux_at_end(tables, patch, section, out):
     """(inflow [m3/s], momentum flux minus the thrust inside [m4/s2], wave speed [m/s]) at an end of a conduit."""
-    st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    valve = tables.valves[patch["valve"]]
     q = out[layout["valve"] + patch["valve"]] / st["rho"]
     drop = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
     z = patch["lowest"] + drop / (st["rho"] * st["gravity"])
@@ -96,7 +107,9 @@ def flux_at_end(tables, patch, section, out):
 @njit
 def end_fluxes(tables, b, section, out):
     """(flow, momentum) along the conduit at `from`, the same at `to`, and the greatest wave speed at both ends."""
-    first, last, most = (0.0, 0.0), (0.0, 0.0), 0.0
+    first = (0.0, 0.0)
+    last = (0.0, 0.0)
+    most = 0.0
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         if patch["basin"] == b:
@@ -113,8 +126,15 @@ def end_fluxes(tables, b, section, out):
 @njit
 def read_block(tables, basin, section, y, low, high, block):
     """Write area, depth, surface and velocity of the cells low to high - 1 of a conduit to a block."""
-    n, plane, at, o = basin["n"], tables.plane, basin["plan"], basin["y"]
-    rest = plane[at + low : at + high], plane[at + n + low : at + n + high], plane[at + 2 * n + low : at + 2 * n + high]
+    n = basin["n"]
+    plane = tables.plane
+    at = basin["plan"]
+    o = basin["y"]
+    rest = (
+        plane[at + low : at + high],
+        plane[at + n + low : at + n + high],
+        plane[at + 2 * n + low : at + 2 * n + high],
+    )
     cells.put_cells(section, *rest, y[o + low : o + high], y[o + n + low : o + n + high], block)
 
 
@@ -122,7 +142,9 @@ def read_block(tables, basin, section, y, low, high, block):
 def drag_rows(tables, basin, first, last):
     """Rows `seen` and `drag` of the cells first to last - 1 for `conduit_cells.put_drag`."""
     at = basin["work"] + WORK
-    return tables.work[at + first : at + last], tables.work[at + basin["n"] + first : at + basin["n"] + last]
+    return tables.work[at + first : at + last], tables.work[
+        at + basin["n"] + first : at + basin["n"] + last
+    ]
 
 
 @njit
@@ -138,21 +160,26 @@ def block_rates(tables, b, section, y, dydt, first, last, ends):
     ends : ((flow, momentum) at `from`, the same at `to`)
     """
     basin, st = tables.basins[b], tables.settings[0]
-    n, o, k = basin["n"], basin["y"], tables.plane[basin["spacing"]]
+    n = basin["n"]
+    o = basin["y"]
+    k = tables.plane[basin["spacing"]]
     low, high = max(first - 2, 0), min(last + 2, n)
     count, at = high - low, first - low
     block = tables.work[basin["work"] : basin["work"] + WORK]
     read_block(tables, basin, section, y, low, high, block)
     cells.put_waves(section, count, block)
     most = k * cells.greatest(last - first, block[at + cells.WAVE :])
-    cells.put_limited(basin["limiter"], basin["scheme"] == UPWIND, count, low == 0, high == n, block)
+    cells.put_limited(
+        basin["limiter"], basin["scheme"] == UPWIND, count, low == 0, high == n, block
+    )
     cells.put_sides(section, count, block)
     cells.put_fluxes(section, count - 1, block)
     if first == 0:
         block[cells.FLOW], block[cells.AFTER] = ends[0]
     if last == n:
         block[count + cells.FLOW], block[count + cells.BEFORE] = ends[1]
-    for i in range(max(first, 1), last if basin["flows"] >= 0 else 0):  # for scalars: times the width; walls at ends
+    # for scalars: times the width; walls at ends
+    for i in range(max(first, 1), last if basin["flows"] >= 0 else 0):
         tables.work[basin["flows"] + i] = section.diameter * block[i - low + cells.FLOW]
     own, flow_rates = block[at:], dydt[o + n + first : o + n + last]
     cells.put_rates(st["gravity"], k, own, dydt[o + first : o + last], flow_rates)
@@ -195,7 +222,8 @@ def add_end_scalars(t, y, dydt, out, handle):
         basin = tables.basins[patch["basin"]]
         if basin["kind"] != OWN_CODE:
             continue
-        flow, at = out[layout["valve"] + patch["valve"]], basin["carried"] + tables.integers[patch["first"]]
+        flow = out[layout["valve"] + patch["valve"]]
+        at = basin["carried"] + tables.integers[patch["first"]]
         node = tables.valves[patch["valve"]]["from_node"] if flow > 0.0 else patch["node"]
         per = tables.plane[basin["spacing"]] * flow / tables.settings[0]["rho"]
         for q in range(tables.scalars.size):
@@ -210,14 +238,19 @@ def damp_conduits(h, y, rates, quick, handle):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["damped"] == 0:
             continue
-        n, o, section = basin["n"], basin["y"], section_at(tables.plane, basin["table"])
+        n = basin["n"]
+        o = basin["y"]
+        section = section_at(tables.plane, basin["table"])
         for first in range(0, n, cells.MOST_CELLS):
             last = min(first + cells.MOST_CELLS, n)
             seen, drag = drag_rows(tables, basin, first, last)
-            if drag[0] == 0.0 or not cells.are_equal(seen, y[o + first : o + last]):  # not the state of the last rates
+            # not the state of the last rates
+            if drag[0] == 0.0 or not cells.are_equal(seen, y[o + first : o + last]):
                 block = tables.work[basin["work"] : basin["work"] + WORK]
                 read_block(tables, basin, section, y, first, last, block)
-                cells.put_drag(section, rough_wall(tables, basin), y[o + first : o + last], block, seen, drag)
+                cells.put_drag(
+                    section, rough_wall(tables, basin), y[o + first : o + last], block, seen, drag
+                )
             low, high = o + n + first, o + n + last
             cells.damp_row(h, y[low:high], drag, rates[low:high], quick[low:high])
 
@@ -231,9 +264,17 @@ def observe_conduits(t, y, out, handle, values):
         if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != OWN_CODE:
             continue
         basin, total = tables.basins[probe["index"]], 0.0
-        section, n, o = section_at(tables.plane, basin["table"]), basin["n"], basin["y"]
+        section = section_at(tables.plane, basin["table"])
+        n = basin["n"]
+        o = basin["y"]
         for m in range(probe["count"]):
             i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
             area, h, _, _ = read_cell(tables, basin, section, y, i)
-            total += weight * (h if probe["side"] == OF_DEPTH else area if probe["side"] == OF_AREA else y[o + n + i])
+            total += weight * (
+                h
+                if probe["side"] == OF_DEPTH
+                else area
+                if probe["side"] == OF_AREA
+                else y[o + n + i]
+            )
         values[k] = probe["scale"] * total + probe["offset"]

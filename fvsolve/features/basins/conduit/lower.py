@@ -12,14 +12,30 @@ from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.errors import Notice
 from fvsolve.features.basins.basin_terms import SHORTAGES
 from fvsolve.features.basins.conduit import conduit_rates
-from fvsolve.features.basins.conduit.conduit_cells import THIN, drag_per_flow, fastest, velocity_factor
+from fvsolve.features.basins.conduit.conduit_cells import (
+    THIN,
+    drag_per_flow,
+    fastest,
+    velocity_factor,
+)
 from fvsolve.features.basins.conduit.conduit_rates import OF_AREA, OF_DEPTH, OF_FLOW
 from fvsolve.features.basins.conduit.lower_chain import steady_chain
 from fvsolve.features.basins.conduit.steady_profile import put_profile
 from fvsolve.features.basins.free_surface.lower import COURANT_FACTOR
-from fvsolve.features.basins.lower_friction import RowsWithFriction, cap_checks, run_checks, start_notices
+from fvsolve.features.basins.lower_friction import (
+    RowsWithFriction,
+    cap_checks,
+    run_checks,
+    start_notices,
+)
 from fvsolve.parts.conduit.law import INSIDE, end_flow
-from fvsolve.parts.conduit.law_section import area_of, celerity, depth_of, section_at_depth, section_of
+from fvsolve.parts.conduit.law_section import (
+    area_of,
+    celerity,
+    depth_of,
+    section_at_depth,
+    section_of,
+)
 
 PACKAGE = __package__
 QUANTITIES = {"depth": OF_DEPTH, "head": OF_DEPTH, "filling": OF_AREA, "flow": OF_FLOW}
@@ -38,12 +54,16 @@ class ConduitWaterRows(RowsWithFriction):
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
         self.conduit, self.bed = self.part.conduit, self.part.bed_at_centres()
-        self.section = section_of(case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity))
+        self.section = section_of(
+            case.gravity, self.conduit.diameter, self.conduit.celerity(case.gravity)
+        )
         self.rough = self.conduit.rough(case.gravity)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
         self.area = self.areas(self.depth)
         self.fades = THIN * self.section.area
-        self.full_rate = COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
+        self.full_rate = (
+            COURANT_FACTOR * self.conduit.celerity(case.gravity) * self.n / self.conduit.length
+        )
 
     def areas(self, depth: np.ndarray) -> np.ndarray:
         """Areas of cells at their depths : float64[n] [m2]."""
@@ -91,7 +111,8 @@ class ConduitWaterRows(RowsWithFriction):
     def lower(self, draft, row) -> None:
         surface = np.maximum(self.bed - self.part.level, 0.0)
         row["plan"] = draft.to_plane(np.array([self.area, self.depth, surface]))
-        row["area"] = draft.to_plane(np.full(self.n, self.conduit.length / self.n))  # of cells of unit width
+        # of cells of unit width
+        row["area"] = draft.to_plane(np.full(self.n, self.conduit.length / self.n))
         row["table"] = draft.to_plane(np.array(self.section))
         row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
@@ -103,7 +124,10 @@ class ConduitWaterRows(RowsWithFriction):
         super().lower_patch(draft, patch, row)
         i = 0 if patch == "from" else -1
         level = self.part.level
-        row["closure"], row["valve"] = rec.LINKED, draft.valve_names.index(f"{self.name}.{patch}.face")
+        row["closure"], row["valve"] = (
+            rec.LINKED,
+            draft.valve_names.index(f"{self.name}.{patch}.face"),
+        )
         row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
         row["depth"], row["inside"], row["stencil"] = -1, draft.to_work(INSIDE), 1
         row["second"] = len(draft.integers)
@@ -132,8 +156,12 @@ class ConduitWaterRows(RowsWithFriction):
         if conduit.initial_depth is not None:
             depth = np.full(self.n, conduit.initial_depth)
         elif depth is None:
-            depth = np.maximum(low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0)
-        change = np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
+            depth = np.maximum(
+                low + (high - low) * (np.arange(self.n) + 0.5) / self.n - self.bed, 0.0
+            )
+        change = (
+            np.zeros(self.n) if np.array_equal(depth, self.depth) else self.areas(depth) - self.area
+        )
         return np.array([change, np.where(self.area + change > 0.0, flow, 0.0)])
 
     def filling_step(self) -> float:
@@ -159,7 +187,9 @@ class ConduitWaterRows(RowsWithFriction):
     @cached_property
     def steady(self) -> tuple[float | None, list[float | None]]:
         """(steady flow at the start [m3/s], heads of both nodes then [m]); None if not known."""
-        conduit, flows, heads = self.conduit, {}, {}
+        conduit = self.conduit
+        flows = {}
+        heads = {}
         if self.case.numerics.initial != "rest" and conduit.initial_depth is None:
             flows, heads = steady_chain(self.part.chain, self.case.gravity)
         flow = conduit.initial_flow if conduit.initial_flow is not None else flows.get(self.name)
@@ -181,7 +211,9 @@ class ConduitWaterRows(RowsWithFriction):
 
     def depths(self, y: np.ndarray) -> np.ndarray:
         """Depths of cells at deviations y : float64[n] [m]."""
-        return np.array([depth_of(self.section, area) for area in np.maximum(self.area + y[0], 0.0).tolist()])
+        return np.array(
+            [depth_of(self.section, area) for area in np.maximum(self.area + y[0], 0.0).tolist()]
+        )
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         depth, area = self.depths(y), np.maximum(self.area + y[0], 0.0)
@@ -234,4 +266,6 @@ class ConduitWaterRows(RowsWithFriction):
         per = 0.5 * self.mass()[1]
         area = np.maximum(self.area + y[0], 1e-6 * self.section.area)
         width = np.array([section_at_depth(self.section, h)[1] for h in self.depths(y).tolist()])
-        return np.array([per * self.case.gravity / np.maximum(width, self.section.slot), per / area])
+        return np.array(
+            [per * self.case.gravity / np.maximum(width, self.section.slot), per / area]
+        )

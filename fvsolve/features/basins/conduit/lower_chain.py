@@ -25,9 +25,12 @@ def upper_head(link: Conduit, gravity: float, flow: float, head: float) -> float
     if flow == 0.0:
         return head if head > max(link.inverts) else min(head, *link.inverts)
     depths, flow = np.zeros(link.cells + 2), abs(flow)
-    depth = put_profile(section, flow, link.rough(gravity), begin - end, link.length, max(head - end, 0.0), depths)
+    depth = put_profile(
+        section, flow, link.rough(gravity), begin - end, link.length, max(head - end, 0.0), depths
+    )
     low, high = depth, depth
-    while critical_flow(section, high) < flow:  # inflow is at most critical, and at most that of Torricelli
+    # inflow is at most critical, and at most that of Torricelli
+    while critical_flow(section, high) < flow:
         low, high = high, high + section.diameter
     for _ in range(HALVINGS if high > low else 0):
         h = 0.5 * (low + high)
@@ -44,7 +47,9 @@ def lower_head(link: Conduit, gravity: float, flow: float, head: float) -> float
     return high
 
 
-def climb(chain: Chain, gravity: float, heads: dict[str, float], flows: dict[str, float], both: bool) -> dict:
+def climb(
+    chain: Chain, gravity: float, heads: dict[str, float], flows: dict[str, float], both: bool
+) -> dict:
     """Heads of all nodes that follow from known heads; both : True to follow flows downward too, else only upward."""
     found, left = dict(heads), list(heads)
     while left:
@@ -55,14 +60,18 @@ def climb(chain: Chain, gravity: float, heads: dict[str, float], flows: dict[str
             other = link.to if node == link.from_ else link.from_
             rises = flows[name] * (1.0 if node == link.to else -1.0) >= 0.0
             if other not in found and (rises or both):
-                found[other] = (upper_head if rises else lower_head)(link, gravity, flows[name], found[node])
+                found[other] = (upper_head if rises else lower_head)(
+                    link, gravity, flows[name], found[node]
+                )
                 left.append(other)
     return found
 
 
 def flows_by_inflows(chain: Chain, root: str, inflows: dict[str, float]) -> dict[str, float]:
     """Flows of conduits that carry the inflows of all nodes to one node of a tree [m3/s]."""
-    flows, order, seen = {}, [], {root}
+    flows = {}
+    order = []
+    seen = {root}
     left = [root]
     while left:
         node = left.pop()
@@ -83,9 +92,17 @@ def flows_by_inflows(chain: Chain, root: str, inflows: dict[str, float]) -> dict
 @lru_cache
 def steady_chain(chain: Chain, gravity: float) -> tuple[dict[str, float], dict[str, float]]:
     """(flow of each conduit [m3/s], head of each node [m]) of a chain; both empty if keys do not give them."""
-    roots, places = list(chain.heads), {place for link in chain.links.values() for place in link.ports.values()}
-    stated = any(link.initial_flow is not None or link.initial_depth is not None for link in chain.links.values())
-    if len(chain.links) != len(places) - 1 or len(roots) not in (1, 2) or (stated and len(places) > 2):
+    roots = list(chain.heads)
+    places = {place for link in chain.links.values() for place in link.ports.values()}
+    stated = any(
+        link.initial_flow is not None or link.initial_depth is not None
+        for link in chain.links.values()
+    )
+    if (
+        len(chain.links) != len(places) - 1
+        or len(roots) not in (1, 2)
+        or (stated and len(places) > 2)
+    ):
         return {}, {}
     if len(roots) == 1:
         flows = flows_by_inflows(chain, roots[0], chain.inflows)
@@ -96,9 +113,12 @@ def steady_chain(chain: Chain, gravity: float) -> tuple[dict[str, float], dict[s
 
     def both_climbs(flow):
         flows = flows_by_inflows(chain, roots[0], {**chain.inflows, roots[1]: flow})
-        return flows, *(climb(chain, gravity, {root: chain.heads[root]}, flows, False) for root in roots)
+        return flows, *(
+            climb(chain, gravity, {root: chain.heads[root]}, flows, False) for root in roots
+        )
 
-    def rise(flow):  # of the head where both climbs meet, from that of the second node to that of the first
+    # of the head where both climbs meet, from that of the second node to that of the first
+    def rise(flow):
         _, a, b = both_climbs(flow)
         return next((a[place] - b[place] for place in a if place in b), 0.0)
 

@@ -73,7 +73,10 @@ def put_profile(section, flow, rough, fall, length, end, depths):
         if half > 0.0:
             energy = energy_beyond(section, rough, flow, h, -half) + 2.0 * half * fall / length
             h = depth_at_energy(section, rough, flow, energy, critical, half)
-        (area, _, thrust), (wet, _, force) = section_at_depth(section, h), section_at_depth(section, depths[i])
+        (area, _, thrust), (wet, _, force) = (
+            section_at_depth(section, h),
+            section_at_depth(section, depths[i]),
+        )
         if flow * flow / area + section.g * thrust > flow * flow / wet + section.g * force:
             depths[i] = h
     return upper

@@ -43,7 +43,9 @@ def add_friction(law, g, values, depth0, dh, flows, contents, rates):
     """
     (qx, qy), (content_x, content_y), (rate_x, rate_y) = flows, contents, rates
     for i in range(dh.size):
-        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
+        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(
+            qx[i] * qx[i] + qy[i] * qy[i]
+        )
         rate_x[i] -= rate * content_x[i]
         rate_y[i] -= rate * content_y[i]
 
@@ -57,7 +59,9 @@ def add_capped_friction(law, g, values, cap, depth0, dh, flows, contents, rates)
     (qx, qy), (content_x, content_y), (rate_x, rate_y) = flows, contents, rates
     most = 0.0
     for i in range(dh.size):
-        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(qx[i] * qx[i] + qy[i] * qy[i])
+        rate = drag_per_flow(law, g, values[i], depth0[i] + dh[i]) * sqrt(
+            qx[i] * qx[i] + qy[i] * qy[i]
+        )
         rate *= cap / (cap + rate + TINY)
         most = max(most, rate)
         rate_x[i] -= rate * content_x[i]
@@ -78,9 +82,11 @@ def damp_flows(law, g, values, h, depth0, dh, flows, contents, rates, quick):
     quick_x, quick_y = quick
     for i in range(dh.size):
         per = drag_per_flow(law, g, values[i], depth0[i] + dh[i])
-        flow, content = qx[i] * qx[i] + qy[i] * qy[i], content_x[i] * content_x[i] + content_y[i] * content_y[i]
+        flow = qx[i] * qx[i] + qy[i] * qy[i]
+        content = content_x[i] * content_x[i] + content_y[i] * content_y[i]
         rate = per * sqrt(flow)
-        stretch = 1.0 if flow == content else flow / (content + TINY)  # undeformed area over present area, squared
+        # undeformed area over present area, squared
+        stretch = 1.0 if flow == content else flow / (content + TINY)
         x = content_x[i] + h * (rate_x[i] + rate * content_x[i])
         y = content_y[i] + h * (rate_y[i] + rate * content_y[i])
         free = h * per * sqrt(stretch * (x * x + y * y))

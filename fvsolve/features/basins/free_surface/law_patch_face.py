@@ -17,7 +17,8 @@ from fvsolve.jit import njit
 
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 NEAR = 1e-12  # least length of a chord [m]
-DRY_SPEED = 0.1  # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
+# derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
+DRY_SPEED = 0.1
 
 
 @njit
@@ -48,7 +49,11 @@ def level_step(g, faces, z, target, firm):
     least = least_slope(q, target, firm)  # critical outflow does not depend on the level
     if not target > q + SAME_FLOW * abs(q):
         deeper = z - (lowest_bed(faces) - DEEPEST)
-        return (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long) if deeper < 0.0 else (q - target, least)
+        return (
+            (q + DRY_SPEED * long * deeper - target, DRY_SPEED * long)
+            if deeper < 0.0
+            else (q - target, least)
+        )
     level = solve_level(g, faces, target, 0.0, faces[0][:0], faces[0][:0])
     return q - target, max((target - q) / max(level - z, NEAR), least)
 
@@ -58,12 +63,20 @@ def step(out, tables, k, g, m, drop, denser, wide):
     """(a, s) of `restrictions.restriction_step`: Newton's step."""
     patch, st = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]
     z = junction_level(out, tables, patch, drop)
-    a, s = level_step(st["gravity"], faces_inside(tables, patch), z, m / st["rho"], FACE_SHARE * out[FIRM])
+    a, s = level_step(
+        st["gravity"], faces_inside(tables, patch), z, m / st["rho"], FACE_SHARE * out[FIRM]
+    )
     return st["rho"] * a, s / st["gravity"]
 
 
 @njit
 def slope(out, tables, k, g, drop):
     """Derivative of the mass flow by the drop [kg/s/Pa]."""
-    patch, gravity = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]["gravity"]
-    return patch_flow(gravity, junction_level(out, tables, patch, drop), faces_inside(tables, patch))[1] / gravity
+    patch = tables.patches[int(tables.floats[tables.valves[k]["data"]])]
+    gravity = tables.settings[0]["gravity"]
+    return (
+        patch_flow(gravity, junction_level(out, tables, patch, drop), faces_inside(tables, patch))[
+            1
+        ]
+        / gravity
+    )

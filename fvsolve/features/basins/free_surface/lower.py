@@ -26,7 +26,12 @@ from fvsolve.features.basins.free_surface import (
 )
 from fvsolve.features.basins.free_surface.bed_friction import add_friction
 from fvsolve.features.basins.free_surface.lower_error_checks import error_notices, error_watches
-from fvsolve.features.basins.free_surface.lower_marks import Marks, chain_texts, lower_marks, marks_of
+from fvsolve.features.basins.free_surface.lower_marks import (
+    Marks,
+    chain_texts,
+    lower_marks,
+    marks_of,
+)
 from fvsolve.features.basins.free_surface.lower_notices import inflow_watches, unusual_values
 from fvsolve.features.basins.free_surface.surface_patches import DEPTH, TOTALS
 from fvsolve.features.basins.free_surface.surface_rows import THIN
@@ -56,10 +61,14 @@ TIME_SCALE = 10.0  # [s] of condensed times of soils
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
 CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
-    "stage": rec.STAGE, "discharge": rec.DISCHARGE, "rating": rec.RATING, "normal_slope": rec.NORMAL_SLOPE,
+    "stage": rec.STAGE,
+    "discharge": rec.DISCHARGE,
+    "rating": rec.RATING,
+    "normal_slope": rec.NORMAL_SLOPE,
     "critical": rec.CRITICAL,
-}  # fmt: skip
-COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
+}
+# Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
+COURANT_FACTOR = 2.0
 SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
 
 
@@ -75,7 +84,9 @@ def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]
     if model == "green-ampt":
         conductivity, suction, deficit = fields
         store, ponded = suction * deficit, conductivity * water_sources.EARLY
-        return rec.GREEN_AMPT, np.array([conductivity, store, np.sqrt(2.0 * store * ponded) + ponded])
+        return rec.GREEN_AMPT, np.array(
+            [conductivity, store, np.sqrt(2.0 * store * ponded) + ponded]
+        )
     initial, final, decay = fields
     return rec.HORTON, np.array([final, initial - final, decay])
 
@@ -109,7 +120,8 @@ class PatchFaceRows(Restriction, kind="patch-face"):
         row["conductance"] = draft.fluid.density * link.length**2 * DEPTH_SCALE**2
         row["chained"] = 1  # the links at the junction limit its rate
         row["level_start"] = 1
-        row["drive"] = 1.0  # unlike that of valves without a shaft: the velocity in the cells may change alone
+        # unlike that of valves without a shaft: the velocity in the cells may change alone
+        row["drive"] = 1.0
 
     def numbers(self, draft, name, link) -> list[float]:
         patches = [place for place in draft.case.places.values() if place.kind == "patch"]
@@ -119,7 +131,9 @@ class PatchFaceRows(Restriction, kind="patch-face"):
         """Function as in `Restriction.stepper`, for water at rest."""
         link = start.case.conduits[start.draft.valve_names[k]]
         basin = next(basin for basin in start.draft.meshed if basin.name == link.basin)
-        faces, gravity, rho = basin.faces_at_rest(link.patch), start.case.gravity, start.draft.fluid.density
+        faces = basin.faces_at_rest(link.patch)
+        gravity = start.case.gravity
+        rho = start.draft.fluid.density
         rest = max(float(faces[1].min()), 0.0)
 
         def step(flow, drop):
@@ -158,7 +172,9 @@ class FreeSurfaceRows(RowsWithFriction):
             yield RhsTerms(package=PACKAGE, damp="surface_rates: damp_stages")
         if self.moves:
             yield RhsTerms(
-                package=PACKAGE, power="surface_energy: add_wall_power", stored="surface_energy: add_wall_stored"
+                package=PACKAGE,
+                power="surface_energy: add_wall_power",
+                stored="surface_energy: add_wall_stored",
             )
         if self.records_maxima:
             yield RhsTerms(package=PACKAGE, record="surface_maxima: record_maxima")
@@ -193,10 +209,14 @@ class FreeSurfaceRows(RowsWithFriction):
     def lower_sources(self, draft, row) -> None:
         row["present"], row["source"] = draft.to_work(water_sources.PRESENT_NUMBERS), draft.sources
         if self.soil is not None:  # right after the states of cells
-            row["soil"], numbers = soil_numbers(self.soil.model, [self.formula(shape) for shape in self.soil.shapes])
+            row["soil"], numbers = soil_numbers(
+                self.soil.model, [self.formula(shape) for shape in self.soil.shapes]
+            )
             row["soil_numbers"], row["soil_row"] = draft.to_plane(numbers), numbers.shape[1]
             row["soil_work"] = draft.to_work(2 * self.n + water_sources.CHUNK)
-            row["infiltrated"] = draft.states(Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE)
+            row["infiltrated"] = draft.states(
+                Numbered(f"{self.name}.infiltrated", self.n), HEIGHT_SCALE
+            )
             if self.soil_states > 1:
                 draft.states(Numbered(f"{self.name}.condensed_time", self.n), TIME_SCALE)
         rain = self.part.rain
@@ -205,9 +225,12 @@ class FreeSurfaceRows(RowsWithFriction):
                 frames, times = rain.over(self.mesh), rain.times + self.case.numerics.start
                 row["frames"], row["frame_rates"] = len(frames), draft.to_plane(frames)
                 kind = "linear" if len(frames) > 1 else "constant"
-                row["frame_position"] = draft.schedules.add(Schedule(kind, times, np.arange(len(frames))))
+                row["frame_position"] = draft.schedules.add(
+                    Schedule(kind, times, np.arange(len(frames)))
+                )
                 breaks = draft.schedules.breaks
-                breaks |= {t: breaks.get(t, False) for t in times.tolist()}  # slopes in cells change at all frames
+                # slopes in cells change at all frames
+                breaks |= {t: breaks.get(t, False) for t in times.tolist()}
                 rain = Schedule(kind, times, frames @ self.mesh.area / self.mesh.area.sum())
             row["rain"] = draft.schedules.add(rain)
             row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
@@ -222,27 +245,37 @@ class FreeSurfaceRows(RowsWithFriction):
         cells = draft.integers[row["first"] : row["first"] + row["count"]]
         row["rest"], row["depth"], row["neighbours"] = self.part.level, -1, -1
         row["lowest"] = max(float(self.bed[cells].min()) - self.part.level, 0.0)
-        has_faces, is_interior = f"{self.name}.{patch}" in self.case.patches_with_faces, patch in self.mesh.interior
+        has_faces = f"{self.name}.{patch}" in self.case.patches_with_faces
+        is_interior = patch in self.mesh.interior
         if is_interior and not has_faces:
             row["faces"] = 0  # links see its cells only
             if f"{self.name}.{patch}" not in self.places_of_links:
                 text = f"basin {self.name}: no link joins the interior patch {patch}, so no water flows through it"
-                draft.warnings.append(Notice("patch", f"nodes.{self.name}.patches.{patch}", text, None))
+                draft.warnings.append(
+                    Notice("patch", f"nodes.{self.name}.patches.{patch}", text, None)
+                )
         if patch not in self.driven and not has_faces:
             return
         behind = np.array(draft.integers[row["ring"] + row["faces"] :][: row["faces"]])
         row["second"], row["inside"] = len(draft.integers), draft.to_work(5 * int(row["faces"]))
         row["stencil"] = patch_closures.STENCIL if self.extrapolates and not is_interior else 1
         if row["stencil"] > 1:
-            cells, weights = self.mesh.extrapolation(patch, patch_closures.STENCIL, self.marks.walls)
+            cells, weights = self.mesh.extrapolation(
+                patch, patch_closures.STENCIL, self.marks.walls
+            )
             row["weights"] = draft.to_plane(weights)
         else:
-            cells = self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)
+            cells = (
+                self.mesh.faces(patch).inside if is_interior else self.second_cells(patch, behind)
+            )
         draft.integers += cells.ravel().tolist()
         of_triangles = self.mesh.cells[behind, 3] < 0
-        if of_triangles.any() and not is_interior:  # quadrilaterals, as cells of grids, have inflow of their own
+        # quadrilaterals, as cells of grids, have inflow of their own
+        if of_triangles.any() and not is_interior:
             row["neighbours"] = len(draft.integers)
-            faces = np.where(of_triangles, self.mesh.neighbouring_faces(patch), np.arange(behind.size))
+            faces = np.where(
+                of_triangles, self.mesh.neighbouring_faces(patch), np.arange(behind.size)
+            )
             draft.integers += faces.ravel().tolist()
         if has_faces:
             row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
@@ -257,7 +290,9 @@ class FreeSurfaceRows(RowsWithFriction):
             row["numbers"] = draft.to_plane(np.array([stated.rating.level, stated.rating.flow]))
             row["points"] = len(stated.rating.level)
         if stated.normal_slope is not None:
-            row["conveyance"] = draft.to_plane(math.sqrt(stated.normal_slope) / self.roughness[behind])
+            row["conveyance"] = draft.to_plane(
+                math.sqrt(stated.normal_slope) / self.roughness[behind]
+            )
 
     @property
     def places_of_links(self) -> set[str]:
@@ -268,7 +303,12 @@ class FreeSurfaceRows(RowsWithFriction):
         """(depth, surface above the level at rest, inward velocity, length) of the faces of a patch at rest."""
         faces, cells, inside, _ = self.mesh.faces(patch)
         bed = np.maximum(self.bed[cells], self.bed[inside]) - self.part.level
-        return np.maximum(-bed, 0.0), np.maximum(bed, 0.0), np.zeros(cells.size), self.mesh.length[faces]
+        return (
+            np.maximum(-bed, 0.0),
+            np.maximum(bed, 0.0),
+            np.zeros(cells.size),
+            self.mesh.length[faces],
+        )
 
     @property
     def extrapolates(self) -> bool:
@@ -279,10 +319,15 @@ class FreeSurfaceRows(RowsWithFriction):
         """Cells next inside the cells `behind` the faces of a patch; the same cells at a wall, and with upwind."""
         if not self.is_grid or self.scheme == "upwind":
             return behind
-        grid, (x, y) = self.mesh.grid, -np.round(self.mesh.normal[self.mesh.patch(patch)].T).astype(int)
+        grid, (x, y) = (
+            self.mesh.grid,
+            -np.round(self.mesh.normal[self.mesh.patch(patch)].T).astype(int),
+        )
         second = behind + x * (grid.nx > 1) + y * grid.nx * (grid.ny > 1)
         low, high = (self.mesh.left[self.marks.walls], self.mesh.right[self.marks.walls])
-        apart = np.isin(behind * self.n + second, np.concatenate([low * self.n + high, high * self.n + low]))
+        apart = np.isin(
+            behind * self.n + second, np.concatenate([low * self.n + high, high * self.n + low])
+        )
         return np.where(apart, behind, second)
 
     def scales(self) -> list[float]:
@@ -321,7 +366,9 @@ class FreeSurfaceRows(RowsWithFriction):
             amount = draft.case.amount
             text = f"basin {self.name} starts dry: level {amount(part.level, 'level')} is not above its bed, lowest at "
             text += amount(float(self.bed.min()), "level")
-            draft.warnings.append(Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min()))
+            draft.warnings.append(
+                Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min())
+            )
 
     @property
     def fills(self) -> bool:
@@ -347,7 +394,9 @@ class FreeSurfaceRows(RowsWithFriction):
             depth = level_at_start(self, attitude)
             states[0] = depth - self.depth
         if given is not None and given.level is not None:
-            depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))
+            depth = depth_at_start(
+                samples(given.level, self.mesh), samples(self.part.bed, self.mesh)
+            )
             states[0] = depth - self.depth
         if given is not None:
             states[1], states[2] = depth * self.formula(given.u), depth * self.formula(given.v)
@@ -363,7 +412,11 @@ class FreeSurfaceRows(RowsWithFriction):
     def maxima(self, t: float, recorded: np.ndarray) -> dict[str, np.ndarray]:
         at, size = int(self.row["maxima"]), int(self.row["maxima_row"])
         rows = recorded[at : at + surface_maxima.QUANTITIES * self.n].reshape(-1, size)
-        cells = rows.reshape(len(rows), surface_maxima.QUANTITIES, -1).swapaxes(0, 1).reshape(-1, self.n)
+        cells = (
+            rows.reshape(len(rows), surface_maxima.QUANTITIES, -1)
+            .swapaxes(0, 1)
+            .reshape(-1, self.n)
+        )
         depth, speed, hazard, wet, arrival, duration = cells
         bed = self.bed + (self.part.elevation or 0.0)
         values = depth, bed + depth, np.sqrt(speed), np.sqrt(hazard), arrival
@@ -403,7 +456,8 @@ class FreeSurfaceRows(RowsWithFriction):
         return float(np.sum(per * self.depth)), per
 
     def weights(self, y: np.ndarray) -> np.ndarray:
-        per, depth = self.case.properties.density * self.mesh.area, np.maximum(self.depth + y[0], THIN)
+        per = self.case.properties.density * self.mesh.area
+        depth = np.maximum(self.depth + y[0], THIN)
         return np.array([0.5 * self.case.gravity * per, 0.5 * per / depth, 0.5 * per / depth])
 
     def energy_of_waves(self, y: np.ndarray) -> float:
@@ -411,13 +465,16 @@ class FreeSurfaceRows(RowsWithFriction):
         wet = depth > THIN
         if not wet.any():
             return 0.0
-        area, surface, depth = self.mesh.area[wet], (self.bed + depth)[wet], depth[wet]
+        area = self.mesh.area[wet]
+        surface = (self.bed + depth)[wet]
+        depth = depth[wet]
         square = (y[1][wet] ** 2 + y[2][wet] ** 2) / depth
         height = self.case.gravity * (surface - np.average(surface, weights=area)) ** 2
         return float(0.5 * self.case.properties.density * np.sum(area * (height + square)))
 
     def above(self, y: np.ndarray, datum: float) -> float:
-        depth, bed = np.maximum(self.depth + y[0], 0.0), self.bed + (self.part.elevation or 0.0) - datum
+        depth = np.maximum(self.depth + y[0], 0.0)
+        bed = self.bed + (self.part.elevation or 0.0) - datum
         height = 0.5 * self.case.gravity * ((bed + depth) ** 2 - np.maximum(bed, 0.0) ** 2)
         wet = np.maximum(depth, THIN)
         moves = depth / (depth**2 + wet**2) * (y[1] ** 2 + y[2] ** 2)
@@ -444,9 +501,15 @@ class FreeSurfaceRows(RowsWithFriction):
         return np.maximum(self.depth + y[0], 0.0)
 
     def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        depth, zeros, law = self.depth_of(y), np.zeros(self.n), rec.DARCY if self.part.manning is None else rec.MANNING
-        rate, flows, contents = np.zeros(self.n), (y[1], y[2]), (zeros - 1.0, zeros)
-        add_friction(law, self.case.gravity, self.roughness, depth, zeros, flows, contents, (rate, zeros))
+        depth = self.depth_of(y)
+        zeros = np.zeros(self.n)
+        law = rec.DARCY if self.part.manning is None else rec.MANNING
+        rate = np.zeros(self.n)
+        flows = (y[1], y[2])
+        contents = (zeros - 1.0, zeros)
+        add_friction(
+            law, self.case.gravity, self.roughness, depth, zeros, flows, contents, (rate, zeros)
+        )
         return depth, np.hypot(y[1], y[2]) * self.mesh.area, rate
 
     def mass_per_depth(self) -> np.ndarray:

@@ -69,7 +69,9 @@ def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> Surface
 def is_even(basin) -> bool:
     """True if the mesh is a full rectangle of equal rectangular cells."""
     grid = basin.mesh.grid
-    return basin.is_grid and all(np.ptp(np.diff(lines)) < 1e-9 * (lines[-1] - lines[0]) for lines in (grid.x, grid.y))
+    return basin.is_grid and all(
+        np.ptp(np.diff(lines)) < 1e-9 * (lines[-1] - lines[0]) for lines in (grid.x, grid.y)
+    )
 
 
 def on_grid(basin, surface: np.ndarray) -> float:
@@ -78,7 +80,10 @@ def on_grid(basin, surface: np.ndarray) -> float:
 
     grid = basin.mesh.grid
     square = dctn(surface.reshape(grid.ny, grid.nx), norm="ortho") ** 2 / surface.size
-    kx, ky = (np.pi * np.arange(n) / (lines[-1] - lines[0]) for n, lines in ((grid.nx, grid.x), (grid.ny, grid.y)))
+    kx, ky = (
+        np.pi * np.arange(n) / (lines[-1] - lines[0])
+        for n, lines in ((grid.nx, grid.x), (grid.ny, grid.y))
+    )
     k = kx**2 + ky[:, None] ** 2
     square[0, 0], k[0, 0] = 0.0, 1.0
     return float(np.sum(square / k))
@@ -90,11 +95,18 @@ def on_mesh(basin, surface: np.ndarray) -> float:
     from scipy.sparse.linalg import spsolve
 
     mesh, inner = basin.mesh, basin.mesh.inner
-    left, right, n = mesh.left[:inner], mesh.right[:inner], basin.n
-    distance = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
+    left = mesh.left[:inner]
+    right = mesh.right[:inner]
+    n = basin.n
+    distance = np.abs(
+        np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1)
+    )
     per = mesh.length[:inner] / distance
-    rows, columns = np.concatenate([left, right, left, right]), np.concatenate([left, right, right, left])
-    matrix = coo_array((np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)).tocsc()
+    rows = np.concatenate([left, right, left, right])
+    columns = np.concatenate([left, right, right, left])
+    matrix = coo_array(
+        (np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)
+    ).tocsc()
     own = mesh.area * (surface - np.average(surface, weights=mesh.area))
     psi = np.zeros(n)
     psi[1:] = spsolve(matrix[1:, 1:], own[1:])
@@ -127,7 +139,11 @@ def body_notices(basin) -> list[Notice]:
         f"{basin.name}: in shallow-water theory the slowest wave is {mode.excess:.2g} % too fast "
         f'(k h = {mode.kh:.2g}); sloshing = "modes" is correct for small waves'
     )
-    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, WAVE_ERROR)]
+    return [
+        Notice(
+            "dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, WAVE_ERROR
+        )
+    ]
 
 
 def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
@@ -142,7 +158,12 @@ def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     down = basin.bed[left] > basin.bed[right]
     upper, lower = np.where(down, left, right), np.where(down, right, left)
     fall, deep = basin.bed[upper] - basin.bed[lower], depth[upper]
-    film = (deep > DRY_DEPTH) & (depth[lower] > DRY_DEPTH) & (fall > deep) & (fall + deep - depth[lower] > deep)
+    film = (
+        (deep > DRY_DEPTH)
+        & (depth[lower] > DRY_DEPTH)
+        & (fall > deep)
+        & (fall + deep - depth[lower] > deep)
+    )
     if not film.any():
         return 0.0, math.nan, math.nan
     at = int(np.argmax(np.where(film, deep, 0.0)))
@@ -168,7 +189,11 @@ def film_checks(basin) -> list[tuple]:
 
 def error_notices(basin, y: np.ndarray) -> list[Notice]:
     """Notices of short waves and thin films at deviations y."""
-    return [*wave_notices(basin, y), *body_notices(basin), *start_notices(basin, y, film_checks(basin))]
+    return [
+        *wave_notices(basin, y),
+        *body_notices(basin),
+        *start_notices(basin, y, film_checks(basin)),
+    ]
 
 
 def error_watches(basin, y: np.ndarray) -> list[Any]:

@@ -12,7 +12,8 @@ from fvsolve.features.basins.cell_sides import BLOCK
 from fvsolve.features.basins.free_surface.marked_faces import SUM_COUNT
 from fvsolve.features.basins.lower_motion import sides_of_cells
 
-MOST_STRETCH = 2.0  # greatest factor on the flow over a wall by which its faces pass that over its line
+# greatest factor on the flow over a wall by which its faces pass that over its line
+MOST_STRETCH = 2.0
 
 
 class Marks(NamedTuple):
@@ -40,7 +41,11 @@ def marks_of(basin) -> Marks:
     """Marked faces of a basin: those of its sections, and those of walls above both beds; the highest wall counts."""
     mesh = basin.mesh
     beds = np.maximum(*(basin.bed[cells[: mesh.inner]] for cells in (mesh.left, mesh.right)))
-    crest, marked, (factor, cosine, sine) = beds.copy(), np.zeros(mesh.inner, bool), np.zeros((3, mesh.inner))
+    crest, marked, (factor, cosine, sine) = (
+        beds.copy(),
+        np.zeros(mesh.inner, bool),
+        np.zeros((3, mesh.inner)),
+    )
     for wall in (basin.part.walls or {}).values():
         chain = wall.chain(mesh)
         highest = wall.crest > crest[chain.faces]
@@ -78,7 +83,9 @@ def lower_marks(draft, basin, row) -> None:
 
 def rows_of_grid(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """(row of each marked face, its column, its number, number of rows) on a grid, see `marked_faces.MarkedFaces`."""
-    mesh, faces, ny = basin.mesh, basin.marks.faces, basin.mesh.grid.ny
+    mesh = basin.mesh
+    faces = basin.marks.faces
+    ny = basin.mesh.grid.ny
     row, column = np.divmod(mesh.left[faces], mesh.grid.nx)
     east = np.abs(mesh.normal[faces, 0]) > 0.5
     return np.where(east, ny + 1 + row, row + 1), column + east, np.arange(faces.size), 2 * ny + 1
@@ -90,7 +97,12 @@ def rows_of_mesh(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     number = np.searchsorted(basin.marks.faces, np.where(face >= 0, face, ~face))
     marked = np.isin(np.where(face >= 0, face, ~face), basin.marks.faces)
     number = np.where(face >= 0, number, ~number)
-    return (4 * (own // BLOCK) + side)[marked], (own % BLOCK)[marked], number[marked], 4 * -(-basin.n // BLOCK)
+    return (
+        (4 * (own // BLOCK) + side)[marked],
+        (own % BLOCK)[marked],
+        number[marked],
+        4 * -(-basin.n // BLOCK),
+    )
 
 
 def chain_texts(basin) -> Iterator[str]:
@@ -99,7 +111,11 @@ def chain_texts(basin) -> Iterator[str]:
     for name, wall in (basin.part.walls or {}).items():
         faces, _, cosine, _, stretch = wall.chain(basin.mesh)
         length = amount(stretch * float(basin.mesh.length[faces] @ cosine), "length", 3)
-        height = marks.height[np.isin(marks.faces, faces)] if np.isin(faces, marks.faces).any() else np.zeros(1)
+        height = (
+            marks.height[np.isin(marks.faces, faces)]
+            if np.isin(faces, marks.faces).any()
+            else np.zeros(1)
+        )
         low, high = (amount(value, "length", 3) for value in (height.min(), height.max()))
         yield f"wall {name}: {faces.size} faces, {length} long, crest {low} to {high} above the bed"
     for name, chain in basin.sections.items():
@@ -119,8 +135,14 @@ def crest_texts(basin) -> Iterator[str]:
                 continue
             _, around, own, _ = basin.mesh.faces(patch)
             crest, bed = rows.bottoms(link)[end], datum + float(basin.bed[own].min())
-            low, high = (amount(datum + float(value), "length", 6)
-                         for value in (surface[around].min(), surface[around].max()))  # fmt: skip
+            low, high = (
+                amount(datum + float(value), "length", 6)
+                for value in (surface[around].min(), surface[around].max())
+            )
             text = f"{name}: {rows.bottom_key} {amount(crest, 'length', 6)}, {amount(abs(crest - bed), 'length', 3)} "
-            text += f"{'above' if crest > bed else 'below'} the lowest bed of {place}" if crest != bed else ""
+            text += (
+                f"{'above' if crest > bed else 'below'} the lowest bed of {place}"
+                if crest != bed
+                else ""
+            )
             yield f"{text}; surface around it at the start {low} to {high}"

@@ -13,7 +13,8 @@ from fvsolve.parts.raster import Raster
 from fvsolve.parts.weir.part import HydraulicStructure
 
 MM_PER_H = 3.6e6  # mm/h in 1 m/s
-CLIFF = 50.0  # slope above which a pixel of a bed is rather a value that stands for missing data, such as -9999 m
+# slope above which a pixel of a bed is rather a value that stands for missing data, such as -9999 m
+CLIFF = 50.0
 STEEP = 0.1  # slope above which rain runs off otherwise than shallow-water theory assumes
 TIMES = 1001  # times at which a scheduled inflow is compared with critical flow, beside its own
 
@@ -55,7 +56,11 @@ def intense_formula(basin) -> Iterator[Notice]:
     Other rates are compared when the case is read.
     """
     place, rain = f"nodes.{basin.name}", basin.part.rain
-    most = float(rain.over(basin.mesh).max()) if isinstance(rain, SpatialSeries) and rain.value == 0.0 else 0.0
+    most = (
+        float(rain.over(basin.mesh).max())
+        if isinstance(rain, SpatialSeries) and rain.value == 0.0
+        else 0.0
+    )
     if most > RAIN.greatest:
         text = f"{place}.rain: {most * MM_PER_H:.4g} mm/h is above {RAIN.greatest * MM_PER_H:g} mm/h, {RAIN.source}"
         yield Notice("range", place, text, "rain", most, RAIN.greatest)
@@ -80,7 +85,9 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
     from fvsolve.exact.solution import value
 
     numerics, amount = basin.case.numerics, basin.case.amount
-    t = np.union1d(np.linspace(numerics.start, numerics.end, TIMES), [*patch.discharge.time, *patch.depth.time])
+    t = np.union1d(
+        np.linspace(numerics.start, numerics.end, TIMES), [*patch.discharge.time, *patch.depth.time]
+    )
     t = t[(t >= numerics.start) & (t <= numerics.end)]
     flow, depth = value(patch.discharge, t), value(patch.depth, t)
     inward = (flow > 0.0) & (depth > 0.0)
@@ -88,33 +95,53 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
     k = int(np.argmin(number))
     if number[k] < 1.0:
         given = f"{amount(flow[k], 'flow')} at a depth of {amount(depth[k], 'length')}"
-        text = (f"{basin.name}.{name}: the inflow of {given} is subcritical at {amount(t[k], 'time')} (Froude number "
-                f"{number[k]:.3g}); leave out `depth`, which the water in the basin determines")  # fmt: skip
-        yield Notice("range", f"nodes.{basin.name}", text, f"patches.{name}.depth", float(number[k]), 1.0)
+        text = (
+            f"{basin.name}.{name}: the inflow of {given} is subcritical at {amount(t[k], 'time')} (Froude number "
+            f"{number[k]:.3g}); leave out `depth`, which the water in the basin determines"
+        )
+        yield Notice(
+            "range", f"nodes.{basin.name}", text, f"patches.{name}.depth", float(number[k]), 1.0
+        )
 
 
 def structures_of_unusual_width(basin, name: str) -> Iterator[Notice]:
     """Notices of structures at a patch that are narrower than its cells, or wider than the patch and its side."""
     place, sides = f"{basin.name}.{name}", basin.mesh.length[basin.mesh.faces(name).index]
-    side, size = basin.part.patches[name].side if name in basin.part.patches else None, basin.part.size
+    side = basin.part.patches[name].side if name in basin.part.patches else None
+    size = basin.part.size
     whole = max(float(sides.sum()), size[side in ("west", "east")] if side and size else 0.0)
     widths = {
-        link: (getattr(part, "width", None) or getattr(part, "diameter", None)) * getattr(part, "barrels", 1)
+        link: (getattr(part, "width", None) or getattr(part, "diameter", None))
+        * getattr(part, "barrels", 1)
         for link, part in basin.case.links.items()
-        if isinstance(part, HydraulicStructure) and place in part.ports.values() and hasattr(part, "width")
+        if isinstance(part, HydraulicStructure)
+        and place in part.ports.values()
+        and hasattr(part, "width")
     }
     narrow = [link for link, width in widths.items() if width < sides.min() * (1.0 - 1e-9)]
     wide = [link for link, width in widths.items() if width > whole * (1.0 + 1e-9)]
     for links, word, size, text in (
-        (narrow, "narrower than the cells at", sides.min(),
-         "the flow spreads over the cells; use smaller cells where velocities beside it matter"),
-        (wide, "wider than the side of" if side else "wider than", whole,
-         "no more than critical flow through the patch passes; give the width that is in the basin"),
-    ):  # fmt: skip
+        (
+            narrow,
+            "narrower than the cells at",
+            sides.min(),
+            "the flow spreads over the cells; use smaller cells where velocities beside it matter",
+        ),
+        (
+            wide,
+            "wider than the side of" if side else "wider than",
+            whole,
+            "no more than critical flow through the patch passes; give the width that is in the basin",
+        ),
+    ):
         if links:
-            verb, size = "is" if len(links) == 1 else "are", basin.case.amount(float(size), "length")
+            verb = "is" if len(links) == 1 else "are"
+            size = basin.case.amount(float(size), "length")
             yield Notice(
-                "cells", f"links.{links[0]}", f"{listing(links)} {verb} {word} {place}, {size}: {text}", "width"
+                "cells",
+                f"links.{links[0]}",
+                f"{listing(links)} {verb} {word} {place}, {size}: {text}",
+                "width",
             )
 
 
@@ -143,7 +170,11 @@ class InflowWatch:
         u = -outward.sum(axis=0) / np.maximum(depth, 1e-9)
         c = np.sqrt(basin.case.gravity * depth)
         limit = float(np.sum(self.length * np.maximum(2.0 * c - u, 0.0) ** 3) / basin.case.gravity)
-        self.greatest[:] = t, float(value(basin.part.patches[self.name].discharge, np.array([t]))[0]), limit
+        self.greatest[:] = (
+            t,
+            float(value(basin.part.patches[self.name].discharge, np.array([t]))[0]),
+            limit,
+        )
 
     def notices(self) -> list[Notice]:
         """List with the notice of an inflow held at critical flow at the end; empty if it is slower than waves."""
@@ -151,14 +182,25 @@ class InflowWatch:
         if not flow > limit:
             return []
         basin, amount = self.basin, self.basin.case.amount
-        text = (f"{basin.name}.{self.name}: the inflow of {amount(flow, 'flow')} at {amount(t, 'time')} enters at "
-                "critical depth, because the water inside runs off faster than waves or is shallow; give the `depth` "
-                "of a supercritical inflow")  # fmt: skip
-        return [Notice("range", f"nodes.{basin.name}", text, f"patches.{self.name}.discharge", flow, limit)]
+        text = (
+            f"{basin.name}.{self.name}: the inflow of {amount(flow, 'flow')} at {amount(t, 'time')} enters at "
+            "critical depth, because the water inside runs off faster than waves or is shallow; give the `depth` "
+            "of a supercritical inflow"
+        )
+        return [
+            Notice(
+                "range", f"nodes.{basin.name}", text, f"patches.{self.name}.discharge", flow, limit
+            )
+        ]
 
 
 def inflow_watches(basin) -> list[InflowWatch]:
     """Watches of the scheduled inflows without `depth`; the output of a control is not known in advance."""
-    return [InflowWatch(basin, name) for name, patch in basin.part.patches.items()
-            if not patch.is_interior and patch.discharge is not None and patch.depth is None
-            and patch.discharge.kind != "control"]  # fmt: skip
+    return [
+        InflowWatch(basin, name)
+        for name, patch in basin.part.patches.items()
+        if not patch.is_interior
+        and patch.discharge is not None
+        and patch.depth is None
+        and patch.discharge.kind != "control"
+    ]

@@ -66,13 +66,24 @@ class MarkedFaces(NamedTuple):
 @njit
 def marked_faces(tables, basin):
     """`MarkedFaces` of a basin."""
-    rows, marks, faces = basin["mark_rows"], basin["marks"], basin["marked_faces"]
-    integers, plane, work = tables.integers[basin["marked"] :], tables.plane[basin["crests"] :], basin["marked_work"]
+    rows = basin["mark_rows"]
+    marks = basin["marks"]
+    faces = basin["marked_faces"]
+    integers = tables.integers[basin["marked"] :]
+    plane = tables.plane[basin["crests"] :]
+    work = basin["marked_work"]
     return MarkedFaces(
-        integers[: rows + 1], integers[rows + 1 :][:marks], integers[rows + 1 + marks :][:marks],
-        plane[:faces], plane[faces : 2 * faces], plane[2 * faces : 3 * faces], plane[3 * faces : 4 * faces],
-        plane[4 * faces : 5 * faces], tables.work[work : work + faces], tables.work[work + faces :],
-    )  # fmt: skip
+        integers[: rows + 1],
+        integers[rows + 1 :][:marks],
+        integers[rows + 1 + marks :][:marks],
+        plane[:faces],
+        plane[faces : 2 * faces],
+        plane[2 * faces : 3 * faces],
+        plane[3 * faces : 4 * faces],
+        plane[4 * faces : 5 * faces],
+        tables.work[work : work + faces],
+        tables.work[work + faces :],
+    )
 
 
 @njit
@@ -101,7 +112,11 @@ def flux_over_bed(g, a, b, u, v, low, high):
     a, b : depths over the bed of the face before and after it; u, v : normal velocities; low, high : wave speeds
     """
     per = 1.0 / (high - low + TINY)
-    wa, wb, mix, qa, qb = high * per, -(low * per), high * low * per, a * u, b * v
+    wa = high * per
+    wb = -(low * per)
+    mix = high * low * per
+    qa = a * u
+    qb = b * v
     flow, rise = (wa * (qa * u) + wb * (qb * v)) + mix * (qb - qa), 0.5 * g * ((b - a) * (b + a))
     return (wa * qa + wb * qb) + mix * (b - a), flow + wb * rise, flow - wa * rise
 
@@ -111,7 +126,13 @@ def blend(share, first, second):
     """(1 - share) times each of five values `first`, plus share times each of `second`."""
     a, b, c, d, e = first
     f, g, h, i, j = second
-    return a + share * (f - a), b + share * (g - b), c + share * (h - c), d + share * (i - d), e + share * (j - e)
+    return (
+        a + share * (f - a),
+        b + share * (g - b),
+        c + share * (h - c),
+        d + share * (i - d),
+        e + share * (j - e),
+    )
 
 
 @njit
@@ -132,15 +153,19 @@ def flux_of_weir(q, cosine, sine, before, after):
     """
     (h, _, u, s, c), (k, _, v, t, d) = before, after
     first, second = u * cosine + s * sine, v * cosine + t * sine
-    drift = (t * cosine - v * sine) - (s * cosine - u * sine)  # difference of the velocities along the wall
+    # difference of the velocities along the wall
+    drift = (t * cosine - v * sine) - (s * cosine - u * sine)
     mass, push = cosine * q, cosine * (first + abs(first) + c) * (h * first - q)
     pull = cosine * (second - abs(second) - d) * (k * second - q)
     change = mass * drift
     lost, gained = (0.0, -change) if q > 0.0 else (change, 0.0)
     return (
-        mass, mass * u - lost * sine + push * cosine, mass * v - gained * sine + pull * cosine,
-        mass * s + lost * cosine + push * sine, mass * t + gained * cosine + pull * sine,
-    )  # fmt: skip
+        mass,
+        mass * u - lost * sine + push * cosine,
+        mass * v - gained * sine + pull * cosine,
+        mass * s + lost * cosine + push * sine,
+        mass * t + gained * cosine + pull * sine,
+    )
 
 
 @njit
@@ -152,7 +177,9 @@ def flux_over_wall(g, crest, height, size, cosine, sine, before, after, low, hig
     speed : bound of the change of the flow by a level where laws are blended [m/s], else 0
     """
     e, f = before[1], after[1]
-    top, tail, speed = max(e, f) - crest, min(e, f) - crest, 0.0
+    top = max(e, f) - crest
+    tail = min(e, f) - crest
+    speed = 0.0
     without = share_without(crest, height, e, f)
     plain = flux_without_law(g, e - before[0], before, after, low, high)
     if without == 1.0:
@@ -188,13 +215,16 @@ def flatten_across(marks, ny, j, first, last, before, here, after, sides):
     first, last : columns; before, here, after : values of rows j - 1, j, j + 1; sides : values at the faces of row j
     """
     if marks is not None:
-        for row in range(min(max(j, 1), ny - 1), max(min(j + 1, ny - 1), 1) + 1):  # rows -1 and ny are mirror images
+        # rows -1 and ny are mirror images
+        for row in range(min(max(j, 1), ny - 1), max(min(j + 1, ny - 1), 1) + 1):
             next_row = after if (row == j + 1 and j >= 0) or j == ny else before
             for m in range(marks.first[row], marks.first[row + 1]):
                 k, n = marks.place[m] - first, marks.number[m]
                 if 0 <= k < last - first:
                     e, beyond = here[k + SURFACE], next_row[k + SURFACE]
-                    flatten(share_without(marks.crest[n], marks.height[n], e, beyond), here, k, sides, k)
+                    flatten(
+                        share_without(marks.crest[n], marks.height[n], e, beyond), here, k, sides, k
+                    )
 
 
 @njit
@@ -206,7 +236,9 @@ def flatten_along(marks, row, nx, first, last, cells, sides):
     """
     if marks is not None:
         for m in range(marks.first[row], marks.first[row + 1]):
-            i, k, n = marks.place[m], marks.place[m] - first, marks.number[m]
+            i = marks.place[m]
+            k = marks.place[m] - first
+            n = marks.number[m]
             if -1 <= k <= last - first + 1:
                 e, beyond = cells[k + 1 + SURFACE], cells[k + 2 + SURFACE]
                 share = share_without(marks.crest[n], marks.height[n], e, beyond)
@@ -234,18 +266,30 @@ def close_marked(g, marks, row, first, count, axes, sides, f, kx, ky, top):
     (normal, along), (left, right, l, r) = axes, sides
     turn = 1.0 if normal == EAST else -1.0  # y is to the left of x, -x to the left of y
     for m in range(marks.first[row], marks.first[row + 1]):
-        i, k, n = marks.place[m], marks.place[m] - first, marks.number[m]
+        i = marks.place[m]
+        k = marks.place[m] - first
+        n = marks.number[m]
         if not 0 <= k < count:
             continue
         if marks.height[n] > 0.0:
-            wave, ua, ub = max(l[k + WAVE], r[k + WAVE]), l[k + normal], r[k + normal]
+            wave = max(l[k + WAVE], r[k + WAVE])
+            ua = l[k + normal]
+            ub = r[k + normal]
             before = left[k], left[k + SURFACE], left[k + normal], left[k + along], l[k + WAVE]
             after = right[k], right[k + SURFACE], right[k + normal], right[k + along], r[k + WAVE]
             low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
             flux, speed = flux_over_wall(
-                g, marks.crest[n], marks.height[n], marks.size[n], marks.cosine[n], turn * marks.sine[n],
-                before, after, low, high,
-            )  # fmt: skip
+                g,
+                marks.crest[n],
+                marks.height[n],
+                marks.size[n],
+                marks.cosine[n],
+                turn * marks.sine[n],
+                before,
+                after,
+                low,
+                high,
+            )
             f[k], f[k + BEFORE], f[k + AFTER], f[k + ALONG], beyond = flux
             marks.spare[n] = beyond - f[k + ALONG]
             if speed > 0.0:
@@ -254,7 +298,9 @@ def close_marked(g, marks, row, first, count, axes, sides, f, kx, ky, top):
                     top[k] = max(top[k], speed * kx[i - 1] + west * ky[0])
                     top[k + 1] = max(top[k + 1], speed * kx[i] + east * ky[0])
                 else:
-                    top[k + 1] = max(top[k + 1], speed * max(ky[0], ky[1]) + max(west, east) * kx[i])
+                    top[k + 1] = max(
+                        top[k + 1], speed * max(ky[0], ky[1]) + max(west, east) * kx[i]
+                    )
         marks.flows[n] = f[k]
 
 
@@ -282,7 +328,9 @@ def flatten_cells(marks, mesh, j, cells, sides):
         for m in range(marks.first[4 * j + k], marks.first[4 * j + k + 1]):
             i, number = marks.place[m], max(marks.number[m], ~marks.number[m])
             beyond = cells[1, mesh.places[(slot * INDICES + CELL) * BLOCK + i]]
-            share = share_without(marks.crest[number], marks.height[number], cells[1, at + i], beyond)
+            share = share_without(
+                marks.crest[number], marks.height[number], cells[1, at + i], beyond
+            )
             for field in range(4):
                 here = cells[field, at + i]
                 for side in range(mesh.slots):

@@ -33,39 +33,52 @@ class SurfaceStart(VelocityStart):
     """Keys of the table `start` of water that is not at rest at the start."""
 
     level: Annotated[
-        SpatialField | None, SpatialFieldKey("length", "level of the free surface above the elevation [m]")
+        SpatialField | None,
+        SpatialFieldKey("length", "level of the free surface above the elevation [m]"),
     ] = None
 
 
 SOIL_KEYS = {  # model of infiltration -> its keys
-    "constant": ("rate",), "horton": ("initial", "final", "decay"),
+    "constant": ("rate",),
+    "horton": ("initial", "final", "decay"),
     "green-ampt": ("conductivity", "suction", "deficit"),
-}  # fmt: skip
+}
 
 
 class Infiltration(Table):
     """Soil into which water infiltrates: each number is a value, a formula of x and y, or points of a file."""
 
-    model: Annotated[str, Choice("model", tuple(SOIL_KEYS), "law of the infiltration capacity", changes=SHAPE)]
-    rate: Annotated[SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity [m/s]", nonnegative)] = None
+    model: Annotated[
+        str, Choice("model", tuple(SOIL_KEYS), "law of the infiltration capacity", changes=SHAPE)
+    ]
+    rate: Annotated[
+        SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity [m/s]", nonnegative)
+    ] = None
     initial: Annotated[
-        SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity at the start [m/s]", nonnegative)
+        SpatialField | None,
+        SpatialFieldKey("rainfall", "infiltration capacity at the start [m/s]", nonnegative),
     ] = None
     final: Annotated[
-        SpatialField | None, SpatialFieldKey("rainfall", "infiltration capacity after a long time [m/s]", nonnegative)
+        SpatialField | None,
+        SpatialFieldKey("rainfall", "infiltration capacity after a long time [m/s]", nonnegative),
     ] = None
     decay: Annotated[
-        SpatialField | None, SpatialFieldKey("frequency", "rate of decay from initial to final [1/s]", nonnegative)
+        SpatialField | None,
+        SpatialFieldKey("frequency", "rate of decay from initial to final [1/s]", nonnegative),
     ] = None
     conductivity: Annotated[
-        SpatialField | None, SpatialFieldKey("rainfall", "hydraulic conductivity of the wetted soil [m/s]", nonnegative)
+        SpatialField | None,
+        SpatialFieldKey("rainfall", "hydraulic conductivity of the wetted soil [m/s]", nonnegative),
     ] = None
     suction: Annotated[
-        SpatialField | None, SpatialFieldKey("length", "suction head at the wetting front [m]", nonnegative)
+        SpatialField | None,
+        SpatialFieldKey("length", "suction head at the wetting front [m]", nonnegative),
     ] = None
     deficit: Annotated[
         SpatialField | None,
-        SpatialFieldKey("number", "moisture deficit, porosity minus water content [-]", between(0, 1)),
+        SpatialFieldKey(
+            "number", "moisture deficit, porosity minus water content [-]", between(0, 1)
+        ),
     ] = None
 
     @classmethod
@@ -95,13 +108,20 @@ class FaceWall(Table):
 
     line: Annotated[
         tuple[tuple[float, float], ...] | None,
-        PointList(2, "points of a line; the wall is on the faces between the cells on both of its sides"),
+        PointList(
+            2, "points of a line; the wall is on the faces between the cells on both of its sides"
+        ),
     ] = None
-    group: Annotated[str | None, Text("group of lines of the mesh file on which the wall is, instead of `line`")] = None
-    crest: Annotated[float, Quantity("level", anything, "height of its crest above the elevation of the basin [m]")]
-    coefficient: Annotated[float, Number(between(0.01, 1.0), "coefficient C of the weir [-]", WEIR_COEFFICIENTS)] = (
-        COEFFICIENTS["broad"]
-    )
+    group: Annotated[
+        str | None, Text("group of lines of the mesh file on which the wall is, instead of `line`")
+    ] = None
+    crest: Annotated[
+        float,
+        Quantity("level", anything, "height of its crest above the elevation of the basin [m]"),
+    ]
+    coefficient: Annotated[
+        float, Number(between(0.01, 1.0), "coefficient C of the weir [-]", WEIR_COEFFICIENTS)
+    ] = COEFFICIENTS["broad"]
 
     def chain(self, mesh) -> Any:
         """`FaceChain` of the wall in a mesh; without faces for an unknown group."""
@@ -129,15 +149,28 @@ class FreeSurface(Physics, name="free-surface"):
     """Depth h, flow per width q: h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
-    fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **VELOCITY_FIELDS}
+    fields: ClassVar[dict[str, str]] = {
+        "depth": "level",
+        "surface": "level",
+        "bed": "level",
+        **VELOCITY_FIELDS,
+    }
     maxima: ClassVar[dict[str, str]] = {
-        "max_depth": "level", "max_surface": "level", "max_speed": "velocity", "max_hazard": "unit_flow",
-        "arrival_time": "time", "wet_duration": "time",
-    }  # fmt: skip
+        "max_depth": "level",
+        "max_surface": "level",
+        "max_speed": "velocity",
+        "max_hazard": "unit_flow",
+        "arrival_time": "time",
+        "wet_duration": "time",
+    }
     totals: ClassVar[dict[str, str]] = {
-        "volume": "volume", "wet_area": "area", "rain": "flow", "rained": "volume", "infiltration": "flow",
+        "volume": "volume",
+        "wet_area": "area",
+        "rain": "flow",
+        "rained": "volume",
+        "infiltration": "flow",
         "infiltrated": "volume",
-    }  # fmt: skip
+    }
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
     starts: ClassVar[type[VelocityStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
@@ -151,40 +184,57 @@ class FreeSurface(Physics, name="free-surface"):
 
     level: Annotated[
         float,
-        Quantity("level", anything, "level of the water at rest above the elevation [m]; required for a free surface"),
+        Quantity(
+            "level",
+            anything,
+            "level of the water at rest above the elevation [m]; required for a free surface",
+        ),
     ]
     bed: Annotated[
         SpatialField | None,
-        SpatialFieldKey("length", "height of the bed of a free surface above the elevation [m]; default 0"),
+        SpatialFieldKey(
+            "length", "height of the bed of a free surface above the elevation [m]; default 0"
+        ),
     ] = None
     manning: Annotated[
         float | SpatialField | None,
         NumberOrField(
             Quantity("number", nonnegative, usual=MANNING_RANGE),
-            "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction", VALUE,
+            "Manning's n of the bed of a free surface [s/m^(1/3)]; default: no friction",
+            VALUE,
         ),
-    ] = None  # fmt: skip
+    ] = None
     factor: Annotated[
         float | None,
         Quantity(
-            "number", nonnegative,
+            "number",
+            nonnegative,
             "Darcy friction factor of the bed of a free surface, instead of `manning` [-]; default: no friction",
-            UsualRange(0.002, 3.0, "glass to boulders"), VALUE,
+            UsualRange(0.002, 3.0, "glass to boulders"),
+            VALUE,
         ),
-    ] = None  # fmt: skip
+    ] = None
 
     rain: Annotated[
         Schedule | SpatialSeries | None,
         ScheduledField(
-            "rainfall", nonnegative, "rate of rain on the basin [m/s]; default: none",
-            RAIN, needs_unit=True,
+            "rainfall",
+            nonnegative,
+            "rate of rain on the basin [m/s]; default: none",
+            RAIN,
+            needs_unit=True,
         ),
-    ] = None  # fmt: skip
+    ] = None
     infiltration: Annotated[
-        Infiltration | None, Nested(Infiltration, "soil into which water infiltrates; default: none")
+        Infiltration | None,
+        Nested(Infiltration, "soil into which water infiltrates; default: none"),
     ] = None
     walls: Annotated[
-        Any, NamedTables(FaceWall, "walls on faces between cells: { levee = { line, crest } } or { group, crest }")
+        Any,
+        NamedTables(
+            FaceWall,
+            "walls on faces between cells: { levee = { line, crest } } or { group, crest }",
+        ),
     ] = None
 
     @classmethod
@@ -233,6 +283,8 @@ class FreeSurface(Physics, name="free-surface"):
         stated = basin.elevation is not None or basin.bed is not None
         return {
             "elevation": (basin.elevation or 0.0) + height if stated else None,
-            "depth": float(np.average(np.maximum(basin.level - bed[cells], 0.0), weights=area[cells])),
+            "depth": float(
+                np.average(np.maximum(basin.level - bed[cells], 0.0), weights=area[cells])
+            ),
             "pressure": None,
         }

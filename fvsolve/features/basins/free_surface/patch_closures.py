@@ -145,7 +145,10 @@ def excess(g, z, faces, target, rest, levels, flows):
 def first_level(g, faces, target):
     """First estimate of the level of a patch: mean surface of wet faces, or critical inflow over the lowest dry bed."""
     h, e, _, lengths = faces
-    wet, total, low, wide = 0.0, 0.0, e[0], 0.0
+    wet = 0.0
+    total = 0.0
+    low = e[0]
+    wide = 0.0
     for m in range(h.size):
         wide += lengths[m]
         low = min(low, e[m])
@@ -181,7 +184,9 @@ def solve_level(g, faces, target, rest, levels, flows):
     if f < 0.0:
         rise = LEAST_RISE
         while excess(g, high, faces, target, rest, levels, flows)[0] < 0.0 and rise < 1e9:
-            low, high, rise = high, high + rise, 4.0 * rise
+            low = high
+            high = high + rise
+            rise = 4.0 * rise
         if rise >= 1e9:  # the flow is not finite
             return z
     else:
@@ -211,12 +216,15 @@ def uniform_depth(g, h, e, u, conveyance):
 
     conveyance : sqrt(slope) / Manning's n [m^(1/3)/s]; h, e, u : as for `face_flow`
     """
-    low, high, z = e - h, e + max(h, LEAST_RISE), e
+    low = e - h
+    high = e + max(h, LEAST_RISE)
+    z = e
     for _ in range(ITERATIONS):
         q, change, depth = face_flow(g, z, h, e, u)
         deep = h + (z - e)
         root = 1.0 / cube_root_reciprocal(deep) if deep > 0.0 else 0.0
-        f, slope = q + conveyance * deep * root * root, change + 5.0 / 3.0 * conveyance * root * root
+        f = q + conveyance * deep * root * root
+        slope = change + 5.0 / 3.0 * conveyance * root * root
         if f == 0.0:
             break
         if f < 0.0:
@@ -259,7 +267,9 @@ def read_faces(tables, patch, y):
 
     They are depth, surface above the level at rest, inward velocity, and length of the faces. y : deviations of cells
     """
-    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    integers = tables.integers
     count, at = patch["faces"], patch["normals"]
     h, e, u, lengths = faces_inside(tables, patch)
     for m in range(count):
@@ -270,7 +280,8 @@ def read_faces(tables, patch, y):
             h[m], e[m], u[m] = read_around(tables, patch, m, y)
         elif inner != k and h[m] > 0.0:
             depth, surface, inward = read_cell(plane, basin, inner, nx, ny, y)
-            if depth > 0.0:  # linear extrapolation from two cells, as in the ghost cells of the rates
+            # linear extrapolation from two cells, as in the ghost cells of the rates
+            if depth > 0.0:
                 h[m] = 0.5 * (h[m] + max(2.0 * h[m] - depth, 0.0))
                 e[m] += 0.5 * (e[m] - surface)
                 u[m] += 0.5 * (u[m] - inward)
@@ -287,18 +298,28 @@ def read_around(tables, patch, m, y):
     The state at the mirror image of the centre is written to the rows from BEYOND on. Both are the values of the cell
     behind plus the sum of weights times differences of the STENCIL cells around it from this cell, if all are wet.
     """
-    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    integers = tables.integers
     count, (first, outer) = patch["faces"], driven_range(basin)
     nx, ny = plane[patch["normals"] + m], plane[patch["normals"] + count + m]
     k, second = integers[patch["ring"] + count + m], integers[patch["second"] + STENCIL * m :]
     weights = plane[patch["weights"] + 2 * STENCIL * m :]
     h, e, u = read_cell(plane, basin, k, nx, ny, y)
-    v = read_cell(plane, basin, k, -ny, nx, y)[2]  # along the face: not extrapolated, or its differences would grow
-    deeper, higher, faster, wet = 0.0, 0.0, 0.0, h > 0.0
-    bed, surface, across = e - h, e, u
+    # along the face: not extrapolated, or its differences would grow
+    v = read_cell(plane, basin, k, -ny, nx, y)[2]
+    deeper = 0.0
+    higher = 0.0
+    faster = 0.0
+    wet = h > 0.0
+    bed = e - h
+    surface = e
+    across = u
     for j in range(STENCIL):
         depth, level, inward = read_cell(plane, basin, second[j], nx, ny, y)
-        near, far, wet = weights[2 * j], weights[2 * j + 1], wet and depth > 0.0
+        near = weights[2 * j]
+        far = weights[2 * j + 1]
+        wet = wet and depth > 0.0
         deeper += near * (depth - h)
         higher += near * (level - e)
         faster += near * (inward - u)
@@ -306,11 +327,20 @@ def read_around(tables, patch, m, y):
         surface += far * (level - e)
         across += far * (inward - u)
     if not wet:
-        deeper, higher, faster, bed, surface, across = 0.0, 0.0, 0.0, e - h, e, u
+        deeper = 0.0
+        higher = 0.0
+        faster = 0.0
+        bed = e - h
+        surface = e
+        across = u
     at = first + BEYOND * outer + integers[patch["ring"] + m]
     tables.work[at], tables.work[at + outer] = bed, surface
-    tables.work[at + 2 * outer], tables.work[at + 3 * outer] = v * ny - across * nx, -across * ny - v * nx
-    c = sqrt(tables.settings[0]["gravity"] * h)  # differences of the velocity are bounded as at other sides of the cell
+    tables.work[at + 2 * outer], tables.work[at + 3 * outer] = (
+        v * ny - across * nx,
+        -across * ny - v * nx,
+    )
+    # differences of the velocity are bounded as at other sides of the cell
+    c = sqrt(tables.settings[0]["gravity"] * h)
     depth, level = min(max(h + deeper, 0.5 * h), 2.0 * h), e + higher
     if depth != h + deeper:  # the bed is no lower than that of the cell and the extrapolated one
         level = max(level, (e - h) + min(higher - deeper, 0.0) + depth)
@@ -344,13 +374,19 @@ def read_faces_around(tables, patch, y):
     A face has the higher of the beds of both cells. Its depth is at most twice that of the cell of the patch, from
     which its flow comes. y : deviations of cells
     """
-    basin, plane, integers = tables.basins[patch["basin"]], tables.plane, tables.integers
-    count, at, beds = patch["faces"], patch["normals"], tables.basins[patch["basin"]]["plan"]
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    integers = tables.integers
+    count = patch["faces"]
+    at = patch["normals"]
+    beds = tables.basins[patch["basin"]]["plan"]
     h, e, u, lengths = faces_inside(tables, patch)
     for m in range(count):
         k, own = integers[patch["ring"] + count + m], integers[patch["second"] + m]
         depth, surface, u[m] = read_cell(plane, basin, k, plane[at + m], plane[at + count + m], y)
-        step = (plane[beds + basin["n"] + own] - plane[beds + own]) - (plane[beds + basin["n"] + k] - plane[beds + k])
+        step = (plane[beds + basin["n"] + own] - plane[beds + own]) - (
+            plane[beds + basin["n"] + k] - plane[beds + k]
+        )
         above = depth - max(step, 0.0)  # of the surface over the bed of the face
         within = max(plane[beds + own] + y[basin["y"] + own], 0.0)
         h[m], e[m] = min(max(above, 0.0), 2.0 * within), surface + max(-above, 0.0)
@@ -367,9 +403,13 @@ def level_of_patch(tables, patch, g, faces, t, out):
     """
     empty = tables.plane[:0]
     if patch["closure"] == LINKED or patch["closure"] == INTERIOR:
-        st, layout, valve = tables.settings[0], tables.layout[0], tables.valves[patch["valve"]]
+        st = tables.settings[0]
+        layout = tables.layout[0]
+        valve = tables.valves[patch["valve"]]
         pressure = valve["drop"] + out[layout["pressure"] + valve["from_node"]]
-        return patch["lowest"] + pressure / (st["rho"] * g), out[layout["valve"] + patch["valve"]] / st["rho"]
+        return patch["lowest"] + pressure / (st["rho"] * g), out[
+            layout["valve"] + patch["valve"]
+        ] / st["rho"]
     if patch["closure"] == STAGE:
         return schedule_value(tables, patch["drive"], t) - patch["rest"], 0.0
     if patch["closure"] == DISCHARGE:
@@ -388,7 +428,9 @@ def close_face(plane, patch, m, g, z, h, e, u):
     if patch["closure"] == CRITICAL:
         q, _, depth = face_flow(g, e - h, h, e, u)
     elif patch["closure"] == NORMAL_SLOPE:
-        q, _, depth = face_flow(g, uniform_depth(g, h, e, u, plane[patch["conveyance"] + m]), h, e, u)
+        q, _, depth = face_flow(
+            g, uniform_depth(g, h, e, u, plane[patch["conveyance"] + m]), h, e, u
+        )
     else:
         q, _, depth = face_flow(g, z, h, e, u)
     return q, depth
@@ -402,12 +444,26 @@ def close_patch(tables, patch, t, y, out):
     During outflow above critical the fraction of the discharge that leaves is written to the node's outflow fraction.
     What links draw beyond critical outflow is supplied from outside.
     """
-    layout, basin, node = tables.layout[0], tables.basins[patch["basin"]], tables.nodes[patch["node"]]
-    g, faces, (first, outer) = tables.settings[0]["gravity"], read_faces(tables, patch, y), driven_range(basin)
-    rows, (h, e, u, lengths) = tables.work[first : first + ROWS * outer].reshape((ROWS, outer)), faces
+    layout = tables.layout[0]
+    basin = tables.basins[patch["basin"]]
+    node = tables.nodes[patch["node"]]
+    g, faces, (first, outer) = (
+        tables.settings[0]["gravity"],
+        read_faces(tables, patch, y),
+        driven_range(basin),
+    )
+    rows, (h, e, u, lengths) = (
+        tables.work[first : first + ROWS * outer].reshape((ROWS, outer)),
+        faces,
+    )
     z, target = level_of_patch(tables, patch, g, faces, t, out)
     shut = patch["closure"] == LINKED and target == 0.0
-    total, surface, wet, wide, held, low = 0.0, 0.0, 0.0, 0.0, 1.0, z
+    total = 0.0
+    surface = 0.0
+    wet = 0.0
+    wide = 0.0
+    held = 1.0
+    low = z
     given = schedule_value(tables, patch["depth"], t) if patch["depth"] >= 0 else 0.0
     for m in range(h.size):
         k = tables.integers[patch["ring"] + m]
@@ -435,9 +491,13 @@ def close_patch(tables, patch, t, y, out):
         rows[SPEED, k] = abs(u_face) + sqrt(g * depth) if depth > 0.0 else DRY_FACE
     if patch["closure"] == LINKED:
         if held < 1.0:
-            out[layout["supply"] + patch["node"]] = tables.settings[0]["rho"] * (held - 1.0) * target
+            out[layout["supply"] + patch["node"]] = (
+                tables.settings[0]["rho"] * (held - 1.0) * target
+            )
         return
-    own = patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    own = (
+        patch["closure"] == CRITICAL or patch["closure"] == NORMAL_SLOPE or given > 0.0 or z <= low
+    )
     rise = (surface / wet if own and wet > 0.0 else z) - patch["lowest"]
     out[layout["pressure"] + patch["node"]] = tables.settings[0]["rho"] * g * rise
     out[layout["outflow_fraction"] + node["row"]] = held
@@ -471,7 +531,11 @@ def close_patches(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == OWN_CODE and patch["closure"] != NO_CLOSURE and patch["closure"] != INTERIOR:
+        if (
+            basin["kind"] == OWN_CODE
+            and patch["closure"] != NO_CLOSURE
+            and patch["closure"] != INTERIOR
+        ):
             close_patch(tables, patch, t, deviations_of(basin, tables.seen, y), out)
 
 
@@ -489,8 +553,11 @@ def observe_froude(t, y, out, handle, values):
             for m in range(patch["faces"]):
                 k = at + tables.integers[patch["ring"] + m]
                 cell = tables.integers[patch["ring"] + patch["faces"] + m]
-                q, square = tables.work[k + FLOW * basin["outer"]], tables.work[k + MOMENTUM * basin["outer"]]
-                wave = max(tables.work[k + SPEED * basin["outer"]], 0.0) - (square / abs(q) if q != 0.0 else 0.0)
+                q = tables.work[k + FLOW * basin["outer"]]
+                square = tables.work[k + MOMENTUM * basin["outer"]]
+                wave = max(tables.work[k + SPEED * basin["outer"]], 0.0) - (
+                    square / abs(q) if q != 0.0 else 0.0
+                )
                 length = lengths[m] * tables.plane[basin["area"] + cell]
                 total += length * q
                 critical += length * wave * wave * wave / g

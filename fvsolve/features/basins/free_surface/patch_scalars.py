@@ -21,7 +21,9 @@ OWN_CODE = physics_code(__package__)
 @njit(forceinline=True)
 def flow_index(basin, k):
     """Index in `tables.work` of the flow, read by the schemes of advection, through boundary face k of a basin."""
-    nx, ny, first = basin["nx"], basin["ny"], basin["flows"]
+    nx = basin["nx"]
+    ny = basin["ny"]
+    first = basin["flows"]
     if nx == 0:
         return first + basin["faces"] - basin["outer"] + k
     if k < 2 * ny:
@@ -35,13 +37,17 @@ def outflow_of_face(tables, patch, basin, q, y, m):
     """(flow per width [m2/s] into the basin, value of scalar q in the cell behind) of face m of a patch."""
     k = tables.integers[patch["ring"] + m]
     i = tables.integers[patch["ring"] + patch["faces"] + m]
-    return tables.work[basin["driven"] + FLOW * basin["outer"] + k], cell_value(tables, basin, q, y, i)
+    return tables.work[basin["driven"] + FLOW * basin["outer"] + k], cell_value(
+        tables, basin, q, y, i
+    )
 
 
 @njit
 def leaving(tables, patch, basin, q, y):
     """(flow [m3/s], amount of scalar q in it) out through the faces of a patch."""
-    total, amount, lengths = 0.0, 0.0, faces_inside(tables, patch)[3]
+    total = 0.0
+    amount = 0.0
+    lengths = faces_inside(tables, patch)[3]
     for m in range(patch["faces"]):
         flow, value = outflow_of_face(tables, patch, basin, q, y, m)
         total -= lengths[m] * min(flow, 0.0)
@@ -66,7 +72,9 @@ def values_at_faces(t, y, dydt, out, handle):
         for q in range(tables.scalars.size):
             total, amount = leaving(tables, patch, basin, q, seen)
             if total > 0.0:
-                out[tables.layout[0]["value"] + q * tables.nodes.size + patch["node"]] = amount / total
+                out[tables.layout[0]["value"] + q * tables.nodes.size + patch["node"]] = (
+                    amount / total
+                )
         for m in range(patch["faces"]):
             tables.work[flow_index(basin, tables.integers[patch["ring"] + m])] = 0.0
 
@@ -92,7 +100,9 @@ def add_face_flows(t, y, dydt, out, handle):
 @njit
 def add_through_faces(tables, patch, basin, q, y, rate, out):
     """Add the flows of scalar q through the faces of a patch to the rates of its amounts per area."""
-    valve, layout, at = tables.valves[patch["valve"]], tables.layout[0], patch["normals"] + 2 * patch["faces"]
+    valve = tables.valves[patch["valve"]]
+    layout = tables.layout[0]
+    at = patch["normals"] + 2 * patch["faces"]
     total, amount = leaving(tables, patch, basin, q, y)
     entering = max(out[layout["valve"] + patch["valve"]], 0.0) / tables.settings[0]["rho"]
     amount += entering * out[layout["value"] + q * tables.nodes.size + valve["from_node"]]
@@ -107,9 +117,15 @@ def add_through_faces(tables, patch, basin, q, y, rate, out):
 @njit
 def add_inside(tables, patch, basin, q, y, rate, out):
     """Add the flow of scalar q into or out of the cells of an interior patch to the rates of its amounts per area."""
-    layout, node, plane = tables.layout[0], patch["node"], tables.plane
-    flow, at = out[layout["net"] + node] + out[layout["supply"] + node], q * tables.nodes.size + node
-    inflow, volume = (out[layout["scalar_inflow"] + at] + out[layout["gain"] + at]) / tables.settings[0]["rho"], 0.0
+    layout = tables.layout[0]
+    node = patch["node"]
+    plane = tables.plane
+    flow = out[layout["net"] + node] + out[layout["supply"] + node]
+    at = q * tables.nodes.size + node
+    inflow = (out[layout["scalar_inflow"] + at] + out[layout["gain"] + at]) / tables.settings[0][
+        "rho"
+    ]
+    volume = 0.0
     for m in range(patch["count"] if flow < 0.0 else 0):
         i = tables.integers[patch["first"] + m]
         volume += plane[basin["area"] + i] * depth_at_patch(plane, basin, i, y)
@@ -118,6 +134,11 @@ def add_inside(tables, patch, basin, q, y, rate, out):
         i = tables.integers[patch["first"] + m]
         if flow < 0.0:
             depth = depth_at_patch(plane, basin, i, y)
-            rate[i] += flow / (tables.settings[0]["rho"] * volume) * depth * cell_value(tables, basin, q, y, i)
+            rate[i] += (
+                flow
+                / (tables.settings[0]["rho"] * volume)
+                * depth
+                * cell_value(tables, basin, q, y, i)
+            )
         else:
             rate[i] += inflow / patch_area(tables, patch)

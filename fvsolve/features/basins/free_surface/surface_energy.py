@@ -19,7 +19,13 @@ from fvsolve.features.basins.boundary_cells import (
     weighted_volume,
 )
 from fvsolve.features.basins.free_surface.bed_friction import drag_per_flow
-from fvsolve.features.basins.free_surface.patch_closures import FLOW, MOMENTUM, SURFACE, driven_faces, faces_inside
+from fvsolve.features.basins.free_surface.patch_closures import (
+    FLOW,
+    MOMENTUM,
+    SURFACE,
+    driven_faces,
+    faces_inside,
+)
 from fvsolve.features.basins.free_surface.surface_rows import THIN
 from fvsolve.features.basins.moving_walls import area_growth_rate
 from fvsolve.jit import njit
@@ -64,18 +70,24 @@ def water_power(st, basin, plane, y, dydt, rows):
     """
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
-    weight, rest, area = st["rho"] * st["gravity"], rest_potential(st, basin), plane[basin["area"] :]
+    weight = st["rho"] * st["gravity"]
+    rest = rest_potential(st, basin)
+    area = plane[basin["area"] :]
     drawn, rough = plane[basin["drawn"] :], plane[basin["roughness"] :]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
+        d = y[o + i]
+        qx = y[o + n + i]
+        qy = y[o + 2 * n + i]
         depth = max(depths[i] + d, 0.0)
         share = velocity_factor(depth)
         u, v = share * qx, share * qy
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
         kinetic = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
         rate += drawn[i] * (level * dydt[o + i] + st["rho"] * kinetic)
-        friction += area[i] * drag_power(st, basin, rough[i], depth, sqrt(qx * qx + qy * qy), u * u + v * v)
+        friction += area[i] * drag_power(
+            st, basin, rough[i], depth, sqrt(qx * qx + qy * qy), u * u + v * v
+        )
     rows[2], rows[3] = friction, rate
 
 
@@ -98,8 +110,14 @@ def patch_loss(tables, patch, flow, y):
 
     flow : [kg/s], positive into the cells at the patch, negative out of them
     """
-    st, basin, plane, integers = tables.settings[0], tables.basins[patch["basin"]], tables.plane, tables.integers
-    n, o, total, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
+    st = tables.settings[0]
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    integers = tables.integers
+    n = basin["n"]
+    o = basin["y"]
+    total = 0.0
+    leaves = flow < 0.0
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
     each = flow / weighted_volume(tables, patch, leaves, y)
     for m in range(patch["count"]):
@@ -108,11 +126,18 @@ def patch_loss(tables, patch, flow, y):
         square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
         total += 0.5 * area[i] * square * each * flow_weight(plane, basin, leaves, i, y)
     for m in range(patch["faces"]):
-        i, at, count = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
+        i = integers[patch["ring"] + patch["faces"] + m]
+        at = patch["normals"]
+        count = patch["faces"]
         depth = max(depths[i] + y[o + i], 0.0)
         share, wide = velocity_factor(depth), plane[at + 2 * count + m] * plane[basin["drawn"] + i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
-        away = -each * flow_weight(plane, basin, leaves, i, y) * patch_area(tables, patch) / patch_length(tables, patch)
+        away = (
+            -each
+            * flow_weight(plane, basin, leaves, i, y)
+            * patch_area(tables, patch)
+            / patch_length(tables, patch)
+        )
         along = u * plane[at + m] + v * plane[at + count + m]
         net_outflow = away - st["rho"] * depth * along  # at a wall the inflow of momentum is lost
         total -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * net_outflow
@@ -128,8 +153,15 @@ def face_loss(tables, patch, flow, y, out):
     flow : mass flow into the cells [kg/s]. Its power is that at the pressure of the cells: the loss from the junction
     to this pressure is that of the restriction `law_patch_face`.
     """
-    st, basin, plane, count = tables.settings[0], tables.basins[patch["basin"]], tables.plane, patch["faces"]
-    n, o, g, rho, at = basin["n"], basin["y"], st["gravity"], st["rho"], patch["normals"]
+    st = tables.settings[0]
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    count = patch["faces"]
+    n = basin["n"]
+    o = basin["y"]
+    g = st["gravity"]
+    rho = st["rho"]
+    at = patch["normals"]
     rows, (h, e, _, lengths) = driven_faces(tables, basin).values, faces_inside(tables, patch)
     total, rest = 0.0, rest_potential(st, basin)
     for m in range(count):
@@ -137,10 +169,14 @@ def face_loss(tables, patch, flow, y, out):
         share = velocity_factor(max(plane[basin["plan"] + i] + y[o + i], 0.0))
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
         inward = -(u * plane[at + m] + v * plane[at + count + m])
-        square, q, depth = u * u + v * v, rows[FLOW, k], max(h[m] + (rows[SURFACE, k] - e[m]), 0.0)
+        square = u * u + v * v
+        q = rows[FLOW, k]
+        depth = max(h[m] + (rows[SURFACE, k] - e[m]), 0.0)
         push = rows[MOMENTUM, k] + 0.5 * g * ((depth - h[m]) * (depth + h[m]))
         level = rest + rho * (g * (plane[basin["plan"] + n + i] + y[o + i]) - 0.5 * square)
-        total += lengths[m] * (q * level + rho * (inward * push + min(q, 0.0) * (square - inward * inward)))
+        total += lengths[m] * (
+            q * level + rho * (inward * push + min(q, 0.0) * (square - inward * inward))
+        )
     return total_pressure(tables, out, patch["node"]) * flow / rho - total
 
 
@@ -150,8 +186,15 @@ def interior_loss(tables, patch, flow, y, dydt, out):
 
     flow : mass flow into the cells [kg/s]. Its power is that at the pressure of the cells, as in `face_loss`.
     """
-    st, basin, plane = tables.settings[0], tables.basins[patch["basin"]], tables.plane
-    n, o, g, rho, total, volume = basin["n"], basin["y"], st["gravity"], st["rho"], 0.0, 0.0
+    st = tables.settings[0]
+    basin = tables.basins[patch["basin"]]
+    plane = tables.plane
+    n = basin["n"]
+    o = basin["y"]
+    g = st["gravity"]
+    rho = st["rho"]
+    total = 0.0
+    volume = 0.0
     rest, leaves = rest_potential(st, basin), flow < 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -171,13 +214,18 @@ def interior_loss(tables, patch, flow, y, dydt, out):
 def add_stored(t, y, dydt, out, handle, stored):
     """Write the stored energy of all basins of water, relative to that at rest, to `stored` [J]."""
     tables = open_tables(handle)
-    st, basins, plane = tables.settings[0], tables.basins, tables.plane
+    st = tables.settings[0]
+    basins = tables.basins
+    plane = tables.plane
     weight = st["rho"] * st["gravity"]
     for b in range(basins.size):
         basin, total = basins[b], 0.0
         if basin["kind"] != OWN_CODE:
             continue
-        n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["area"] :]
+        n = basin["n"]
+        o = basin["y"]
+        rest = rest_potential(st, basin)
+        area = plane[basin["area"] :]
         depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
         for i in range(n):
             d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
@@ -202,7 +250,14 @@ def add_wall_power(t, y, dydt, out, handle, power):
         basin = tables.basins[b]
         for i in range(basin["n"] if is_moving(basin) else 0):
             depth = max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
-            spent = 0.5 * st["rho"] * st["gravity"] * depth * depth * area_growth_rate(t, tables, basin, y, i)
+            spent = (
+                0.5
+                * st["rho"]
+                * st["gravity"]
+                * depth
+                * depth
+                * area_growth_rate(t, tables, basin, y, i)
+            )
             power[basin_first_row(tables, power, b) + 3] -= plane[basin["drawn"] + i] * spent
 
 
@@ -210,11 +265,15 @@ def add_wall_power(t, y, dydt, out, handle, power):
 def add_wall_stored(t, y, dydt, out, handle, stored):
     """Add the energy of water at rest [J] on the area that cells have gained by the motion of walls to `stored`."""
     tables = open_tables(handle)
-    st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
+    st = tables.settings[0]
+    plane = tables.plane
+    first = stored.size - tables.basins.size
     weight = st["rho"] * st["gravity"]
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         for i in range(basin["n"] if is_moving(basin) else 0):
             depth, surface = plane[basin["plan"] + i], plane[basin["plan"] + basin["n"] + i]
             rest_energy = depth * (rest_potential(st, basin) + weight * (surface - 0.5 * depth))
-            stored[first + b] += (plane[basin["area"] + i] - plane[basin["drawn"] + i]) * rest_energy
+            stored[first + b] += (
+                plane[basin["area"] + i] - plane[basin["drawn"] + i]
+            ) * rest_energy

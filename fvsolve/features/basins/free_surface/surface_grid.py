@@ -30,13 +30,22 @@ from fvsolve.features.basins.free_surface.marked_faces import (
     flatten_along,
 )
 from fvsolve.features.basins.free_surface.patch_closures import FLOW, MOMENTUM, SPEED, SURFACE
-from fvsolve.features.basins.free_surface.surface_rows import EAST, GHOSTS, HIGH, MAX_COLUMNS, NORTH, STRIDE
+from fvsolve.features.basins.free_surface.surface_rows import (
+    EAST,
+    GHOSTS,
+    HIGH,
+    MAX_COLUMNS,
+    NORTH,
+    STRIDE,
+)
 from fvsolve.jit import inline, njit
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
 RING = 8  # stored rows of cells
 REACH = 3  # greatest stencil radius of the rates, in rows
-BLOCK, SIDE, FLUX = rows_of.FIELDS * STRIDE, rows_of.SIDES * STRIDE, rows_of.FLUXES * STRIDE
+BLOCK = rows_of.FIELDS * STRIDE
+SIDE = rows_of.SIDES * STRIDE
+FLUX = rows_of.FLUXES * STRIDE
 WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # length of the work array of `grid_rates`
 MOVING = WORK + 3 * STRIDE
 
@@ -110,9 +119,13 @@ def open_work(work):
     at = RING * BLOCK
     sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
     fluxes, at = work[at : at + 3 * FLUX], at + 3 * FLUX
-    deep, top, speeds = work[at : at + STRIDE], work[at + STRIDE : at + 2 * STRIDE], work[WORK : WORK + STRIDE]
+    deep = work[at : at + STRIDE]
+    top = work[at + STRIDE : at + 2 * STRIDE]
+    speeds = work[WORK : WORK + STRIDE]
     ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]
-    return RowArrays(work[: RING * BLOCK], sides, fluxes, ends, along, deep, top, speeds, work[WORK + STRIDE :])
+    return RowArrays(
+        work[: RING * BLOCK], sides, fluxes, ends, along, deep, top, speeds, work[WORK + STRIDE :]
+    )
 
 
 @njit(forceinline=True)
@@ -156,15 +169,26 @@ def put_row(grid, j, first, last, states, rows, moves, faces):
     A row beyond the grid is computed from the rows inside, which must be in the buffer. The greatest rates of columns
     are updated.
     """
-    nx, ny, fifth = grid.nx, grid.ny, is_fifth_order(grid.scheme)
+    nx = grid.nx
+    ny = grid.ny
+    fifth = is_fifth_order(grid.scheme)
     fields, reach = (rows_of.FIELDS, 3) if fifth else (rows_of.FLOW_EAST // STRIDE, 2)
-    left, right, walls = max(first - GHOSTS, 0), min(last + GHOSTS, nx), grid.reflect.size > 0
+    left = max(first - GHOSTS, 0)
+    right = min(last + GHOSTS, nx)
+    walls = grid.reflect.size > 0
     if j < 0 or j >= ny:
         put_row_beyond(grid, j, first, last, fields, rows, moves, faces)
         return
-    a, b, cells, kx = j * nx + left, j * nx + right, rows.cells[ring_offset(j, left - first) :], grid.kx[left:right]
-    dh, qx, qy = states[0][a:b], states[1][a:b], states[2][a:b]
-    depths, surfaces, top = grid.plan[0, a:b], grid.plan[1, a:b], rows.top[GHOSTS + left - first :]
+    a = j * nx + left
+    b = j * nx + right
+    cells = rows.cells[ring_offset(j, left - first) :]
+    kx = grid.kx[left:right]
+    dh = states[0][a:b]
+    qx = states[1][a:b]
+    qy = states[2][a:b]
+    depths = grid.plan[0, a:b]
+    surfaces = grid.plan[1, a:b]
+    top = rows.top[GHOSTS + left - first :]
     if moves is None:
         rows_of.put_cells(grid.g, depths, surfaces, dh, qx, qy, kx, grid.ky[j], None, cells, top)
         if fifth:
@@ -176,13 +200,17 @@ def put_row(grid, j, first, last, states, rows, moves, faces):
             rows_of.put_flows(qx, qy, factors, cells)
     block, end = rows.cells[ring_offset(j, -GHOSTS) :], GHOSTS + nx - 1 - first
     if left == 0:
-        rows_of.put_ghost_end(fields, reach, grid.reflect[j] if walls else 1.0, block, GHOSTS, -1, nx)
+        rows_of.put_ghost_end(
+            fields, reach, grid.reflect[j] if walls else 1.0, block, GHOSTS, -1, nx
+        )
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[0], block, GHOSTS, -1)
         if faces is not None and faces.values[SPEED, j] != 0.0 and nx > 1:
             rows_of.extrapolate_ghosts(fields, reach, block, GHOSTS, -1)
     if right == nx:
-        rows_of.put_ghost_end(fields, reach, grid.reflect[ny + j] if walls else 1.0, block, end, 1, nx)
+        rows_of.put_ghost_end(
+            fields, reach, grid.reflect[ny + j] if walls else 1.0, block, end, 1, nx
+        )
         if moves is not None and moves.speed_x.size > 0:
             rows_of.correct_ghost_end(fields, reach, moves.speed_x[nx], block, end, 1)
         if faces is not None and faces.values[SPEED, ny + j] != 0.0 and nx > 1:
@@ -195,14 +223,22 @@ def put_row_beyond(grid, j, first, last, fields, rows, moves, faces):
 
     fields : number of quantities of a cell
     """
-    nx, ny, n, walls = grid.nx, grid.ny, last - first, grid.reflect
+    nx = grid.nx
+    ny = grid.ny
+    n = last - first
+    walls = grid.reflect
     edge = 0 if j < 0 else ny - 1
     mirror = min(-1 - j, ny - 1) if j < 0 else max(2 * ny - 1 - j, 0)
     at, cells = 2 * ny + first if j < 0 else 2 * ny + nx + first, rows.cells[ring_offset(j, 0) :]
     if walls.size > 0:
         walls = walls[at : at + n]
     rows_of.put_ghost_row(
-        n, fields, walls, rows.cells[ring_offset(edge, 0) :], rows.cells[ring_offset(mirror, 0) :], cells
+        n,
+        fields,
+        walls,
+        rows.cells[ring_offset(edge, 0) :],
+        rows.cells[ring_offset(mirror, 0) :],
+        cells,
     )
     if moves is not None and moves.speed_y.size > 0:
         rows_of.correct_ghost_row(n, fields, moves.speed_y[0 if j < 0 else ny], cells)
@@ -275,7 +311,9 @@ def grid_rates(grid, begin, stop, states, flows, work, rates, moves, faces):
     most = 0.0
     for first in range(0, grid.nx, MAX_COLUMNS):
         last = min(first + MAX_COLUMNS, grid.nx)
-        rate = column_rates(grid, begin, stop, True, first, last, states, flows, work, rates, moves, faces)
+        rate = column_rates(
+            grid, begin, stop, True, first, last, states, flows, work, rates, moves, faces
+        )
         most = max(most, rate)
     return most
 
@@ -336,7 +374,11 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves, faces):
 
     Arguments as in `column_rates`
     """
-    g, n, nx, ny, is_side = grid.g, last - first, grid.nx, grid.ny, j == 0 or j == grid.ny
+    g = grid.g
+    n = last - first
+    nx = grid.nx
+    ny = grid.ny
+    is_side = j == 0 or j == grid.ny
     fifth, at = is_fifth_order(grid.scheme), 2 * ny + first + (nx if j > 0 else 0)
     low, under = rows.sides[(j & 1) * SIDE :], rows.sides[((j - 1) & 1) * SIDE + HIGH :]
     before, here = rows.cells[ring_offset(j - 1, 0) :], rows.cells[ring_offset(j, 0) :]
@@ -350,15 +392,26 @@ def put_fluxes_across(grid, j, first, last, rows, flows, moves, faces):
         rows_of.put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, rows.speeds)
         if is_side:
             rest = grid.plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
-            close_walls(g, moves.speed_y[j], rest, low if j == 0 else under, north, moves.thrust[at : at + n])
+            close_walls(
+                g,
+                moves.speed_y[j],
+                rest,
+                low if j == 0 else under,
+                north,
+                moves.thrust[at : at + n],
+            )
     if fifth and ny < REACH and is_side:
         close_fixed_walls(grid.reflect[at : at + n], north, n)
     if faces is not None and is_side:
         cells, side, turn = (here, low, 1.0) if j == 0 else (before, under, -1.0)
-        ky, kx, top = grid.ky[min(j, ny - 1) : min(j, ny - 1) + 1], grid.kx[first:last], rows.top[GHOSTS:]
+        ky = grid.ky[min(j, ny - 1) : min(j, ny - 1) + 1]
+        kx = grid.kx[first:last]
+        top = rows.top[GHOSTS:]
         close_driven(g, faces.values[:, at : at + n], turn, EAST, cells, ky, kx, side, north, top)
     ky, top = grid.ky[max(j - 1, 0) : j + 1], rows.top[GHOSTS - 1 :]
-    close_marked(g, grid.marks, j, first, n, (NORTH, EAST), (under, low, l, r), north, grid.kx, ky, top)
+    close_marked(
+        g, grid.marks, j, first, n, (NORTH, EAST), (under, low, l, r), north, grid.kx, ky, top
+    )
     if flows.y.size > 0:
         copy(north, flows.y[j * nx + first : j * nx + last])
     if flows.through.size > 0 and is_side:
@@ -371,15 +424,23 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
 
     Arguments as in `column_rates`
     """
-    g, n, nx, ny, fifth = grid.g, last - first, grid.nx, grid.ny, is_fifth_order(grid.scheme)
+    g = grid.g
+    n = last - first
+    nx = grid.nx
+    ny = grid.ny
+    fifth = is_fifth_order(grid.scheme)
     cell, after = rows.cells[ring_offset(j, -1) :], rows.cells[ring_offset(j, 0) :]
-    a, b, e = rows.cells[ring_offset(j, -3) :], rows.cells[ring_offset(j, -2) :], rows.cells[ring_offset(j, 1) :]
+    a = rows.cells[ring_offset(j, -3) :]
+    b = rows.cells[ring_offset(j, -2) :]
+    e = rows.cells[ring_offset(j, 1) :]
     count = (n + 8) // 8 * 8
     size = (n + 9) // 8 * 8  # padded to whole vectors
     put_values(grid, size, grid.kerbs[j], (a, b, cell, after, e), rows.ends, rows.deep)
     if grid.scheme == MUSCL:
         flatten_along(grid.marks, ny + 1 + j, nx, first, last, b, rows.ends)
-    along, left, right = rows.along, rows.ends[HIGH:], rows.ends[1:]
+    along = rows.along
+    left = rows.ends[HIGH:]
+    right = rows.ends[1:]
     l, r = (left, right) if fifth else (cell, after)  # cells that bound wave speeds
     if moves is None or moves.speed_x.size == 0:
         rows_of.put_fluxes(g, count, EAST, NORTH, left, right, l, r, along, None)
@@ -389,19 +450,44 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
         if first == 0:
             close_walls(g, moves.speed_x[0], rest, right, along, thrust[j : j + 1])
         if last == nx:
-            close_walls(g, moves.speed_x[nx], rest[nx - 1 :], left[n:], along[n:], thrust[ny + j : ny + j + 1])
+            close_walls(
+                g,
+                moves.speed_x[nx],
+                rest[nx - 1 :],
+                left[n:],
+                along[n:],
+                thrust[ny + j : ny + j + 1],
+            )
     if fifth and nx < REACH:
         close_fixed_walls(grid.reflect[j : j + 1], along, 1)
         close_fixed_walls(grid.reflect[ny + j : ny + j + 1], along[n:], 1)
     if faces is not None:
-        kx, ky, top = grid.kx, grid.ky[j : j + 1], rows.top[GHOSTS:]
+        kx = grid.kx
+        ky = grid.ky[j : j + 1]
+        top = rows.top[GHOSTS:]
         if first == 0 and faces.values[SPEED, j] != 0.0:
-            close_driven(g, faces.values[:, j : j + 1], 1.0, NORTH, after, kx[:1], ky, right, along, top)
+            close_driven(
+                g, faces.values[:, j : j + 1], 1.0, NORTH, after, kx[:1], ky, right, along, top
+            )
         if last == nx and faces.values[SPEED, ny + j] != 0.0:
             east, end = faces.values[:, ny + j : ny + j + 1], n - 1
-            close_driven(g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:])
+            close_driven(
+                g, east, -1.0, NORTH, after[end:], kx[nx - 1 :], ky, left[n:], along[n:], top[end:]
+            )
     ky, top = grid.ky[j : j + 1], rows.top[GHOSTS - 1 :]
-    close_marked(g, grid.marks, ny + 1 + j, first, n + 1, (EAST, NORTH), (left, right, l, r), along, grid.kx, ky, top)
+    close_marked(
+        g,
+        grid.marks,
+        ny + 1 + j,
+        first,
+        n + 1,
+        (EAST, NORTH),
+        (left, right, l, r),
+        along,
+        grid.kx,
+        ky,
+        top,
+    )
     if flows.x.size > 0:
         copy(along, flows.x[j * (nx + 1) + first : j * (nx + 1) + last + 1])
     if flows.through.size > 0 and first == 0:
@@ -413,15 +499,24 @@ def put_fluxes_along(grid, j, first, last, rows, flows, moves, faces):
 @inline
 def put_row_rates(grid, j, first, last, rows, rates, moves):
     """Write the rates of row j from the fluxes through its faces; arguments as in `column_rates`."""
-    a, z, kx, ky = j * grid.nx + first, j * grid.nx + last, grid.kx[first:last], grid.ky[j]
+    a = j * grid.nx + first
+    z = j * grid.nx + last
+    kx = grid.kx[first:last]
+    ky = grid.ky[j]
     was = j & 1
     south, north = rows.fluxes[was * FLUX :], rows.fluxes[(1 - was) * FLUX :]
     push_x, push_y = rows.ends[rows_of.PUSH + 1 :], rows.sides[was * SIDE + rows_of.PUSH :]
-    to_h, to_x, to_y = rates[0][a:z], rates[1][a:z], rates[2][a:z]
+    to_h = rates[0][a:z]
+    to_x = rates[1][a:z]
+    to_y = rates[2][a:z]
     if moves is None:
-        rows_of.put_rates(grid.g, kx, ky, push_x, push_y, rows.along, south, north, None, to_h, to_x, to_y)
+        rows_of.put_rates(
+            grid.g, kx, ky, push_x, push_y, rows.along, south, north, None, to_h, to_x, to_y
+        )
     else:
         wide, _ = factors_of(j, first, last, moves, rows.factors)
-        rows_of.put_rates(grid.g, kx, ky, push_x, push_y, rows.along, south, north, wide, to_h, to_x, to_y)
+        rows_of.put_rates(
+            grid.g, kx, ky, push_x, push_y, rows.along, south, north, wide, to_h, to_x, to_y
+        )
     add_forces_along(grid.marks, j, first, last, grid.ky[j : j + 1], to_x)
     add_forces_along(grid.marks, grid.ny + 1 + j, first, last, kx, to_y)

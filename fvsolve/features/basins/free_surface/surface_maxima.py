@@ -31,8 +31,12 @@ def update_row(t, least, depths, dh, qx, qy, row, n):
     dh, qx, qy : deviations of depth [m], unit flows [m2/s]
     row : numbers of the cells in `maxima`; n : number of all cells of the row
     """
-    depth, speed, hazard = row[:n], row[n : 2 * n], row[2 * n : 3 * n]
-    wet, arrival, duration = row[3 * n : 4 * n], row[4 * n : 5 * n], row[5 * n : 6 * n]
+    depth = row[:n]
+    speed = row[n : 2 * n]
+    hazard = row[2 * n : 3 * n]
+    wet = row[3 * n : 4 * n]
+    arrival = row[4 * n : 5 * n]
+    duration = row[5 * n : 6 * n]
     for i in range(dh.size):
         h, square = depths[i] + dh[i], qx[i] * qx[i] + qy[i] * qy[i]
         now = 1.0 if h > least else 0.0
@@ -57,13 +61,18 @@ def record_maxima(t, y, out, handle, values):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["maxima"] < 0:
             continue
-        n, o, size = basin["n"], basin["y"], basin["maxima_row"]
+        n = basin["n"]
+        o = basin["y"]
+        size = basin["maxima_row"]
         wide, (first, end) = size // QUANTITIES, band_cells(tables, b)
         if end - first == n and tables.joint.size > 0 and tables.joint[BAND] > 0:
             continue
         for j in range(first // wide, (end + wide - 1) // wide):
             a, z = max(j * wide, first), min((j + 1) * wide, end)
             at = basin["maxima"] + j * size
-            depths, row = tables.plane[basin["plan"] + a : basin["plan"] + z], tables.maxima[at : at + size]
-            dh, qx, qy = y[o + a : o + z], y[o + n + a : o + n + z], y[o + 2 * n + a : o + 2 * n + z]
+            depths = tables.plane[basin["plan"] + a : basin["plan"] + z]
+            row = tables.maxima[at : at + size]
+            dh = y[o + a : o + z]
+            qx = y[o + n + a : o + n + z]
+            qy = y[o + 2 * n + a : o + 2 * n + z]
             update_row(t, basin["wet_depth"], depths, dh, qx, qy, row[a - j * wide :], wide)

@@ -18,9 +18,29 @@ import numpy as np
 
 from fvsolve.core.kernels.dtypes import UPWIND
 from fvsolve.features.basins import cell_sides as side
-from fvsolve.features.basins.cell_sides import BLOCK, HUGE, INDICES, MEASURES, TINY, gather, limited_sides, ring_place
-from fvsolve.features.basins.free_surface.marked_faces import MarkedFaces, flatten_cells, flux_over_wall, save_sums
-from fvsolve.features.basins.free_surface.patch_closures import BEYOND, FLOW, MOMENTUM, SPEED, DrivenFaces
+from fvsolve.features.basins.cell_sides import (
+    BLOCK,
+    HUGE,
+    INDICES,
+    MEASURES,
+    TINY,
+    gather,
+    limited_sides,
+    ring_place,
+)
+from fvsolve.features.basins.free_surface.marked_faces import (
+    MarkedFaces,
+    flatten_cells,
+    flux_over_wall,
+    save_sums,
+)
+from fvsolve.features.basins.free_surface.patch_closures import (
+    BEYOND,
+    FLOW,
+    MOMENTUM,
+    SPEED,
+    DrivenFaces,
+)
 from fvsolve.features.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.features.basins.free_surface.surface_rows import THIN
 from fvsolve.features.basins.mesh_blocks import own_sides
@@ -28,14 +48,18 @@ from fvsolve.jit import inline, njit
 
 # Greatest `wide_by`: with 2, exact for linear fields, ripples on a lake over a rough bed gain energy.
 MOST_OVERSHOOT = 1.5
-SMOOTH = 1.0 / 16.0  # part of the rise to a neighbour that the bend of a smooth bed may reach, which is no kerb
+# part of the rise to a neighbour that the bend of a smooth bed may reach, which is no kerb
+SMOOTH = 1.0 / 16.0
 DEPTH, SURFACE = 0, 1  # rows of plan: depth of the profile, its surface above the level
 FIELDS, ROWS_OF_CELLS, SHOWN = 4, 6, 2  # see `mesh_blocks`
 
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sums for the step, flow through the side.
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _OUTFLOW, MASS = (k * BLOCK for k in range(1, 11))
-_NX, _NY, _REACH = side.NX * BLOCK, side.NY * BLOCK, side.REACH * BLOCK
-TOP, _SHORE = 11 * BLOCK, 12 * BLOCK  # greatest rates; allowed differences of the surface, see `put_shores`
+_NX = side.NX * BLOCK
+_NY = side.NY * BLOCK
+_REACH = side.REACH * BLOCK
+# greatest rates; allowed differences of the surface, see `put_shores`
+TOP, _SHORE = 11 * BLOCK, 12 * BLOCK
 _PUSH = 13 * BLOCK  # of moving sides: thrust minus that of the cell's own depth
 ROWS = 14
 SUMS = _RH, _RX, _RY, _FAST, _OUTFLOW
@@ -70,9 +94,21 @@ def begin(w):
 @inline
 def put_cells(water, mesh, j, states, cells, phi):
     """Write depth, surface, velocities and wave speed of block j of cells."""
-    a, z, o, (dh, qx, qy), plan = j * BLOCK, min((j + 1) * BLOCK, mesh.n), (j % mesh.ring) * BLOCK, states, water.plan
-    h, e, u, v, c = cells[0, o:], cells[1, o:], cells[2, o:], cells[3, o:], cells[4, o:]
-    put_primitives(water.g, plan[DEPTH, a:z], plan[SURFACE, a:z], dh[a:z], qx[a:z], qy[a:z], h, e, u, v, c)
+    a, z, o, (dh, qx, qy), plan = (
+        j * BLOCK,
+        min((j + 1) * BLOCK, mesh.n),
+        (j % mesh.ring) * BLOCK,
+        states,
+        water.plan,
+    )
+    h = cells[0, o:]
+    e = cells[1, o:]
+    u = cells[2, o:]
+    v = cells[3, o:]
+    c = cells[4, o:]
+    put_primitives(
+        water.g, plan[DEPTH, a:z], plan[SURFACE, a:z], dh[a:z], qx[a:z], qy[a:z], h, e, u, v, c
+    )
     for i in range(z - a):
         cells[5, o + i] = plan[SURFACE, a + i] - plan[DEPTH, a + i]
 
@@ -86,7 +122,9 @@ def kerbs_of(mesh, bed):
     inner, n = mesh.right >= 0, bed.size
     left, right = mesh.left[inner], mesh.right[inner]
     across, rise = mesh.centre[right] - mesh.centre[left], bed[right] - bed[left]
-    own, across, rise = np.append(left, right), np.append(across, -across, axis=0), np.append(rise, -rise)
+    own = np.append(left, right)
+    across = np.append(across, -across, axis=0)
+    rise = np.append(rise, -rise)
     weight = 1.0 / np.sum(across**2, axis=1)
     # what is added determines the plane of cells whose neighbours lie in a line
     squares, products = np.tile(1e-9 * np.eye(2), (n, 1, 1)), np.zeros((n, 2, 1))
@@ -117,10 +155,17 @@ def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
 @inline
 def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, moves):
     """Write the limited values at the sides of the cells of block j."""
-    floats, integers, wide_by = mesh.floats, mesh.integers, water.wide_by
+    floats = mesh.floats
+    integers = mesh.integers
+    wide_by = water.wide_by
     edges, b = mesh.edges[first:last], mesh.edges.size
-    o, shore, su, sv = (j % mesh.ring) * BLOCK, w[_SHORE:], shown[first:], shown[b + first :]
-    h, e, c = cells[0], cells[1], cells[4, o:]
+    o = (j % mesh.ring) * BLOCK
+    shore = w[_SHORE:]
+    su = shown[first:]
+    sv = shown[b + first :]
+    h = cells[0]
+    e = cells[1]
+    c = cells[4, o:]
     for q in range(first, last):
         i = ring_place(mesh.edges[q], mesh.ring)
         shown[q], shown[b + q] = cells[5, i], e[i]
@@ -132,7 +177,9 @@ def put_sides(water, mesh, j, first, last, reflect, cells, sides, shown, w, move
     side.limit_gathered(j, floats, integers, e, wide_by, shore, sv, edges, w, sides[1])
     for q in range(first, last):
         i = ring_place(mesh.edges[q], mesh.ring)
-        shown[q], shown[b + q] = mirrored_velocity(mesh, q, reflect, cells[2, i], cells[3, i], moves)
+        shown[q], shown[b + q] = mirrored_velocity(
+            mesh, q, reflect, cells[2, i], cells[3, i], moves
+        )
     put_beyond(water.faces, moves, mesh, first, last, BEYOND + 2, shown)
     put_depths(mesh.slots, h[o:], sides[0, 4 * o :], sides[1, 4 * o :])
     # Velocities differ by no more than the wave speed: next to a thin fast cell, a linear field would reverse the flow.
@@ -180,7 +227,9 @@ def mirrored_velocity(mesh, q, reflect, u, v, moves):
 
     At a wall that moves outward at the speed w, the normal velocity n becomes 2 w - n.
     """
-    nx, ny, r = mesh.nx[q], mesh.ny[q], reflect[mesh.number[q]] if reflect.size > 0 else 1.0
+    nx = mesh.nx[q]
+    ny = mesh.ny[q]
+    r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
     across = u * nx + v * ny
     if moves is not None:
         across -= moves.speeds[mesh.edges[q]]
@@ -198,13 +247,17 @@ def begin_block(water, mesh, j, states, w, phi):
 @inline
 def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, phi):
     """Subtract the outflow through side k of each cell of block j from the rates in `w`."""
-    slot, o, own = j * mesh.slots + k, (j % mesh.ring) * BLOCK, own_sides(water, mesh, j, k)
+    slot = j * mesh.slots + k
+    o = (j % mesh.ring) * BLOCK
+    own = own_sides(water, mesh, j, k)
     geo = mesh.floats[slot * MEASURES * BLOCK :]
     inside = sides[0, own:], sides[1, own:], sides[2, own:], sides[3, own:]
     gather(cells[4], mesh.places[slot * INDICES * BLOCK :], w[_C:])
     for q in range(first, last):
         i = mesh.edges[q] % BLOCK
-        w[_U + i], w[_V + i] = mirrored_velocity(mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves)
+        w[_U + i], w[_V + i] = mirrored_velocity(
+            mesh, q, reflect, sides[2, own + i], sides[3, own + i], moves
+        )
     centre = cells[0, o:], cells[1, o:], cells[4, o:]
     edges, number = mesh.edges[first:last], mesh.number[first:last]
     save_sums(water.marks, 4 * j + k, w, SUMS)
@@ -212,7 +265,9 @@ def add_side(water, mesh, j, k, first, last, reflect, cells, sides, w, moves, ph
     if moves is None:
         add_side_fluxes(water.g, damping, centre, inside, geo, w, None)
     else:
-        add_side_fluxes(water.g, damping, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :])
+        add_side_fluxes(
+            water.g, damping, centre, inside, geo, w, moves.speeds[(4 * j + k) * BLOCK :]
+        )
         rest = water.plan[DEPTH, j * BLOCK :]
         close_walls(water.g, edges, number, reflect, rest, cells[0, o:], geo, w, moves.thrust)
     close_driven(water.g, water.faces, edges, number, inside, cells[4, o:], geo, w)
@@ -233,9 +288,13 @@ def add_side_fluxes(g, damping, cells, inside, geo, w, speeds):
     """
     half, (h0, e0, c0), (hl, el, ul, vl) = 0.5 * g, cells, inside
     for i in range(BLOCK):
-        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        nx = geo[_NX + i]
+        ny = geo[_NY + i]
+        reach = geo[_REACH + i]
         bed = max(el[i] - hl[i], w[_E + i] - w[i])
-        a, b, c = max(0.0, el[i] - bed), max(0.0, w[_E + i] - bed), max(c0[i], w[_C + i])
+        a = max(0.0, el[i] - bed)
+        b = max(0.0, w[_E + i] - bed)
+        c = max(c0[i], w[_C + i])
         na, nb = ul[i] * nx + vl[i] * ny, w[_U + i] * nx + w[_V + i] * ny
         ta, tb = vl[i] * nx - ul[i] * ny, w[_V + i] * nx - w[_U + i] * ny
         if speeds is not None:
@@ -244,13 +303,16 @@ def add_side_fluxes(g, damping, cells, inside, geo, w, speeds):
         per_width = 1.0 / (high - low + TINY)
         qa, qb = a * na, b * nb
         mass = per_width * (high * qa - low * qb + high * low * (b - a))
-        flow = per_width * (high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa))
+        flow = per_width * (
+            high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa)
+        )
         flow += half * (hl[i] + h0[i]) * (el[i] - e0[i])
         if speeds is not None:
             flow += speeds[i] * mass
             w[_PUSH + i] = flow
         along = mass * (ta if mass > 0.0 else tb)
-        along -= damping * abs(c0[i] - w[_C + i]) * min(a, b) * (tb - ta)  # damps vortices of the size of cells
+        # damps vortices of the size of cells
+        along -= damping * abs(c0[i] - w[_C + i]) * min(a, b) * (tb - ta)
         w[_RH + i] -= reach * mass
         w[_RX + i] -= reach * (flow * nx - along * ny)
         w[_RY + i] -= reach * (flow * ny + along * nx)
@@ -288,10 +350,17 @@ def close_driven(g, faces, edges, number, inside, waves, geo, w):
         for q in range(edges.size):
             i, k = edges[q] % BLOCK, number[q]
             if driven[SPEED, k] != 0.0:
-                nx, ny, reach, flow = geo[_NX + i], geo[_NY + i], geo[_REACH + i], -driven[FLOW, k]
+                nx = geo[_NX + i]
+                ny = geo[_NY + i]
+                reach = geo[_REACH + i]
+                flow = -driven[FLOW, k]
                 across, along = u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny
                 depth = max(h[i] + (driven[DRIVEN_SURFACE, k] - e[i]), 0.0)
-                push = driven[MOMENTUM, k] + 0.5 * g * ((depth - h[i]) * (depth + h[i])) - w[MASS + i] * across
+                push = (
+                    driven[MOMENTUM, k]
+                    + 0.5 * g * ((depth - h[i]) * (depth + h[i]))
+                    - w[MASS + i] * across
+                )
                 drift = (max(flow, 0.0) - w[MASS + i]) * along
                 w[_RH + i] -= reach * (flow - w[MASS + i])
                 w[_RX + i] -= reach * (push * nx - drift * ny)
@@ -315,16 +384,26 @@ def close_marked(g, marks, row, centre, inside, geo, w):
         if marks.height[k] > 0.0:
             for q in range(len(SUMS)):
                 w[SUMS[q] + i] = marks.spare[q * BLOCK + m - marks.first[row]]
-            nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+            nx = geo[_NX + i]
+            ny = geo[_NY + i]
+            reach = geo[_REACH + i]
             before = h[i], e[i], u[i] * nx + v[i] * ny, v[i] * nx - u[i] * ny, c0[i]
             beyond, along = w[_U + i] * nx + w[_V + i] * ny, w[_V + i] * nx - w[_U + i] * ny
             after = w[i], w[_E + i], beyond, along, w[_C + i]
             c = max(c0[i], w[_C + i])
             low, high = min(min(before[2], beyond) - c, 0.0), max(max(before[2], beyond) + c, 0.0)
             (mass, push, _, drift, _), speed = flux_over_wall(
-                g, marks.crest[k], marks.height[k], marks.size[k], marks.cosine[k], marks.sine[k], before, after, low,
+                g,
+                marks.crest[k],
+                marks.height[k],
+                marks.size[k],
+                marks.cosine[k],
+                marks.sine[k],
+                before,
+                after,
+                low,
                 high,
-            )  # fmt: skip
+            )
             push += 0.5 * g * (h[i] + h0[i]) * (e[i] - e0[i])
             w[_RH + i] -= reach * mass
             w[_RX + i] -= reach * (push * nx - drift * ny)

@@ -20,15 +20,23 @@ from fvsolve.features.basins.free_surface.patch_closures import (
     read_faces_around,
 )
 from fvsolve.features.basins.free_surface.surface_rows import THIN
-from fvsolve.features.basins.free_surface.water_sources import infiltration, rain_rate, sum_of_products
+from fvsolve.features.basins.free_surface.water_sources import (
+    infiltration,
+    rain_rate,
+    sum_of_products,
+)
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
 DEPTH, VOLUME, WET_AREA, RAIN, RAINED, INFILTRATION, INFILTRATED = range(FIRST_OWN, FIRST_OWN + 7)
 TOTALS = {  # quantity of a whole basin -> code
-    "volume": VOLUME, "wet_area": WET_AREA, "rain": RAIN, "rained": RAINED, "infiltration": INFILTRATION,
+    "volume": VOLUME,
+    "wet_area": WET_AREA,
+    "rain": RAIN,
+    "rained": RAINED,
+    "infiltration": INFILTRATION,
     "infiltrated": INFILTRATED,
-}  # fmt: skip
+}
 
 
 @njit
@@ -41,13 +49,20 @@ def water_at_patch(tables, patch, y):
     bed.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
-    n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
+    n = basin["n"]
+    plan = basin["plan"]
+    low = inf
+    lowest = 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
         if bed < low:
             low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
-    rest, rise, depth, volume, squares = max(low, 0.0) if basin["frame"] < 0 else 0.0, 0.0, 0.0, 0.0, 0.0
+    rest = max(low, 0.0) if basin["frame"] < 0 else 0.0
+    rise = 0.0
+    depth = 0.0
+    volume = 0.0
+    squares = 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
         h = near.depth_at_patch(plane, basin, i, y)
@@ -69,10 +84,19 @@ def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
     Below the depth near.SHALLOW it is multiplied by `available_fraction`.
     rise, depth : results of `water_at_patch`
     """
-    at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
-    x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
+    at, (fx, fy, xx, xy, yy) = (
+        patch["sizes"] + 2,
+        potential_coefficients(plane, basin["frame"], 1.0),
+    )
+    x = plane[at]
+    y = plane[at + 1]
+    z = plane[at + 2]
+    profile = plane[at + 3]
     phi = x * (fx + xx * x + xy * y) + y * (fy + yy * y)
-    return near.available_fraction(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0) - profile
+    return (
+        near.available_fraction(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0)
+        - profile
+    )
 
 
 @njit
@@ -101,7 +125,9 @@ def patch_pressures(t, y, dydt, out, handle):
         spread = area * squares / (volume * volume) if volume > near.LEAST_DEPTH * area else 1.0
         pressure = slope * stored
         if basin["frame"] >= 0:
-            pressure = st["rho"] * bottom_pressure_at_patch(tables.plane, basin, patch, stored, depth)
+            pressure = st["rho"] * bottom_pressure_at_patch(
+                tables.plane, basin, patch, stored, depth
+            )
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["outflow_fraction"] + node["row"]] = near.available_fraction(depth)
@@ -121,7 +147,9 @@ def patch_flows(t, y, dydt, out, handle):
         inflow, seen = out[layout["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
         if patch["closure"] == INTERIOR:
             put_held_outflow(tables, patch, t, out)
-            add_interior_flow(tables, patch, inflow + out[layout["supply"] + patch["node"]], seen, dydt, out)
+            add_interior_flow(
+                tables, patch, inflow + out[layout["supply"] + patch["node"]], seen, dydt, out
+            )
         else:
             add_patch_flow(tables, patch, inflow, seen, dydt, out)
 
@@ -143,12 +171,17 @@ def add_interior_flow(tables, patch, inflow, y, dydt, out):
     The outflow takes its momentum along; the inflow has none. During outflow out[RATE], which limits the step, is
     raised to the fraction of the water that leaves in a second.
     """
-    plane, basin, leaves = tables.plane, tables.basins[patch["basin"]], inflow < 0.0
-    n, o, volume = basin["n"], basin["y"], 0.0
+    plane = tables.plane
+    basin = tables.basins[patch["basin"]]
+    leaves = inflow < 0.0
+    n = basin["n"]
+    o = basin["y"]
+    volume = 0.0
     for m in range(patch["count"] if leaves else 0):
         i = tables.integers[patch["first"] + m]
         volume += plane[basin["area"] + i] * near.depth_at_patch(plane, basin, i, y)
-    flow, least = inflow / tables.settings[0]["rho"], near.LEAST_DEPTH * near.patch_area(tables, patch)
+    flow = inflow / tables.settings[0]["rho"]
+    least = near.LEAST_DEPTH * near.patch_area(tables, patch)
     if leaves:
         out[RATE] = max(out[RATE], -2.0 * flow / max(volume, least))
         if volume < least:  # a film of nanometres cannot give it all: the rest comes from outside
@@ -172,9 +205,14 @@ def add_patch_flow(tables, patch, demand, y, dydt, out):
     The missing part of an outflow is written to `out` as a supply from outside. During outflow out[RATE], which limits
     the step, is raised too.
     """
-    st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    integers = tables.integers
+    plane = tables.plane
     basin, rho = tables.basins[patch["basin"]], st["rho"]
-    n, o, first = basin["n"], basin["y"], patch["first"]
+    n = basin["n"]
+    o = basin["y"]
+    first = patch["first"]
     _, depth, volume, _ = water_at_patch(tables, patch, y)
     leaves, available = demand < 0.0, 1.0
     total = near.weighted_volume(tables, patch, leaves, y)
@@ -186,20 +224,26 @@ def add_patch_flow(tables, patch, demand, y, dydt, out):
     flow = available * demand / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = integers[first + m]
-        dydt[o + i] += flow * near.flow_weight(plane, basin, leaves, i, y) * stretch_of_cell(plane, basin, i)
-    per_width = -flow * near.patch_area(tables, patch) / near.patch_length(tables, patch)  # over weights [m/s]
+        dydt[o + i] += (
+            flow * near.flow_weight(plane, basin, leaves, i, y) * stretch_of_cell(plane, basin, i)
+        )
+    # over weights [m/s]
+    per_width = -flow * near.patch_area(tables, patch) / near.patch_length(tables, patch)
     for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
         k = integers[patch["ring"] + patch["faces"] + m]
         out_per_width = per_width * near.flow_weight(plane, basin, leaves, k, y)
         h = near.depth_at_patch(plane, basin, k, y)
-        i, at, count = o + k, patch["normals"], patch["faces"]
+        i = o + k
+        at = patch["normals"]
+        count = patch["faces"]
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
         along_x, along_y = plane[at + m], plane[at + count + m]
         u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
         push = (abs(u) + sqrt(normal_gravity(st, plane, basin) * h)) * out_per_width
         add_link_momentum(plane, patch, m, push, dydt, i + n, i + 2 * n)
         if out_per_width > 0.0:  # outflow takes its tangential momentum along
-            across, per_area = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * count + m]
+            across = share * (y[i + 2 * n] * along_x - y[i + n] * along_y)
+            per_area = plane[at + 2 * count + m]
             dydt[i + n] += out_per_width * per_area * across * along_y
             dydt[i + 2 * n] -= out_per_width * per_area * across * along_x
 
@@ -211,12 +255,17 @@ def limit_inflow_rate(t, y, dydt, out, handle):
     Their speed is taken as sqrt(drop / rho), with the pressure drop across the valve.
     """
     tables = open_tables(handle)
-    st, valves, patches = tables.settings[0], tables.valves, tables.patches
+    st = tables.settings[0]
+    valves = tables.valves
+    patches = tables.patches
     for k in range(valves.size):
         drop = head_drop(tables, out, k)[1]
         receiver = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
         for p in range(patches.size if tables.nodes[receiver]["kind"] == PATCH else 0):
-            if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == OWN_CODE:
+            if (
+                patches[p]["node"] == receiver
+                and tables.basins[patches[p]["basin"]]["kind"] == OWN_CODE
+            ):
                 wide = sqrt(near.patch_area(tables, patches[p]) / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)
 
@@ -237,7 +286,11 @@ def observe_water(t, y, out, handle, values):
         else:
             depth, u, v = read_water(tables, probe, y)
             own = probe["side"] == DEPTH
-            values[k] = probe["scale"] * depth + probe["offset"] if own else velocity_value(probe["side"], u, v)
+            values[k] = (
+                probe["scale"] * depth + probe["offset"]
+                if own
+                else velocity_value(probe["side"], u, v)
+            )
 
 
 @njit
@@ -247,14 +300,17 @@ def total_of_basin(tables, basin, quantity, t, y):
         return rain_rate(tables, basin, t) * basin["total_area"]
     if quantity == RAINED:
         return y[basin["rained"]] * basin["total_area"] if basin["rain"] >= 0 else 0.0
-    total, n, soaks = 0.0, basin["n"], basin["soil"] != NO_SOIL
+    total = 0.0
+    n = basin["n"]
+    soaks = basin["soil"] != NO_SOIL
     if quantity == INFILTRATION:
         return infiltration(tables, basin, t, y) if soaks else 0.0
     if quantity == INFILTRATED:
         area, first = tables.plane[basin["area"] : basin["area"] + n], basin["infiltrated"]
         return sum_of_products(y[first : first + n], area) if soaks else 0.0
     for i in range(n):
-        area, depth = tables.plane[basin["area"] + i], near.depth_at_patch(tables.plane, basin, i, y)
+        area = tables.plane[basin["area"] + i]
+        depth = near.depth_at_patch(tables.plane, basin, i, y)
         total += area * depth if quantity == VOLUME else area if depth > basin["wet_depth"] else 0.0
     return total
 
@@ -265,7 +321,10 @@ def read_water(tables, probe, y):
 
     Velocities fade to zero in thin water.
     """
-    basin, total, u, v = tables.basins[probe["index"]], 0.0, 0.0, 0.0
+    basin = tables.basins[probe["index"]]
+    total = 0.0
+    u = 0.0
+    v = 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):
         i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]

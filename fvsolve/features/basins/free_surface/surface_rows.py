@@ -27,8 +27,10 @@ DEPTH, SURFACE, EAST, NORTH, WAVE, FLOW_EAST, FLOW_NORTH = (k * STRIDE for k in 
 LOW, HIGH, PUSH = (k * STRIDE for k in (0, 5, 10))
 MASS, BEFORE, AFTER, ALONG = (k * STRIDE for k in range(4))
 FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
-SMALL = 1e-20  # squares of differences below which WENO's weights are its linear weights [m2, m4/s2]
-LEAST_DEPTH_RATIO = 0.5  # shallowest of five depths over the deepest, below which values are limited
+# squares of differences below which WENO's weights are its linear weights [m2, m4/s2]
+SMALL = 1e-20
+# shallowest of five depths over the deepest, below which values are limited
+LEAST_DEPTH_RATIO = 0.5
 
 
 @inline
@@ -52,7 +54,9 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
         part = 2.0 * depth / (depth * depth + wet * wet)
         if factors is not None:
             part *= factors[1][i]
-        u, v, c = qx[i] * part, qy[i] * part, sqrt(g * depth)
+        u = qx[i] * part
+        v = qy[i] * part
+        c = sqrt(g * depth)
         rate = (abs(u) + c) * kx[i] + (abs(v) + c) * ky
         cells[i], cells[i + SURFACE], cells[i + EAST] = depth, surface0[i] + rise, u
         cells[i + NORTH], cells[i + WAVE] = v, c
@@ -145,7 +149,9 @@ def put_ghost_row(n, fields, walls, last, mirror, cells):
     """
     for f in range(fields):
         at = f * STRIDE
-        a, b, p = last[at:], mirror[at:], cells[at:]
+        a = last[at:]
+        b = mirror[at:]
+        p = cells[at:]
         sign = -1.0 if at == NORTH or at == FLOW_NORTH else 1.0
         if walls.size == 0:
             for i in range(n):
@@ -162,7 +168,12 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
     hl, el, ul, vl : depth, surface and velocities at the face before; hr, er, ur, vr : at the face after
     """
     sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
-    sides[i + HIGH], sides[i + (HIGH + SURFACE)], sides[i + (HIGH + EAST)], sides[i + (HIGH + NORTH)] = hr, er, ur, vr
+    (
+        sides[i + HIGH],
+        sides[i + (HIGH + SURFACE)],
+        sides[i + (HIGH + EAST)],
+        sides[i + (HIGH + NORTH)],
+    ) = hr, er, ur, vr
     sides[i + PUSH] = push
 
 
@@ -172,8 +183,17 @@ def put_with_velocities(limiter, i, a, b, before, here, after, sides):
 
     a, b : changes of depth and surface from the cell to the face after it; other arguments as for `put_limited`
     """
-    h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-    c, d = half_slopes(limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
+    h = here[i]
+    e = here[i + SURFACE]
+    u = here[i + EAST]
+    v = here[i + NORTH]
+    c, d = half_slopes(
+        limiter,
+        u - before[i + EAST],
+        after[i + EAST] - u,
+        v - before[i + NORTH],
+        after[i + NORTH] - v,
+    )
     put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
 
 
@@ -186,11 +206,16 @@ def put_sloped(limiter, n, before, here, after, sides):
     """
     for i in range(n):
         h, e = here[i], here[i + SURFACE]
-        below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
+        below = h - before[i]
+        above = after[i] - h
+        low = e - before[i + SURFACE]
+        high = after[i + SURFACE] - e
         bed, b = half_slopes(limiter, low - below, high - above, low, high)
         own, change = 0.5 * slope(limiter, below, above), b - bed
         most = max(0.5 * h - 4.0 * abs(change), 0.0)
-        put_with_velocities(limiter, i, own + min(max(change - own, -most), most), b, before, here, after, sides)
+        put_with_velocities(
+            limiter, i, own + min(max(change - own, -most), most), b, before, here, after, sides
+        )
 
 
 @inline
@@ -204,8 +229,13 @@ def put_sloped_at_kerbs(limiter, n, before, here, after, sides):
     """
     for i in range(n):
         h, e = here[i], here[i + SURFACE]
-        below, above, low, high = h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e
-        rise, next_rise, least = low - below, high - above, min(h, min(before[i], after[i]))
+        below = h - before[i]
+        above = after[i] - h
+        low = e - before[i + SURFACE]
+        high = after[i + SURFACE] - e
+        rise = low - below
+        next_rise = high - above
+        least = min(h, min(before[i], after[i]))
         is_kerb = abs(next_rise - rise) > (0.25 * h if least > THIN else HUGE)
         bed, b = half_slopes(limiter, rise, next_rise, low, high)
         steepest = 0.5 * min(abs(rise), abs(next_rise)) + 0.125 * least if is_kerb else HUGE
@@ -235,7 +265,10 @@ def put_limited(scheme, limiter, kerbs, n, before, here, after, sides):
     """
     if scheme == UPWIND:
         for i in range(n):
-            h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
+            h = here[i]
+            e = here[i + SURFACE]
+            u = here[i + EAST]
+            v = here[i + NORTH]
             put_side(i, h, e, u, v, h, e, u, v, 0.0, sides)
     elif kerbs > THIN and has_films(n, kerbs, here):
         by_limiter(put_sloped_at_kerbs, limiter, n, before, here, after, sides)
@@ -261,7 +294,11 @@ def put_smooth_flags(p, q, r, s, t, deep):
         j = i + SURFACE
         least = min(min(min(p[i], q[i]), min(s[i], t[i])), r[i])
         most = max(max(max(p[i], q[i]), max(s[i], t[i])), r[i])
-        a, b, c, d, e = p[j] - p[i], q[j] - q[i], r[j] - r[i], s[j] - s[i], t[j] - t[i]
+        a = p[j] - p[i]
+        b = q[j] - q[i]
+        c = r[j] - r[i]
+        d = s[j] - s[i]
+        e = t[j] - t[i]
         bend = 2.0 * (abs((b - c) + (d - c)) + abs((a - c) + (e - c)))
         deep[i] = 1.0 if least > max(LEAST_DEPTH_RATIO * most, bend) else 0.0
 
@@ -289,12 +326,19 @@ def put_depths(scheme, p, q, r, s, t, deep, low, high):
     """Write the depth at both faces where `deep` is 1: surface minus fifth-order bed; arguments as for `put_push`."""
     for i in range(deep.size):
         j = i + SURFACE
-        a, b, c, d, e = p[j] - p[i], q[j] - q[i], r[j] - r[i], s[j] - s[i], t[j] - t[i]
+        a = p[j] - p[i]
+        b = q[j] - q[i]
+        c = r[j] - r[i]
+        d = s[j] - s[i]
+        e = t[j] - t[i]
         if scheme == WENO5:
             x, y = value_weno5(e, d, c, b, a, SMALL), value_weno5(a, b, c, d, e, SMALL)
         else:
             x, y = value_upwind5(e, d, c, b, a), value_upwind5(a, b, c, d, e)
-        low[i], high[i] = (low[j] - x if deep[i] > 0.0 else low[i]), (high[j] - y if deep[i] > 0.0 else high[i])
+        low[i], high[i] = (
+            (low[j] - x if deep[i] > 0.0 else low[i]),
+            (high[j] - y if deep[i] > 0.0 else high[i]),
+        )
 
 
 @njit
@@ -307,7 +351,11 @@ def put_velocities(g, deep, side):
         depth = max(side[i], 0.0)
         wet = max(depth, THIN)
         part = 2.0 * depth / (depth * depth + wet * wet) if deep[i] > 0.0 else 1.0
-        side[i + EAST], side[i + NORTH], side[i + WAVE] = part * side[i + EAST], part * side[i + NORTH], sqrt(g * depth)
+        side[i + EAST], side[i + NORTH], side[i + WAVE] = (
+            part * side[i + EAST],
+            part * side[i + NORTH],
+            sqrt(g * depth),
+        )
 
 
 @njit
@@ -318,7 +366,8 @@ def put_push(p, q, r, s, t, low, high, deep, push):
     """
     for i in range(push.size):
         h, e = r[i], r[i + SURFACE]
-        h2, e2 = 3.0 * ((low[i] + high[i]) - 2.0 * h), 3.0 * ((low[i + SURFACE] + high[i + SURFACE]) - 2.0 * e)
+        h2 = 3.0 * ((low[i] + high[i]) - 2.0 * h)
+        e2 = 3.0 * ((low[i + SURFACE] + high[i + SURFACE]) - 2.0 * e)
         h3 = 0.5 * ((t[i] - p[i]) - 2.0 * (s[i] - q[i]))
         e3 = 0.5 * ((t[i + SURFACE] - p[i + SURFACE]) - 2.0 * (s[i + SURFACE] - q[i + SURFACE]))
         rise = high[i + SURFACE] - low[i + SURFACE]
@@ -355,16 +404,29 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
     """
     half = 0.5 * g
     for i in range(n):
-        hl, el, hr, er = left[i], left[i + SURFACE], right[i], right[i + SURFACE]
-        nl, nr, tl, tr = left[i + normal], right[i + normal], left[i + along], right[i + along]
+        hl = left[i]
+        el = left[i + SURFACE]
+        hr = right[i]
+        er = right[i + SURFACE]
+        nl = left[i + normal]
+        nr = right[i + normal]
+        tl = left[i + along]
+        tr = right[i + along]
         bed = max(el - hl, er - hr)
         a, b = max(0.0, el - bed), max(0.0, er - bed)
-        wave, ua, ub = max(l[i + WAVE], r[i + WAVE]), l[i + normal], r[i + normal]
+        wave = max(l[i + WAVE], r[i + WAVE])
+        ua = l[i + normal]
+        ub = r[i + normal]
         if moves is not None:
-            nl, nr, ua, ub = nl - moves[i], nr - moves[i], ua - moves[i], ub - moves[i]
+            nl = nl - moves[i]
+            nr = nr - moves[i]
+            ua = ua - moves[i]
+            ub = ub - moves[i]
         low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
         per_width = 1.0 / (high - low + TINY)
-        wa, wb, mix = high * per_width, -(low * per_width), high * low * per_width
+        wa = high * per_width
+        wb = -(low * per_width)
+        mix = high * low * per_width
         qa, qb = a * nl, b * nr
         mass = (wa * qa + wb * qb) + mix * (b - a)
         flow = (wa * (qa * nl) + wb * (qb * nr)) + mix * (qb - qa)

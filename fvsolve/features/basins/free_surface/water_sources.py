@@ -30,7 +30,8 @@ UNKNOWN = -1.0  # in place of the rate of a condensed time
 # Numbers in `work`: mean rate of rain [m/s]; position among the frames of rain
 RATE_OF_RAIN, POSITION = range(2)
 PRESENT_NUMBERS = 2
-CHUNK = 512  # cells for which all loops run in turn, so that their arrays stay in the first-level cache
+# cells for which all loops run in turn, so that their arrays stay in the first-level cache
+CHUNK = 512
 
 
 @njit(forceinline=True)
@@ -61,7 +62,9 @@ def begin_sources(tables, basin, t, dydt, out):
         write_present_sources(tables, basin, t)
     if basin["rain"] >= 0:
         rate = tables.work[basin["present"] + RATE_OF_RAIN]
-        out[tables.layout[0]["source"] + basin["source"]] = tables.settings[0]["rho"] * rate * basin["total_area"]
+        out[tables.layout[0]["source"] + basin["source"]] = (
+            tables.settings[0]["rho"] * rate * basin["total_area"]
+        )
         if dydt.size > 0:
             dydt[basin["rained"]] = rate
 
@@ -69,13 +72,19 @@ def begin_sources(tables, basin, t, dydt, out):
 @njit
 def uniform_rate(tables, basin):
     """Rate of rain that is the same in all cells [m/s], after `write_present_sources`; 0 for frames."""
-    return tables.work[basin["present"] + RATE_OF_RAIN] if basin["rain"] >= 0 and basin["frames"] == 0 else 0.0
+    return (
+        tables.work[basin["present"] + RATE_OF_RAIN]
+        if basin["rain"] >= 0 and basin["frames"] == 0
+        else 0.0
+    )
 
 
 @njit
 def add_frames(tables, basin, first, rates):
     """Add the rate of rain between two frames to rates [m/s] of cells from number `first` on."""
-    n, count, position = basin["n"], rates.size, tables.work[basin["present"] + POSITION]
+    n = basin["n"]
+    count = rates.size
+    position = tables.work[basin["present"] + POSITION]
     k = int(position)
     share, at = min(position - k, 1.0), basin["frame_rates"] + first
     before = tables.plane[at + k * n : at + k * n + count]
@@ -136,11 +145,15 @@ def limit_early(soil, supply, heights, times, rates, aging):
         aging[i] = (slow if takes_all else UNKNOWN) if is_early else 0.0
     for i in range(rates.size):
         if aging[i] == UNKNOWN:
-            height, store, time = max(heights[i], TINY), max(s[i], TINY), max(times[i], 0.0)
+            height = max(heights[i], TINY)
+            store = max(s[i], TINY)
+            time = max(times[i], 0.0)
             steeper = 1.0 + s[i] / height
             # by the lag of the height behind its condensed time
             lag = k[i] * times[i] - (height - store * log1p(height / store))
-            capacity = min(steeper * (k[i] + lag * gain(time)), most_early(k[i], s[i], time, height))
+            capacity = min(
+                steeper * (k[i] + lag * gain(time)), most_early(k[i], s[i], time, height)
+            )
             rates[i] = min(max(capacity, 0.0), supply[i])
             if capacity <= supply[i]:  # at capacity time passes, less the lag of the first instant
                 lost = min(0.5 * k[i] * store / max(supply[i] * supply[i], TINY), FIRST)
@@ -185,9 +198,16 @@ def put_infiltration(tables, basin, first, y, rates, aging):
 
     `write_present_sources` must run before. Numbers of a uniform soil are those of CHUNK cells.
     """
-    plane, row, count, n = tables.plane, basin["soil_row"], rates.size, basin["n"]
+    plane = tables.plane
+    row = basin["soil_row"]
+    count = rates.size
+    n = basin["n"]
     at = basin["soil_numbers"] + (first if row == n else 0)
-    soil = plane[at : at + count], plane[at + row : at + row + count], plane[at + 2 * row : at + 2 * row + count]
+    soil = (
+        plane[at : at + count],
+        plane[at + row : at + row + count],
+        plane[at + 2 * row : at + 2 * row + count],
+    )
     depth0, dh = plane[basin["plan"] + first :][:count], y[basin["y"] + first :][:count]
     rate, heights = uniform_rate(tables, basin), y[basin["infiltrated"] + first :][:count]
     times = y[basin["infiltrated"] + n + first :][: count if has_condensed_times(basin) else 0]

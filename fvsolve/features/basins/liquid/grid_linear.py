@@ -19,8 +19,19 @@ def put_row(liquid, grid, j, states, work, phi, up, down, aside):
 @inline
 def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
     """Write the rates of row j by the fluxes along it."""
-    c, nx, ny, k, a, z = liquid.c, grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx
-    put_waves(0.5 * c, states[0][a:z], states[1][a:z], work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
+    c = liquid.c
+    nx = grid.nx
+    ny = grid.ny
+    k = grid.ky[j]
+    a = j * grid.nx
+    z = (j + 1) * grid.nx
+    put_waves(
+        0.5 * c,
+        states[0][a:z],
+        states[1][a:z],
+        work.east[GHOSTS : nx + GHOSTS],
+        work.west[GHOSTS : nx + GHOSTS],
+    )
     put_faces_along(liquid, grid, j, work, moves)
     east, west, (rate_r, rate_x, rate_y) = work.forward, work.backward, rates
     if through.size > 0:
@@ -28,9 +39,14 @@ def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves,
     if moves is None or moves.speed_x.size == 0:
         put_row_rates(c, grid.kx, east, west, rate_r[a:z], rate_x[a:z], rate_y[a:z])
         return
-    speeds, along, thrust, loss = moves.speed_x, states[2][a:z], moves.thrust, moves.thrust[moves.thrust.size // 2 :]
+    speeds = moves.speed_x
+    along = states[2][a:z]
+    thrust = moves.thrust
+    loss = moves.thrust[moves.thrust.size // 2 :]
     put_wall_pressure(c, -speeds[0], east, west, along, 1, thrust[j:], loss[j:])
-    put_wall_pressure(c, speeds[nx], east[nx:], west[nx:], along[nx - 1 :], 1, thrust[ny + j :], loss[ny + j :])
+    put_wall_pressure(
+        c, speeds[nx], east[nx:], west[nx:], along[nx - 1 :], 1, thrust[ny + j :], loss[ny + j :]
+    )
     put_moving_fluxes(c, liquid.rho, speeds, 1, east, west)
     east[0] = 0.0 if grid.sides[0] == WALLS else east[0]
     east[nx] = 0.0 if grid.sides[1] == WALLS else east[nx]
@@ -42,7 +58,10 @@ def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves,
 @inline
 def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
     """Convert the waves at moving faces before row j to fluxes, and write flows and pressures at the sides."""
-    nx, ny, up, down = grid.nx, grid.ny, flux[0], flux[1]
+    nx = grid.nx
+    ny = grid.ny
+    up = flux[0]
+    down = flux[1]
     at = 2 * ny + (nx if j > 0 else 0)
     if through.size > 0 and j == 0:
         put_inward(grid.kx, up, down, through[at : at + nx])
@@ -68,11 +87,15 @@ def add_rates_across(liquid, grid, j, states, before, after, rates, moves, phi):
     """Add to the rates of row j the fluxes through the faces before and after it."""
     nx, ny, a, z, (rate_r, rate_x, rate_y) = grid.nx, grid.ny, j * grid.nx, (j + 1) * grid.nx, rates
     if moves is None or moves.speed_y.size == 0:
-        add_column_rates(liquid.c, grid.ky[j], before[0], before[1], after[0], after[1], rate_r[a:z], rate_y[a:z])
+        add_column_rates(
+            liquid.c, grid.ky[j], before[0], before[1], after[0], after[1], rate_r[a:z], rate_y[a:z]
+        )
         return
     flow = states[1]
     along = flow[max(j - 1, 0) * nx :], flow[a:], flow[min(j + 1, ny - 1) * nx :]
-    add_moving_column_rates(grid.ky[j], moves.speed_y[j:], before, after, along, rate_r[a:z], rate_y[a:z], rate_x[a:z])
+    add_moving_column_rates(
+        grid.ky[j], moves.speed_y[j:], before, after, along, rate_r[a:z], rate_y[a:z], rate_x[a:z]
+    )
 
 
 @inline
@@ -135,7 +158,9 @@ def put_moving_fluxes(c, rho, speeds, step, forward, backward):
     """
     per = 1.0 / c
     for i in range(forward.size):
-        m, x, speed = forward[i] - backward[i], forward[i] + backward[i], speeds[step * i]
+        m = forward[i] - backward[i]
+        x = forward[i] + backward[i]
+        speed = speeds[step * i]
         forward[i], backward[i] = m - speed * (rho + per * x), c * x - speed * m
 
 
@@ -149,11 +174,17 @@ def put_moving_row_rates(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
     mass, push : fluxes of mass and of momentum normal to the faces; along : momentum along the faces in each cell
     rate_r, rate_m, rate_t : as for `put_row_rates`
     """
-    m, p, last = mass[1:], push[1:], rate_r.size - 1
+    m = mass[1:]
+    p = push[1:]
+    last = rate_r.size - 1
     for i in range(rate_r.size):
         rate_r[i] = k[i] * (mass[i] - m[i])
         rate_m[i] = k[i] * (push[i] - p[i])
-    beyond, wide, before, after, interior = along[1:], k[1:], speeds[1:], speeds[2:], rate_t[1:]
+    beyond = along[1:]
+    wide = k[1:]
+    before = speeds[1:]
+    after = speeds[2:]
+    interior = rate_t[1:]
     for i in range(last - 1):  # cells with a neighbour on either side
         low, high = along[i] + beyond[i], beyond[i] + along[i + 2]
         interior[i] = 0.5 * wide[i] * (after[i] * high - before[i] * low)
@@ -171,7 +202,12 @@ def add_moving_column_rates(k, speeds, fluxes_before, fluxes_after, along, rate_
     along : momentum along the faces in the row before, in this row and in the row after
     rate_r, rate_m, rate_t : rates of density, and of flows across and along the row
     """
-    s0, s1, m0, p0, m1, p1 = speeds[0], speeds[1], fluxes_before[0], fluxes_before[1], fluxes_after[0], fluxes_after[1]
+    s0 = speeds[0]
+    s1 = speeds[1]
+    m0 = fluxes_before[0]
+    p0 = fluxes_before[1]
+    m1 = fluxes_after[0]
+    p1 = fluxes_after[1]
     before, here, after = along
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])

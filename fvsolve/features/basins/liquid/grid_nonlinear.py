@@ -19,7 +19,11 @@ from fvsolve.core.kernels.reconstruction import by_limiter, slope, value_weno5
 from fvsolve.features.basins.basin_patches import put_inward
 from fvsolve.features.basins.liquid import liquid_sides as sides
 from fvsolve.features.basins.liquid.liquid_sides import GHOSTS, WALLS, ring_offset, value_upwind5
-from fvsolve.features.basins.liquid.riemann_invariants import invariant, invariant_at_potential, state
+from fvsolve.features.basins.liquid.riemann_invariants import (
+    invariant,
+    invariant_at_potential,
+    state,
+)
 from fvsolve.jit import inline, njit
 
 
@@ -27,8 +31,12 @@ from fvsolve.jit import inline, njit
 def put_row(liquid, grid, j, states, work, phi, up, down, aside):
     """Write the waves across row j to up, down, and the velocities along it to `aside`."""
     c, rho, table, nx, (r, mx, my) = liquid.c, liquid.rho, liquid.table, grid.nx, states
-    a, z, v = j * nx, (j + 1) * nx, work.over[GHOSTS : nx + GHOSTS]
-    put_primitives(c, rho, table, grid.kx, grid.ky[j], r[a:z], mx[a:z], my[a:z], work.w, aside, v, work.top)
+    a = j * nx
+    z = (j + 1) * nx
+    v = work.over[GHOSTS : nx + GHOSTS]
+    put_primitives(
+        c, rho, table, grid.kx, grid.ky[j], r[a:z], mx[a:z], my[a:z], work.w, aside, v, work.top
+    )
     if phi is not None:
         subtract_potential(c, rho, table, phi.cells[a:z], work.w)
     sides.put_waves(0.5, work.w, v, up, down)
@@ -37,12 +45,23 @@ def put_row(liquid, grid, j, states, work, phi, up, down, aside):
 @inline
 def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves, phi):
     """Write the rates of row j by the fluxes along it."""
-    nx, ny, k, a, z, f = grid.nx, grid.ny, grid.ky[j], j * grid.nx, (j + 1) * grid.nx, grid.nx + 1
-    mass, push, along, over = work.forward, work.backward, work.along, work.over
-    sides.put_waves(0.5, work.w, aside, work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS])
+    nx = grid.nx
+    ny = grid.ny
+    k = grid.ky[j]
+    a = j * grid.nx
+    z = (j + 1) * grid.nx
+    f = grid.nx + 1
+    mass = work.forward
+    push = work.backward
+    along = work.along
+    over = work.over
+    sides.put_waves(
+        0.5, work.w, aside, work.east[GHOSTS : nx + GHOSTS], work.west[GHOSTS : nx + GHOSTS]
+    )
     sides.mirror(nx, over, over)
     sides.put_faces_along(liquid, grid, j, work, moves)
-    scheme, flux = sides.scheme_for(liquid.scheme, nx, grid.sides[0], grid.sides[1]), (mass, push, along)
+    scheme = sides.scheme_for(liquid.scheme, nx, grid.sides[0], grid.sides[1])
+    flux = (mass, push, along)
     cells = over, over[1:], over[2:], over[3:], over[4:], over[5:]
     if moves is None or moves.speed_x.size == 0:
         at_faces = None if phi is None else phi.columns[j * f : (j + 1) * f]
@@ -57,23 +76,35 @@ def put_rates_along(liquid, grid, j, states, work, aside, through, rates, moves,
         through[j], through[ny + j] = mass[0] / k, -mass[nx] / k
     put_row_rates(grid.kx, mass, push, along, rates[0][a:z], rates[1][a:z], rates[2][a:z])
     if phi is not None:
-        r, at_cells, low, high = states[0][a:z], phi.cells[a:z], phi.columns[j * f :], phi.columns[j * f + 1 :]
-        balance_row(liquid.c, liquid.rho, liquid.table, grid.kx, 1, r, at_cells, low, high, rates[1][a:z])
+        r = states[0][a:z]
+        at_cells = phi.cells[a:z]
+        low = phi.columns[j * f :]
+        high = phi.columns[j * f + 1 :]
+        balance_row(
+            liquid.c, liquid.rho, liquid.table, grid.kx, 1, r, at_cells, low, high, rates[1][a:z]
+        )
 
 
 @inline
 def put_fluxes_across(liquid, grid, j, states, work, flux, through, moves, phi):
     """Convert the waves at the faces before row j to fluxes, and write flows and pressures at the sides."""
     nx, ny, (mass, push, along) = grid.nx, grid.ny, flux
-    scheme, at = sides.scheme_for(liquid.scheme, ny, grid.sides[2], grid.sides[3]), 2 * ny + (nx if j > 0 else 0)
+    scheme = sides.scheme_for(liquid.scheme, ny, grid.sides[2], grid.sides[3])
+    at = 2 * ny + (nx if j > 0 else 0)
     aside = work.aside
-    a, b, c = aside[ring_offset(j - 3, nx) :], aside[ring_offset(j - 2, nx) :], aside[ring_offset(j - 1, nx) :]
-    d, e, g = aside[ring_offset(j, nx) :], aside[ring_offset(j + 1, nx) :], aside[ring_offset(j + 2, nx) :]
+    a = aside[ring_offset(j - 3, nx) :]
+    b = aside[ring_offset(j - 2, nx) :]
+    c = aside[ring_offset(j - 1, nx) :]
+    d = aside[ring_offset(j, nx) :]
+    e = aside[ring_offset(j + 1, nx) :]
+    g = aside[ring_offset(j + 2, nx) :]
     if moves is None or moves.speed_y.size == 0:
         at_faces = None if phi is None else phi.rows[j * nx : (j + 1) * nx]
         put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), None, 0, at_faces, work.seen, flux)
     else:
-        put_upwind_fluxes(liquid, scheme, (a, b, c, d, e, g), moves.speed_y[j:], 0, None, work.seen[:nx], flux)
+        put_upwind_fluxes(
+            liquid, scheme, (a, b, c, d, e, g), moves.speed_y[j:], 0, None, work.seen[:nx], flux
+        )
         if (j == 0 and grid.sides[2] == WALLS) or (j == ny and grid.sides[3] == WALLS):
             put_wall_flux(push, nx, moves.thrust[at:], mass, along)
     if through.size > 0 and (j == 0 or j == ny):
@@ -86,8 +117,13 @@ def add_rates_across(liquid, grid, j, states, before, after, rates, moves, phi):
     nx, a, z, (rate_r, rate_x, rate_y) = grid.nx, j * grid.nx, (j + 1) * grid.nx, rates
     add_column_rates(grid.ky[j], before, after, rate_r[a:z], rate_y[a:z], rate_x[a:z])
     if phi is not None:
-        r, at_cells, low, high = states[0][a:z], phi.cells[a:z], phi.rows[a:z], phi.rows[z : z + nx]
-        balance_row(liquid.c, liquid.rho, liquid.table, grid.ky[j:], 0, r, at_cells, low, high, rate_y[a:z])
+        r = states[0][a:z]
+        at_cells = phi.cells[a:z]
+        low = phi.rows[a:z]
+        high = phi.rows[z : z + nx]
+        balance_row(
+            liquid.c, liquid.rho, liquid.table, grid.ky[j:], 0, r, at_cells, low, high, rate_y[a:z]
+        )
 
 
 @inline
@@ -101,7 +137,9 @@ def put_upwind_fluxes(liquid, scheme, cells, speeds, step, phi, seen, flux):
     forward, backward, along = flux
     a, b, c, d, e, g = cells
     if speeds is None:
-        faces_upwind(scheme, liquid.limiter, liquid.small, forward, backward, a, b, c, d, e, g, along)
+        faces_upwind(
+            scheme, liquid.limiter, liquid.small, forward, backward, a, b, c, d, e, g, along
+        )
     else:
         relative_waves(speeds, step, forward, seen)
         faces_upwind(scheme, liquid.limiter, liquid.small, seen, backward, a, b, c, d, e, g, along)
@@ -193,7 +231,11 @@ def balance_row(c0, rho, table, k, step, r, phi, low, high, rate):
     """
     for i in range(rate.size):
         per, bulk = stiffness(c0, rho, table, r[i])
-        rate[i] += k[step * i] * bulk * (log1p_small(per * (low[i] - phi[i])) - log1p_small(per * (high[i] - phi[i])))
+        rate[i] += (
+            k[step * i]
+            * bulk
+            * (log1p_small(per * (low[i] - phi[i])) - log1p_small(per * (high[i] - phi[i])))
+        )
 
 
 @inline
@@ -219,12 +261,16 @@ def faces_upwind(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f)
     elif scheme == LINEAR:
         for i in range(f.size):
             on = forward[i] > backward[i]
-            first, low, here = a[i] if on else g[i], b[i] if on else e[i], c[i] if on else d[i]
+            first = a[i] if on else g[i]
+            low = b[i] if on else e[i]
+            here = c[i] if on else d[i]
             f[i] = value_upwind5(first, low, here, d[i] if on else c[i], e[i] if on else b[i])
     elif scheme == WENO5:
         for i in range(f.size):
             on = forward[i] > backward[i]
-            first, low, here = a[i] if on else g[i], b[i] if on else e[i], c[i] if on else d[i]
+            first = a[i] if on else g[i]
+            low = b[i] if on else e[i]
+            here = c[i] if on else d[i]
             f[i] = value_weno5(first, low, here, d[i] if on else c[i], e[i] if on else b[i], small)
     else:
         by_limiter(faces_upwind_limited, limiter, forward, backward, b, c, d, e, f)
@@ -243,7 +289,9 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     if table is not None:
         for i in range(forward.size):
             w = forward[i] + backward[i]
-            r, p = state(table, w if phi is None else invariant_at_potential(c0, rho, table, w, phi[i]))
+            r, p = state(
+                table, w if phi is None else invariant_at_potential(c0, rho, table, w, phi[i])
+            )
             u = forward[i] - backward[i]
             mass = (rho + r) * (u if speeds is None else u - speeds[step * i])
             forward[i], backward[i], along[i] = mass, mass * u + p, mass * along[i]
@@ -254,7 +302,11 @@ def put_fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
             y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]
             z = y * (2.0 + y) + phi[i] / (c0 * c0)
             mass = rho * u / (1.0 + z)
-            forward[i], backward[i], along[i] = mass, mass * u - bulk * log1p_vector(z), mass * along[i]
+            forward[i], backward[i], along[i] = (
+                mass,
+                mass * u - bulk * log1p_vector(z),
+                mass * along[i],
+            )
         return
     for i in range(forward.size):
         y, u = -per * (forward[i] + backward[i]), forward[i] - backward[i]  # c = c0 (1 + y)
@@ -281,7 +333,9 @@ def put_row_rates(k, mass, push, along, rate_r, rate_m, rate_t):
     k : 1 / widths of the cells [1/m]; mass, push, along : fluxes of mass and of momentum normal to and along the faces
     rate_r, rate_m, rate_t : rates of density, and of flows along and across the row
     """
-    m, p, t = mass[1:], push[1:], along[1:]
+    m = mass[1:]
+    p = push[1:]
+    t = along[1:]
     for i in range(rate_r.size):
         rate_r[i] = k[i] * (mass[i] - m[i])
         rate_m[i] = k[i] * (push[i] - p[i])

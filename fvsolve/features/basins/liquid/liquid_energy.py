@@ -30,7 +30,10 @@ def liquid_power(st, basin, plane, y, dydt, rows):
 
     rows : entries of the basin in `power`, see `basin_output`
     """
-    n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["drawn"] :]
+    n = basin["n"]
+    o = basin["y"]
+    rest = rest_potential(st, basin)
+    area = plane[basin["drawn"] :]
     rate, square = 0.0, basin["speed"] * basin["speed"]
     for i in range(n):
         kinetic = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
@@ -47,7 +50,10 @@ def add_stored(t, y, dydt, out, handle, stored):
         basin, total = basins[b], 0.0
         if basin["kind"] != OWN_CODE:
             continue
-        n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), tables.plane[basin["area"] :]
+        n = basin["n"]
+        o = basin["y"]
+        rest = rest_potential(st, basin)
+        area = tables.plane[basin["area"] :]
         for i in range(n):
             r, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
             total += area[i] * (rest * r + 0.5 * (basin["speed"] ** 2 * r * r + square))
@@ -70,7 +76,9 @@ def displaced_potential(tables, wall):
     basin, length = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
         length += tables.plane[wall["lengths"] + m]
-    return wall["outward"] * (rest_potential(tables.settings[0], basin) * basin["thickness"] * length - wall["rest"])
+    return wall["outward"] * (
+        rest_potential(tables.settings[0], basin) * basin["thickness"] * length - wall["rest"]
+    )
 
 
 @njit
@@ -83,19 +91,26 @@ def add_wall_power(t, y, dydt, out, handle, power):
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
         basin, total = tables.basins[b], 0.0
-        n, o, rest, square = basin["n"], basin["y"], rest_potential(st, basin), basin["speed"] * basin["speed"]
+        n = basin["n"]
+        o = basin["y"]
+        rest = rest_potential(st, basin)
+        square = basin["speed"] * basin["speed"]
         for i in range(n if is_moving(basin) else 0):
             r, m2 = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
             content_energy = basin["density"] * (rest + square * r) + 0.5 * (square * r * r + m2)
-            total += plane[basin["drawn"] + i] * area_growth_rate(t, tables, basin, y, i) * content_energy
+            total += (
+                plane[basin["drawn"] + i]
+                * area_growth_rate(t, tables, basin, y, i)
+                * content_energy
+            )
         if is_moving(basin):
             power[basin_first_row(tables, power, b) + 3] -= basin["thickness"] / st["rho"] * total
     for k in range(tables.walls.size):
         wall = tables.walls[k]
         if is_moving(tables.basins[wall["basin"]]):
-            power[basin_first_row(tables, power, wall["basin"]) + 3] += displaced_potential(tables, wall) * speed_of(
-                t, tables, wall, y
-            )
+            power[basin_first_row(tables, power, wall["basin"]) + 3] += displaced_potential(
+                tables, wall
+            ) * speed_of(t, tables, wall, y)
 
 
 @njit

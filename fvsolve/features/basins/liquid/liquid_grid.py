@@ -21,7 +21,8 @@ from fvsolve.features.basins.liquid import liquid_sides as sides
 from fvsolve.features.basins.liquid.liquid_sides import CLOSURE_CELLS, GHOSTS, ring_offset
 from fvsolve.jit import njit, specialise
 
-EQUATION = GHOST_ROWS = None  # of the templates: module `grid_linear` or `grid_nonlinear`, and `_ghost_rows` for it
+# of the templates: module `grid_linear` or `grid_nonlinear`, and `_ghost_rows` for it
+EQUATION = GHOST_ROWS = None
 
 
 @njit
@@ -50,12 +51,22 @@ def _ghost_rows(liquid, grid, north, states, work, moves, phi):
         up, down = work.up[at : at + nx], work.down[at : at + nx]
         ahead, back = (down, up) if turned else (up, down)
         EQUATION.put_row(
-            liquid, grid, sides.mirrored_cell(j, ny), states, work, phi, ahead, back, work.aside[at : at + nx]
+            liquid,
+            grid,
+            sides.mirrored_cell(j, ny),
+            states,
+            work,
+            phi,
+            ahead,
+            back,
+            work.aside[at : at + nx],
         )
         if moves is not None and moves.speed_y.size > 0 and turned:
             speed = moves.speed_y[ny] if north else -moves.speed_y[0]
             entering, leaving = (down, up) if north else (up, down)
-            sides.correct_mirror_row(liquid.full, liquid.c, liquid.rho, speed, entering, leaving, nx)
+            sides.correct_mirror_row(
+                liquid.full, liquid.c, liquid.rho, speed, entering, leaving, nx
+            )
     if grid.sides[3 if north else 2] != sides.WALLS:
         sides.close_rows(liquid, grid, north, work)
 
@@ -66,17 +77,25 @@ def _rows(liquid, grid, first, last, states, through, scratch, rates, moves, phi
     Up to three rows beyond the band are read too, and more next to open sides. Rates of rows from `last` on may be
     written incompletely; the next call completes them.
     """
-    nx, ny, begin, work = grid.nx, grid.ny, grid.begin, sides.open_work(scratch, grid.nx)
+    nx = grid.nx
+    ny = grid.ny
+    begin = grid.begin
+    work = sides.open_work(scratch, grid.nx)
     read = max(min(begin - GHOSTS, ny - CLOSURE_CELLS), 0)
     if first > begin:
         read = max(read, row_needed(first, ny))
-    for j in range(first if first == begin else first + 1, last + 1):  # faces between rows j - 1 and j
+    # faces between rows j - 1 and j
+    for j in range(first if first == begin else first + 1, last + 1):
         while read < row_needed(j, ny):
             at = ring_offset(read, nx)
-            up, down, aside = work.up[at : at + nx], work.down[at : at + nx], work.aside[at : at + nx]
+            up = work.up[at : at + nx]
+            down = work.down[at : at + nx]
+            aside = work.aside[at : at + nx]
             EQUATION.put_row(liquid, grid, read, states, work, phi, up, down, aside)
             if begin <= read < grid.stop:
-                EQUATION.put_rates_along(liquid, grid, read, states, work, aside, through, rates, moves, phi)
+                EQUATION.put_rates_along(
+                    liquid, grid, read, states, work, aside, through, rates, moves, phi
+                )
             read += 1
         if j == begin and begin < GHOSTS:
             GHOST_ROWS(liquid, grid, False, states, work, moves, phi)
@@ -89,13 +108,17 @@ def _rows(liquid, grid, first, last, states, through, scratch, rates, moves, phi
             EQUATION.add_rates_across(liquid, grid, j - 1, states, before, after, rates, moves, phi)
         if moves is not None and j > begin:
             a, z, (rate_r, rate_x, rate_y) = (j - 1) * nx, j * nx, rates
-            stretch_row_rates(moves.speed_x.size > 0, moves.wide, 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z])
+            stretch_row_rates(
+                moves.speed_x.size > 0, moves.wide, 0, j - 1, rate_r[a:z], rate_x[a:z], rate_y[a:z]
+            )
 
 
 linear_ghost_rows = specialise(_ghost_rows, "linear_ghost_rows", EQUATION=grid_linear)
 linear_rows = specialise(_rows, "linear_rows", EQUATION=grid_linear, GHOST_ROWS=linear_ghost_rows)
 nonlinear_ghost_rows = specialise(_ghost_rows, "nonlinear_ghost_rows", EQUATION=grid_nonlinear)
-nonlinear_rows = specialise(_rows, "nonlinear_rows", EQUATION=grid_nonlinear, GHOST_ROWS=nonlinear_ghost_rows)
+nonlinear_rows = specialise(
+    _rows, "nonlinear_rows", EQUATION=grid_nonlinear, GHOST_ROWS=nonlinear_ghost_rows
+)
 
 
 @njit

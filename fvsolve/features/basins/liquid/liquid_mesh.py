@@ -7,21 +7,44 @@ States, waves and fluxes are as on a grid (`grid_linear` and `grid_nonlinear`): 
 
 from math import sqrt
 
-from fvsolve.features.basins.cell_sides import BLOCK, HUGE, MEASURES, NX, NY, REACH, limited_sides, ring_place
-from fvsolve.features.basins.liquid.grid_nonlinear import log1p_small, log1p_vector, stiffness, subtract_potential
+from fvsolve.features.basins.cell_sides import (
+    BLOCK,
+    HUGE,
+    MEASURES,
+    NX,
+    NY,
+    REACH,
+    limited_sides,
+    ring_place,
+)
+from fvsolve.features.basins.liquid.grid_nonlinear import (
+    log1p_small,
+    log1p_vector,
+    stiffness,
+    subtract_potential,
+)
 from fvsolve.features.basins.liquid.liquid_sides import wall_flow
-from fvsolve.features.basins.liquid.riemann_invariants import invariant, invariant_at_potential, state
+from fvsolve.features.basins.liquid.riemann_invariants import (
+    invariant,
+    invariant_at_potential,
+    state,
+)
 from fvsolve.features.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
 
 FIELDS, ROWS_OF_CELLS, SHOWN = 3, 4, 3  # see `mesh_blocks`
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
 _U, _V, _RR, _RX, _RY, _FAST, _C, TOP, _FREE, MASS = (k * BLOCK for k in range(1, 11))
-_NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, term of the power lost there
-_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # with a potential: see `grid_nonlinear.stiffness`
+_NX = NX * BLOCK
+_NY = NY * BLOCK
+_REACH = REACH * BLOCK
+# of moving sides: pressure at the side, term of the power lost there
+_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK
+# with a potential: see `grid_nonlinear.stiffness`
+_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))
 ROWS = 16
-LINKED = 2.0  # reflection coefficient that marks the faces of a patch with links: a wall, through which links pass flow
+# reflection coefficient that marks the faces of a patch with links: a wall, through which links pass flow
+LINKED = 2.0
 
 
 @inline
@@ -34,9 +57,14 @@ def begin(w):
 @inline
 def put_cells(liquid, mesh, j, states, cells, phi):
     """Write invariants, velocities and wave speeds of block j of cells."""
-    a, z, o = j * BLOCK, min((j + 1) * BLOCK, mesh.n), (j % mesh.ring) * BLOCK
+    a = j * BLOCK
+    z = min((j + 1) * BLOCK, mesh.n)
+    o = (j % mesh.ring) * BLOCK
     c0, rho, table, (r, mx, my) = liquid.c, liquid.rho, liquid.table, states
-    w, u, v, c = cells[0, o:], cells[1, o:], cells[2, o:], cells[3, o:]
+    w = cells[0, o:]
+    u = cells[1, o:]
+    v = cells[2, o:]
+    c = cells[3, o:]
     put_primitives(liquid.full, c0, rho, table, r[a:z], mx[a:z], my[a:z], w, u, v, c)
     if phi is not None:
         subtract_potential(c0, rho, table, phi[0][a:z], w[: z - a])
@@ -61,7 +89,12 @@ def put_primitives(full, c0, rho, table, r, mx, my, w, u, v, c):
             x = per * r[i]
             s = sqrt(1.0 + x)
             volume = per / (s * s)
-            w[i], u[i], v[i], c[i] = twice * (x / (s * (1.0 + s))), volume * mx[i], volume * my[i], c0 / s
+            w[i], u[i], v[i], c[i] = (
+                twice * (x / (s * (1.0 + s))),
+                volume * mx[i],
+                volume * my[i],
+                c0 / s,
+            )
     else:
         for i in range(r.size):
             w[i], u[i], v[i], c[i] = c0 * r[i], mx[i], my[i], c0
@@ -70,11 +103,24 @@ def put_primitives(full, c0, rho, table, r, mx, my, w, u, v, c):
 @inline
 def put_sides(liquid, mesh, j, first, last, reflect, cells, sides, shown, w, moves):
     """Write the limited values at the sides of the cells of block j."""
-    edges, free, b = mesh.edges[first:last], w[_FREE:], mesh.edges.size
+    edges = mesh.edges[first:last]
+    free = w[_FREE:]
+    b = mesh.edges.size
     put_ghosts(liquid, mesh, first, last, reflect, cells, shown, moves)
     for q in range(FIELDS):
         beyond = shown[q * b + first :]
-        limited_sides(j, mesh.floats, mesh.integers, cells[q], liquid.wide_by, free, beyond, edges, w, sides[q])
+        limited_sides(
+            j,
+            mesh.floats,
+            mesh.integers,
+            cells[q],
+            liquid.wide_by,
+            free,
+            beyond,
+            edges,
+            w,
+            sides[q],
+        )
 
 
 @inline
@@ -85,14 +131,21 @@ def put_ghosts(liquid, mesh, first, last, reflect, cells, shown, moves):
     patches with links too. A mirror image of the flow there would give a gradient to uniform flow, and the pressure on
     the face would do work on it.
     """
-    w, u, v, b = cells[0], cells[1], cells[2], mesh.edges.size
+    w = cells[0]
+    u = cells[1]
+    v = cells[2]
+    b = mesh.edges.size
     for q in range(first, last):
-        i, nx, ny = ring_place(mesh.edges[q], mesh.ring), mesh.nx[q], mesh.ny[q]
+        i = ring_place(mesh.edges[q], mesh.ring)
+        nx = mesh.nx[q]
+        ny = mesh.ny[q]
         r = reflect[mesh.number[q]] if reflect.size > 0 else 1.0
         r = 0.0 if r == LINKED else r
         out = u[i] * nx + v[i] * ny
         if moves is not None:
-            out -= wall_flow(liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], w[i] + out)
+            out -= wall_flow(
+                liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], w[i] + out
+            )
         across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * out
         shown[q] = min(1.0, 1.0 + 2.0 * r) * w[i]
         shown[b + q], shown[2 * b + q] = u[i] + across * nx, v[i] + across * ny
@@ -111,10 +164,20 @@ def begin_block(liquid, mesh, j, states, w, phi):
 @inline
 def add_side(liquid, mesh, j, k, first, last, reflect, cells, sides, w, moves, phi):
     """Subtract the outflow through side k of each cell of block j from the rates in `w`."""
-    slot, o, own = j * mesh.slots + k, (j % mesh.ring) * BLOCK, own_sides(liquid, mesh, j, k)
-    wl, ul, vl, geo = sides[0, own:], sides[1, own:], sides[2, own:], mesh.floats[slot * MEASURES * BLOCK :]
+    slot = j * mesh.slots + k
+    o = (j % mesh.ring) * BLOCK
+    own = own_sides(liquid, mesh, j, k)
+    wl = sides[0, own:]
+    ul = sides[1, own:]
+    vl = sides[2, own:]
+    geo = mesh.floats[slot * MEASURES * BLOCK :]
     put_reflections(liquid, mesh, first, last, reflect, wl, ul, vl, w, moves)
-    c0, rho, table, u, v, c = liquid.c, liquid.rho, liquid.table, cells[1, o:], cells[2, o:], cells[3, o:]
+    c0 = liquid.c
+    rho = liquid.rho
+    table = liquid.table
+    u = cells[1, o:]
+    v = cells[2, o:]
+    c = cells[3, o:]
     if moves is not None:
         speeds = moves.speeds[(4 * j + k) * BLOCK :]
         if liquid.full:
@@ -140,11 +203,15 @@ def put_reflections(liquid, mesh, first, last, reflect, wl, ul, vl, w, moves):
     wl, ul, vl : values at the sides from inside
     """
     for q in range(first, last):
-        i, nx, ny = mesh.edges[q] % BLOCK, mesh.nx[q], mesh.ny[q]
+        i = mesh.edges[q] % BLOCK
+        nx = mesh.nx[q]
+        ny = mesh.ny[q]
         r = min(reflect[mesh.number[q]], 1.0) if reflect.size > 0 else 1.0
         out = ul[i] * nx + vl[i] * ny
         if moves is not None:
-            out -= wall_flow(liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], wl[i] + out)
+            out -= wall_flow(
+                liquid.full, liquid.c, liquid.rho, moves.speeds[mesh.edges[q]], wl[i] + out
+            )
         across = -(1.0 + r) * out
         w[i], w[_U + i], w[_V + i] = r * wl[i], ul[i] + across * nx, vl[i] + across * ny
 
@@ -157,7 +224,9 @@ def add_side_linear(c0, wl, ul, vl, geo, w):
     w : scratch, which contains the values from beyond; geo : first group of measures of the side, see `cell_sides`
     """
     for i in range(BLOCK):
-        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        nx = geo[_NX + i]
+        ny = geo[_NY + i]
+        reach = geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         push = reach * (c0 * (forward + backward))
@@ -178,7 +247,10 @@ def add_side_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
     Other arguments as in `add_side_linear`
     """
     for i in range(BLOCK):
-        nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
+        nx = geo[_NX + i]
+        ny = geo[_NY + i]
+        reach = geo[_REACH + i]
+        speed = speeds[i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         m, pressure = forward - backward, c0 * (forward + backward)
@@ -206,11 +278,15 @@ def add_side_nonlinear(c0, rho, table, cells, inside, geo, w, speeds, phi):
     (u0, v0, c), (wl, ul, vl) = cells, inside
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
-        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        nx = geo[_NX + i]
+        ny = geo[_NY + i]
+        reach = geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         u = forward - backward
-        through, own, invariant_sum = u, u0[i] * nx + v0[i] * ny, forward + backward
+        through = u
+        own = u0[i] * nx + v0[i] * ny
+        invariant_sum = forward + backward
         if phi is not None:
             invariant_sum = invariant_at_potential(c0, rho, table, invariant_sum, phi[i])
         if speeds is not None:
@@ -224,7 +300,9 @@ def add_side_nonlinear(c0, rho, table, cells, inside, geo, w, speeds, phi):
             mass = rho * through / ((1.0 + y) * (1.0 + y))
             p = -2.0 * bulk * log1p_vector(y)
             push = mass * u + p
-        along = mass * (vl[i] * nx - ul[i] * ny if through > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
+        along = mass * (
+            vl[i] * nx - ul[i] * ny if through > 0.0 else w[_V + i] * nx - w[_U + i] * ny
+        )
         w[_RR + i] -= reach * mass
         w[_RX + i] -= reach * (push * nx - along * ny)
         w[_RY + i] -= reach * (push * ny + along * nx)

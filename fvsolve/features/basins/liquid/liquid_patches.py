@@ -37,10 +37,14 @@ def share_of(tables, patch, m):
     """
     if is_interior(tables, patch):
         i = tables.integers[patch["first"] + m]
-        return i, tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_area(tables, patch)
+        return i, tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_area(
+            tables, patch
+        )
     i = tables.integers[patch["ring"] + patch["faces"] + m]
     per_area = tables.plane[patch["normals"] + 2 * patch["faces"] + m]
-    return i, per_area * tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_length(tables, patch)
+    return i, per_area * tables.plane[tables.basins[patch["basin"]]["area"] + i] / patch_length(
+        tables, patch
+    )
 
 
 @njit
@@ -90,7 +94,9 @@ def _patch_pressures(t, y, dydt, out, handle):
         out[layout["pressure"] + patch["node"]] = deviation
         out[layout["supply"] + patch["node"]] = 0.0
         out[layout["outflow_fraction"] + node["row"]] = 1.0
-        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of_flow(tables, patch))
+        out[layout["stiffness"] + node["row"]] = slope / (
+            basin["thickness"] * area_of_flow(tables, patch)
+        )
 
 
 patch_pressures = specialise(_patch_pressures, "patch_pressures")
@@ -124,7 +130,11 @@ def _read_liquid(tables, probe, y):
     The pressure term is the deviation of density [kg/m3] under the density law `linear`, rho0 ln(rho / rho0) under
     `log`: pressure above that at rest over c0^2. Under `table` it is the pressure above that at rest [Pa].
     """
-    basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
+    basin = tables.basins[probe["index"]]
+    law = tables.settings[0]["law"]
+    total = 0.0
+    u = 0.0
+    v = 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):
         i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
@@ -165,4 +175,6 @@ def _observe_liquid(t, y, out, handle, values):
 
 
 observe_liquid = specialise(_observe_liquid, "observe_liquid")
-observe_liquid_table = specialise(_observe_liquid, "observe_liquid_table", READ=read_liquid_table, TABLED=True)
+observe_liquid_table = specialise(
+    _observe_liquid, "observe_liquid_table", READ=read_liquid_table, TABLED=True
+)

@@ -16,7 +16,12 @@ from fvsolve.features.basins.basin_patches import needs_rates, physics_code, put
 from fvsolve.features.basins.boundary_cells import band_cells
 from fvsolve.features.basins.cell_sides import BLOCK, blocks, deviations_of
 from fvsolve.features.basins.liquid import liquid_grid, liquid_mesh
-from fvsolve.features.basins.liquid.liquid_sides import LiquidGrid, LiquidScheme, Potentials, side_kinds
+from fvsolve.features.basins.liquid.liquid_sides import (
+    LiquidGrid,
+    LiquidScheme,
+    Potentials,
+    side_kinds,
+)
 from fvsolve.features.basins.moving_meshes import mesh_motion
 from fvsolve.features.basins.moving_walls import grid_motion
 from fvsolve.jit import njit, specialise
@@ -24,7 +29,9 @@ from fvsolve.jit import njit, specialise
 OWN_CODE = physics_code(__package__)
 FIXED, ON_BODY, MOVING = range(3)  # motions of basins
 
-mesh_rates = specialise(mesh_blocks.mesh_rates, "mesh_rates", EQUATION=liquid_mesh, __name__=__name__)
+mesh_rates = specialise(
+    mesh_blocks.mesh_rates, "mesh_rates", EQUATION=liquid_mesh, __name__=__name__
+)
 
 
 @njit(forceinline=True)
@@ -36,7 +43,9 @@ def motion_of(basin):
 @njit(forceinline=True)
 def states_of(tables, basin, y):
     """(deviations of density [kg/m3], mass-flow densities along x, along y [kg/(m2 s)]) of the cells of a basin."""
-    n, o, seen = basin["n"], basin["y"], deviations_of(basin, tables.seen, y)
+    n = basin["n"]
+    o = basin["y"]
+    seen = deviations_of(basin, tables.seen, y)
     return seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
 
 
@@ -47,14 +56,20 @@ def rates_of(tables, basin, dydt):
     If `dydt` is empty, they are work arrays, which only `frame_forces.add_frame_forces` reads. If walls move, the rates
     are those of the states of `basins.cell_sides`.
     """
-    n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
+    n, (to, first) = (
+        basin["n"],
+        (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"]),
+    )
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
 
 
 @njit(forceinline=True)
 def boundary_arrays(tables, basin):
     """(reflection coefficients of boundary faces, flows through them, work array) of a basin: three arrays."""
-    plane, work, outer, through = tables.plane, tables.work, basin["outer_given"], basin["through"]
+    plane = tables.plane
+    work = tables.work
+    outer = basin["outer_given"]
+    through = basin["through"]
     reflect = plane[basin["reflect"] : basin["reflect"] + outer]
     return reflect, work[through : through + outer], work[basin["work"] :]
 
@@ -63,15 +78,23 @@ def boundary_arrays(tables, basin):
 def grid_of(tables, b, reflect):
     """`LiquidGrid` of basin b and the band of this thread. reflect : reflection coefficients of its boundary faces"""
     basin, plane = tables.basins[b], tables.plane
-    k, nx, ny = basin["spacing"], basin["nx"], basin["ny"]
-    kx, ky, begin, stop = plane[k : k + nx], plane[k + nx : k + nx + ny], tables.bands[2 * b], tables.bands[2 * b + 1]
+    k = basin["spacing"]
+    nx = basin["nx"]
+    ny = basin["ny"]
+    kx = plane[k : k + nx]
+    ky = plane[k + nx : k + nx + ny]
+    begin = tables.bands[2 * b]
+    stop = tables.bands[2 * b + 1]
     return LiquidGrid(nx, ny, begin, stop, kx, ky, reflect, side_kinds(reflect, nx, ny))
 
 
 @njit(forceinline=True)
 def liquid_of(basin, full, table):
     """`LiquidScheme` of a basin. full : True with the full momentum flux; table : see `LiquidScheme`"""
-    c, rho, scheme, limiter = basin["speed"], basin["density"], basin["scheme"], basin["limiter"]
+    c = basin["speed"]
+    rho = basin["density"]
+    scheme = basin["scheme"]
+    limiter = basin["limiter"]
     return LiquidScheme(c, rho, table, full, scheme, limiter, basin["small"], basin["wide"])
 
 
@@ -83,20 +106,29 @@ def by_blocks(tables, b, liquid, grid, states, through, work, y, rates):
     cache.
     b : number of the basin; y : states of the model; other arguments as in `liquid_grid`
     """
-    basin, sums, nx, mode = tables.basins[b], tables.sums, grid.nx, tables.sums[sums_of.MODE]
+    basin = tables.basins[b]
+    sums = tables.sums
+    nx = grid.nx
+    mode = tables.sums[sums_of.MODE]
     formed_ahead, rows = grid.begin, max(sums[sums_of.CELLS] // nx, 1)
     for row in range(grid.begin, grid.stop, rows):
         block_stop = min(row + rows, grid.stop)
         ahead = min(liquid_grid.row_needed(block_stop, grid.ny), grid.stop)
         for q in range(3 if mode != sums_of.CHECK else 0):
-            sums_of.form_rows(sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx)
+            sums_of.form_rows(
+                sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx
+            )
         formed_ahead = ahead
-        liquid_grid.linear_rows(liquid, grid, row, block_stop, states, through, work, rates, None, None)
+        liquid_grid.linear_rows(
+            liquid, grid, row, block_stop, states, through, work, rates, None, None
+        )
         for q in range(3):
             if mode == sums_of.CHECK:
                 sums_of.check_rows(sums, y, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
             elif mode == sums_of.STAGE_AND_END:
-                sums_of.form_rows(sums, True, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
+                sums_of.form_rows(
+                    sums, True, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx
+                )
     if mode == sums_of.STAGE_AND_END:
         sums_of.form_checked_runs(sums)
     return liquid.c * liquid_grid.max_spacing_rate(grid.kx, grid.ky)
@@ -111,13 +143,19 @@ def linear_grid(tables, b, y, dydt, table, moves, raised):
     """
     basin = tables.basins[b]
     reflect, through, work = boundary_arrays(tables, basin)
-    grid, liquid, (r, mx, my) = grid_of(tables, b, reflect), liquid_of(basin, False, table), states_of(tables, basin, y)
+    grid, liquid, (r, mx, my) = (
+        grid_of(tables, b, reflect),
+        liquid_of(basin, False, table),
+        states_of(tables, basin, y),
+    )
     rates = rates_of(tables, basin, dydt)
     if moves is None and raised is None and sums_of.requested_mode(tables, b) != sums_of.OFF:
         return by_blocks(tables, b, liquid, grid, (r, mx, my), through, work, y, rates)
     if raised is not None:
         r = raised[0]
-    return liquid_grid.linear_grid_rates(liquid, grid, (r, mx, my), through, work, rates, moves, None)
+    return liquid_grid.linear_grid_rates(
+        liquid, grid, (r, mx, my), through, work, rates, moves, None
+    )
 
 
 @njit
@@ -129,8 +167,12 @@ def nonlinear_grid(tables, b, y, dydt, table, moves, phi):
     """
     basin = tables.basins[b]
     reflect, through, work = boundary_arrays(tables, basin)
-    grid, liquid, rates = grid_of(tables, b, reflect), liquid_of(basin, True, table), rates_of(tables, basin, dydt)
-    return liquid_grid.nonlinear_grid_rates(liquid, grid, states_of(tables, basin, y), through, work, rates, moves, phi)
+    grid = grid_of(tables, b, reflect)
+    liquid = liquid_of(basin, True, table)
+    rates = rates_of(tables, basin, dydt)
+    return liquid_grid.nonlinear_grid_rates(
+        liquid, grid, states_of(tables, basin, y), through, work, rates, moves, phi
+    )
 
 
 @njit
@@ -163,9 +205,13 @@ def mesh_rates_of(tables, b, states, dydt, full, table, moves, phi):
     """
     basin, band = tables.basins[b], band_cells(tables, b)
     reflect, through, work = boundary_arrays(tables, basin)
-    floats, integers, no_flow = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :], tables.work[:0]
+    floats = tables.plane[basin["mesh"] :]
+    integers = tables.integers[basin["links"] :]
+    no_flow = tables.work[:0]
     liquid, rates = liquid_of(basin, full, table), rates_of(tables, basin, dydt)
-    return mesh_rates(liquid, floats, integers, reflect, states, no_flow, through, work, rates, band, moves, phi)
+    return mesh_rates(
+        liquid, floats, integers, reflect, states, no_flow, through, work, rates, band, moves, phi
+    )
 
 
 @njit
@@ -184,7 +230,9 @@ def raised_densities(tables, basin, y):
 
     phi : potential of the frame of the basin
     """
-    at, n, o = int(tables.plane[basin["frame"] + frames.POTENTIALS]), basin["n"], basin["y"]
+    at = int(tables.plane[basin["frame"] + frames.POTENTIALS])
+    n = basin["n"]
+    o = basin["y"]
     raised, per = tables.work[at : at + n], basin["density"] / (basin["speed"] * basin["speed"])
     frames.add_potential(tables.plane, basin, per, y[o : o + n], raised)
     return (raised,)
@@ -193,12 +241,20 @@ def raised_densities(tables, basin, y):
 @njit
 def grid_potentials(tables, basin, y):
     """`Potentials` of the frame at cells, faces between columns and faces between rows: views of `tables.work`."""
-    plane, nx, ny = tables.plane, basin["nx"], basin["ny"]
+    plane = tables.plane
+    nx = basin["nx"]
+    ny = basin["ny"]
     at = int(plane[basin["frame"] + frames.CELL_POSITIONS])
-    x, y, lines = plane[at : at + nx], plane[at + nx : at + nx + ny], at + nx + ny
+    x = plane[at : at + nx]
+    y = plane[at + nx : at + nx + ny]
+    lines = at + nx + ny
     across, along = plane[lines : lines + nx + 1], plane[lines + nx + 1 : lines + nx + ny + 2]
-    work, n, face_count = tables.work[int(plane[basin["frame"] + frames.POTENTIALS]) :], nx * ny, (nx + 1) * ny
-    cells, columns, rows = work[:n], work[n : n + face_count], work[n + face_count : n + face_count + nx * (ny + 1)]
+    work = tables.work[int(plane[basin["frame"] + frames.POTENTIALS]) :]
+    n = nx * ny
+    face_count = (nx + 1) * ny
+    cells = work[:n]
+    columns = work[n : n + face_count]
+    rows = work[n + face_count : n + face_count + nx * (ny + 1)]
     phi = frames.potential_coefficients(plane, basin["frame"], 1.0)
     frames.add_potential_rows(phi, x, y, None, cells)
     frames.add_potential_rows(phi, across, y, None, columns)
@@ -209,18 +265,29 @@ def grid_potentials(tables, basin, y):
 @njit
 def mesh_potentials(tables, basin, y):
     """Potential phi of the frame [J/kg] at cells and at the sides of cells of a mesh: two views of `tables.work`."""
-    plane, at, n = tables.plane, int(tables.plane[basin["frame"] + frames.CELL_POSITIONS]), basin["n"]
-    integers, work = tables.integers[basin["links"] :], tables.work[int(plane[basin["frame"] + frames.POTENTIALS]) :]
-    count, phi = blocks(integers) * integers[0] * BLOCK, frames.potential_coefficients(plane, basin["frame"], 1.0)
+    plane = tables.plane
+    at = int(tables.plane[basin["frame"] + frames.CELL_POSITIONS])
+    n = basin["n"]
+    integers = tables.integers[basin["links"] :]
+    work = tables.work[int(plane[basin["frame"] + frames.POTENTIALS]) :]
+    count = blocks(integers) * integers[0] * BLOCK
+    phi = frames.potential_coefficients(plane, basin["frame"], 1.0)
     cells, sides = work[:n], work[n : n + count]
     frames.add_potential_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], None, cells)
     at += 2 * n
-    frames.add_potential_points(phi, plane[at : at + count], plane[at + count : at + 2 * count], None, sides)
+    frames.add_potential_points(
+        phi, plane[at : at + count], plane[at + count : at + 2 * count], None, sides
+    )
     return cells, sides
 
 
 # Constants of the template: True for grids; motion; True for the law `table`; functions for rates, walls and frames.
-GRIDS, MOTION, TABLED, CELLS, MOVES, FRAME = True, FIXED, False, linear_grid, no_motion, no_frame
+GRIDS = True
+MOTION = FIXED
+TABLED = False
+CELLS = linear_grid
+MOVES = no_motion
+FRAME = no_frame
 
 
 def _rates(t, y, dydt, out, handle):
@@ -240,11 +307,14 @@ def _rates(t, y, dydt, out, handle):
             out[RATE] = max(out[RATE], rate)
 
 
-ON_GRIDS, ON_MESHES = {"MOTION": ON_BODY, "FRAME": grid_potentials}, {"MOTION": ON_BODY, "FRAME": mesh_potentials}
+ON_GRIDS = {"MOTION": ON_BODY, "FRAME": grid_potentials}
+ON_MESHES = {"MOTION": ON_BODY, "FRAME": mesh_potentials}
 RAISED = {"MOTION": ON_BODY, "FRAME": raised_densities}
-MOVING_GRIDS, MOVING_MESHES = {"MOTION": MOVING, "MOVES": grid_motion}, {"MOTION": MOVING, "MOVES": mesh_motion}
+MOVING_GRIDS = {"MOTION": MOVING, "MOVES": grid_motion}
+MOVING_MESHES = {"MOTION": MOVING, "MOVES": mesh_motion}
 LINEAR_GRID, LOG_GRID = {"CELLS": linear_grid}, {"CELLS": nonlinear_grid}
-LINEAR_MESH, LOG_MESH = {"GRIDS": False, "CELLS": linear_mesh}, {"GRIDS": False, "CELLS": nonlinear_mesh}
+LINEAR_MESH = {"GRIDS": False, "CELLS": linear_mesh}
+LOG_MESH = {"GRIDS": False, "CELLS": nonlinear_mesh}
 TABLE_GRID, TABLE_MESH = LOG_GRID | {"TABLED": True}, LOG_MESH | {"TABLED": True}
 
 linear_grids = specialise(_rates, "linear_grids", **LINEAR_GRID)

@@ -19,7 +19,8 @@ from fvsolve.jit import inline, njit
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 GHOSTS = 3  # number of ghost cells beyond a side
-RING = 8  # stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side
+# stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side
+RING = 8
 CLOSURE_CELLS = 5  # cells read by the closure of a side
 SIDE_VALUES = GHOSTS + CLOSURE_CELLS
 SIDE_WORK = 2 * SIDE_VALUES + 2 * CLOSURE_CELLS + GHOSTS  # length of the work array of a side
@@ -112,14 +113,29 @@ def work_size(nx):
 @inline
 def open_work(work, nx):
     """`LiquidWork` of a grid of nx columns in its work array."""
-    ring, wide, f = RING * nx, nx + 2 * GHOSTS, nx + 1
-    up, down, east, west = work[:ring], work[ring : 2 * ring], work[2 * ring :][:wide], work[2 * ring + wide :][:wide]
+    ring = RING * nx
+    wide = nx + 2 * GHOSTS
+    f = nx + 1
+    up = work[:ring]
+    down = work[ring : 2 * ring]
+    east = work[2 * ring :][:wide]
+    west = work[2 * ring + wide :][:wide]
     rest = work[2 * ring + 2 * wide :]
-    forward, backward, faces, rest = rest[:f], rest[f : 2 * f], rest[2 * f :][: 6 * nx], rest[2 * f + 6 * nx :]
+    forward = rest[:f]
+    backward = rest[f : 2 * f]
+    faces = rest[2 * f :][: 6 * nx]
+    rest = rest[2 * f + 6 * nx :]
     spare, rest = rest[:SIDE_WORK], rest[SIDE_WORK:]
-    aside, over, rest = rest[:ring], rest[ring:][:wide], rest[ring + wide :]
-    along, seen, w, top = rest[:f], rest[f : 2 * f], rest[2 * f :][:nx], rest[2 * f + nx :][:nx]
-    return LiquidWork(up, down, aside, faces, east, west, over, forward, backward, along, w, top, seen, spare)
+    aside = rest[:ring]
+    over = rest[ring:][:wide]
+    rest = rest[ring + wide :]
+    along = rest[:f]
+    seen = rest[f : 2 * f]
+    w = rest[2 * f :][:nx]
+    top = rest[2 * f + nx :][:nx]
+    return LiquidWork(
+        up, down, aside, faces, east, west, over, forward, backward, along, w, top, seen, spare
+    )
 
 
 @njit(forceinline=True)
@@ -132,7 +148,11 @@ def ring_offset(j, nx):
 def face_values(work, j, nx):
     """Three arrays with the values at row j of faces, in the ring buffer."""
     at = 3 * nx * (j % 2)
-    return work.faces[at : at + nx], work.faces[at + nx : at + 2 * nx], work.faces[at + 2 * nx : at + 3 * nx]
+    return (
+        work.faces[at : at + nx],
+        work.faces[at + nx : at + 2 * nx],
+        work.faces[at + 2 * nx : at + 3 * nx],
+    )
 
 
 @njit
@@ -154,7 +174,12 @@ def side_kind(reflect):
 def side_kinds(reflect, nx, ny):
     """Kinds (WALLS, MIRRORS or OPEN) of the western, eastern, southern and northern side, see `side_kind`."""
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    return side_kind(reflect[:ny]), side_kind(reflect[ny : 2 * ny]), side_kind(south), side_kind(north)
+    return (
+        side_kind(reflect[:ny]),
+        side_kind(reflect[ny : 2 * ny]),
+        side_kind(south),
+        side_kind(north),
+    )
 
 
 @njit
@@ -163,7 +188,11 @@ def scheme_for(scheme, n, first, second):
 
     It is MUSCL for fewer than five cells, except between walls or under `UPWIND`.
     """
-    return scheme if (first == WALLS and second == WALLS) or n >= CLOSURE_CELLS or scheme == UPWIND else MUSCL
+    return (
+        scheme
+        if (first == WALLS and second == WALLS) or n >= CLOSURE_CELLS or scheme == UPWIND
+        else MUSCL
+    )
 
 
 @njit
@@ -216,21 +245,42 @@ def put_faces_along(liquid, grid, j, work, moves):
     moves : None, or the `GridMotion` of moving walls
     """
     nx, ny, reflect, (first, last, _, _) = grid.nx, grid.ny, grid.reflect, grid.sides
-    scheme, limiter, small = scheme_for(liquid.scheme, nx, first, last), liquid.limiter, liquid.small
-    east, west, forward, backward = work.east, work.west, work.forward, work.backward
+    scheme = scheme_for(liquid.scheme, nx, first, last)
+    limiter = liquid.limiter
+    small = liquid.small
+    east = work.east
+    west = work.west
+    forward = work.forward
+    backward = work.backward
     if moves is None or moves.speed_x.size == 0:
         mirror(nx, east, west)
     else:
-        mirror_at_walls(liquid.full, liquid.c, liquid.rho, nx, moves.speed_x[0], moves.speed_x[nx], east, west)
+        mirror_at_walls(
+            liquid.full, liquid.c, liquid.rho, nx, moves.speed_x[0], moves.speed_x[nx], east, west
+        )
     if first != WALLS:
         close_side(first, scheme, limiter, small, reflect[j], nx, east, west, GHOSTS, 1, work.spare)
     if last != WALLS:
-        close_side(last, scheme, limiter, small, reflect[ny + j], nx, west, east, nx + GHOSTS - 1, -1, work.spare)
+        close_side(
+            last,
+            scheme,
+            limiter,
+            small,
+            reflect[ny + j],
+            nx,
+            west,
+            east,
+            nx + GHOSTS - 1,
+            -1,
+            work.spare,
+        )
     faces(scheme, limiter, small, east, east[1:], east[2:], east[3:], east[4:], forward)
     faces(scheme, limiter, small, west[5:], west[4:], west[3:], west[2:], west[1:], backward)
     if moves is not None and moves.speed_x.size > 0:
         reflect_at_wall(liquid.full, liquid.c, liquid.rho, -moves.speed_x[0], backward, forward, 1)
-        reflect_at_wall(liquid.full, liquid.c, liquid.rho, moves.speed_x[nx], forward[nx:], backward[nx:], 1)
+        reflect_at_wall(
+            liquid.full, liquid.c, liquid.rho, moves.speed_x[nx], forward[nx:], backward[nx:], 1
+        )
     if first != WALLS:
         forward[0] = reflect[j] * backward[0]
     if last != WALLS:
@@ -244,16 +294,26 @@ def put_faces_across(liquid, grid, j, work, forward, backward, moves):
     moves : None, or the `GridMotion` of moving walls
     """
     nx, ny, up, down, (_, _, first, last) = grid.nx, grid.ny, work.up, work.down, grid.sides
-    scheme, limiter, small = scheme_for(liquid.scheme, ny, first, last), liquid.limiter, liquid.small
-    a, b, c = ring_offset(j - 3, nx), ring_offset(j - 2, nx), ring_offset(j - 1, nx)
-    d, e, g = ring_offset(j, nx), ring_offset(j + 1, nx), ring_offset(j + 2, nx)
+    scheme = scheme_for(liquid.scheme, ny, first, last)
+    limiter = liquid.limiter
+    small = liquid.small
+    a = ring_offset(j - 3, nx)
+    b = ring_offset(j - 2, nx)
+    c = ring_offset(j - 1, nx)
+    d = ring_offset(j, nx)
+    e = ring_offset(j + 1, nx)
+    g = ring_offset(j + 2, nx)
     faces(scheme, limiter, small, up[a:], up[b:], up[c:], up[d:], up[e:], forward)
     faces(scheme, limiter, small, down[g:], down[e:], down[d:], down[c:], down[b:], backward)
     if moves is not None and moves.speed_y.size > 0:
         if j == 0:
-            reflect_at_wall(liquid.full, liquid.c, liquid.rho, -moves.speed_y[0], backward, forward, nx)
+            reflect_at_wall(
+                liquid.full, liquid.c, liquid.rho, -moves.speed_y[0], backward, forward, nx
+            )
         if j == ny:
-            reflect_at_wall(liquid.full, liquid.c, liquid.rho, moves.speed_y[ny], forward, backward, nx)
+            reflect_at_wall(
+                liquid.full, liquid.c, liquid.rho, moves.speed_y[ny], forward, backward, nx
+            )
     if j == 0 and first != WALLS:
         reflect_waves(grid.reflect[2 * ny :], backward, forward)
     if j == ny and last != WALLS:
@@ -316,7 +376,9 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
             entering[at], leaving[at] = reflect * outgoing[k], reflect * incoming[k]
         return
     degree = 0 if scheme == UPWIND else 4
-    a, b, c = outgoing[2], outgoing[1], outgoing[0]
+    a = outgoing[2]
+    b = outgoing[1]
+    c = outgoing[0]
     leaving_ghosts(outgoing, n, scheme, degree, limiter, small, ghosts)
     for k in range(GHOSTS):
         leaving[first - step * (k + 1)] = ghosts[k]
@@ -338,14 +400,29 @@ def close_rows(liquid, grid, north, work):
     nx, ny, (_, _, first, last) = grid.nx, grid.ny, grid.sides
     kind, row, step = (last, ny - 1, -1) if north else (first, 0, 1)
     entering, leaving = (work.down, work.up) if north else (work.up, work.down)
-    reflect, scheme = grid.reflect[2 * ny + (nx if north else 0) :], scheme_for(liquid.scheme, ny, first, last)
+    reflect = grid.reflect[2 * ny + (nx if north else 0) :]
+    scheme = scheme_for(liquid.scheme, ny, first, last)
     spare = work.spare
-    incoming, outgoing, rest = spare[:SIDE_VALUES], spare[SIDE_VALUES : 2 * SIDE_VALUES], spare[2 * SIDE_VALUES :]
+    incoming = spare[:SIDE_VALUES]
+    outgoing = spare[SIDE_VALUES : 2 * SIDE_VALUES]
+    rest = spare[2 * SIDE_VALUES :]
     for i in range(nx):
         for k in range(min(ny, CLOSURE_CELLS)):
             at = ((row + step * k) % RING) * nx + i
             incoming[GHOSTS + k], outgoing[GHOSTS + k] = entering[at], leaving[at]
-        close_side(kind, scheme, liquid.limiter, liquid.small, reflect[i], ny, incoming, outgoing, GHOSTS, 1, rest)
+        close_side(
+            kind,
+            scheme,
+            liquid.limiter,
+            liquid.small,
+            reflect[i],
+            ny,
+            incoming,
+            outgoing,
+            GHOSTS,
+            1,
+            rest,
+        )
         for k in range(GHOSTS):
             at = ((row - step * (k + 1)) % RING) * nx + i
             entering[at], leaving[at] = incoming[GHOSTS - 1 - k], outgoing[GHOSTS - 1 - k]

@@ -45,7 +45,9 @@ class RiemannInvariants:
         settings, floats = np.zeros(1, rec.SETTINGS), []
         TableLaw.lower(fluid, settings[0], floats)
         n, start, step = (settings[0][key] for key in ("table_size", "table_start", "table_step"))
-        knots, value, slope = start + step * np.arange(n), np.array(floats[:n]), np.array(floats[n : 2 * n])
+        knots = start + step * np.arange(n)
+        value = np.array(floats[:n])
+        slope = np.array(floats[n : 2 * n])
         extension, self.rest, self.interval_count = knots[-1] - knots[0], pressure, 3 * int(n - 1)
         self.ends = min(knots[0], pressure) - extension, max(knots[-1], pressure) + extension
         below, above = self.ends[0] - knots[0], self.ends[1] - knots[-1]
@@ -74,7 +76,9 @@ class RiemannInvariants:
 
     def impedance(self, p):
         """Density times wave speed [kg/(m2 s)] at a pressure p [Pa]."""
-        return np.sqrt(self.density * np.exp(self.stretch(p)) / (self.compressibility(p) + self.compliance))
+        return np.sqrt(
+            self.density * np.exp(self.stretch(p)) / (self.compressibility(p) + self.compliance)
+        )
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
         """Pressure [Pa] at deviations of density from rest [kg/m3], by Newton iteration."""
@@ -87,7 +91,9 @@ class RiemannInvariants:
     @cached_property
     def grid(self) -> np.ndarray:
         """Pressures [Pa] that divide the range into intervals of integration, including the pressure at rest."""
-        return np.unique(np.append(np.linspace(*self.ends, PANELS * self.interval_count + 1), self.rest))
+        return np.unique(
+            np.append(np.linspace(*self.ends, PANELS * self.interval_count + 1), self.rest)
+        )
 
     @cached_property
     def invariant(self):
@@ -98,7 +104,9 @@ class RiemannInvariants:
         half = 0.5 * np.diff(self.grid)
         places = self.grid[:-1, None] + half[:, None] * (1.0 + nodes)
         w = np.append(0.0, np.cumsum(half * ((1.0 / self.impedance(places)) @ weights)))
-        return CubicHermiteSpline(self.grid, w - w[self.grid == self.rest], 1.0 / self.impedance(self.grid))
+        return CubicHermiteSpline(
+            self.grid, w - w[self.grid == self.rest], 1.0 / self.impedance(self.grid)
+        )
 
     def pressure_of(self, w: np.ndarray) -> np.ndarray:
         """Pressure [Pa] at the invariant w [m/s], by Newton iteration."""
@@ -114,8 +122,10 @@ class RiemannInvariants:
         p, q = self.pressure(r), self.pressure_of(w)
         density_of_r, density_of_w = self.density + r, self.density + self.deviation(q)
         of_r = cubics(self.invariant(p), self.impedance(p) / density_of_r**2 / per_r, first_r)
-        of_w = [cubics(self.deviation(q), density_of_w**2 / self.impedance(q) / per_w, first_w),
-                cubics(q - self.rest, self.impedance(q) / per_w, first_w)]  # fmt: skip
+        of_w = [
+            cubics(self.deviation(q), density_of_w**2 / self.impedance(q) / per_w, first_w),
+            cubics(q - self.rest, self.impedance(q) / per_w, first_w),
+        ]
         head = [per_r, first_r, r.size - 2, HEAD, per_w, first_w, w.size - 2, HEAD + of_r.size]
         return np.concatenate([head, of_r.ravel(), np.hstack(of_w).ravel()])
 
@@ -188,7 +198,9 @@ class LiquidRows(BasinRows):
             yield FRAME_FORCES
         if self.moves:
             yield RhsTerms(
-                package=PACKAGE, power="liquid_energy: add_wall_power", stored="liquid_energy: add_wall_stored"
+                package=PACKAGE,
+                power="liquid_energy: add_wall_power",
+                stored="liquid_energy: add_wall_stored",
             )
         yield SHORTAGES
 
@@ -196,7 +208,13 @@ class LiquidRows(BasinRows):
         """Name of the compiled function that computes the rates of the cells, as `module: function`."""
         law = "table" if self.waves is not None else "linear" if self.linear else "log"
         mesh = "grids" if self.is_grid else "meshes"
-        kind = f"moving_{mesh}" if self.moves else mesh if self.part.on is None else f"{mesh}_on_bodies"
+        kind = (
+            f"moving_{mesh}"
+            if self.moves
+            else mesh
+            if self.part.on is None
+            else f"{mesh}_on_bodies"
+        )
         return f"liquid_rates: {law}_{kind}"
 
     @property
@@ -208,7 +226,11 @@ class LiquidRows(BasinRows):
         return self.is_grid and self.linear and not self.undivided_reason
 
     def scales(self) -> list[float]:
-        return [PRESSURE_SCALE / self.speed**2, PRESSURE_SCALE / self.speed, PRESSURE_SCALE / self.speed]
+        return [
+            PRESSURE_SCALE / self.speed**2,
+            PRESSURE_SCALE / self.speed,
+            PRESSURE_SCALE / self.speed,
+        ]
 
     def reflection(self, patch) -> float:
         if patch.impedance is None:
@@ -225,12 +247,18 @@ class LiquidRows(BasinRows):
         if linked and coefficients.size == 0:
             coefficients = np.ones(mesh.left.size - mesh.inner)
         for name in linked:
-            own = coefficients[mesh.patch(name).start - mesh.inner : mesh.patch(name).stop - mesh.inner]
+            own = coefficients[
+                mesh.patch(name).start - mesh.inner : mesh.patch(name).stop - mesh.inner
+            ]
             own[own == 1.0] = liquid_mesh.LINKED
         return coefficients
 
     def lower(self, draft, row) -> None:
-        row["thickness"], row["speed"], row["density"] = self.part.thickness, self.speed, self.density
+        row["thickness"], row["speed"], row["density"] = (
+            self.part.thickness,
+            self.speed,
+            self.density,
+        )
         height = self.case.properties.density * self.case.gravity * (self.part.elevation or 0.0)
         row["rest"] = self.part.pressure - self.case.ambient_pressure + height
         row["small"] = (SMALL * self.speed * (self.density if self.linear else 1.0)) ** 2
@@ -249,9 +277,15 @@ class LiquidRows(BasinRows):
         A fault is added if the wave speed is greater than the speed of sound, because walls can only reduce it.
         """
         if self.waves.speed > (1.0 + 1e-9) * self.waves.fluid_speed:
-            speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.fluid_speed))
-            draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
-                        "expected at most that speed, or another density law")  # fmt: skip
+            speed, sound = (
+                draft.case.amount(value, "velocity", 6)
+                for value in (self.speed, self.waves.fluid_speed)
+            )
+            draft.fault(
+                f"nodes.{self.name}.wave_speed",
+                f"{speed} is faster than sound in the fluid, {sound}; "
+                "expected at most that speed, or another density law",
+            )
         row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
@@ -274,7 +308,9 @@ class LiquidRows(BasinRows):
         states, given = np.zeros((3, self.n)), self.part.start
         rest = 0.0 if self.part.on is None else self.pressure_at_start()
         if given is not None or self.part.on is not None:
-            states[0] = self.deviation(rest + (0.0 if given is None else self.formula(given.pressure)))
+            states[0] = self.deviation(
+                rest + (0.0 if given is None else self.formula(given.pressure))
+            )
         if given is not None:
             density = self.density + (0.0 if self.linear else states[0])
             states[1], states[2] = density * self.formula(given.u), density * self.formula(given.v)
@@ -319,7 +355,9 @@ class LiquidRows(BasinRows):
         return self.density
 
     def thrust_at_rest(self) -> np.ndarray:
-        return np.full(self.n, (self.part.pressure - self.case.ambient_pressure) * self.part.thickness)
+        return np.full(
+            self.n, (self.part.pressure - self.case.ambient_pressure) * self.part.thickness
+        )
 
     def mass(self) -> tuple[float, np.ndarray]:
         per, fluid = self.part.thickness * self.mesh.area, self.case.properties
@@ -334,7 +372,12 @@ class LiquidRows(BasinRows):
 
     def energy_of_waves(self, y: np.ndarray) -> float:
         square = (self.speed * y[0]) ** 2 + y[1] ** 2 + y[2] ** 2
-        return float(0.5 * self.part.thickness / self.case.properties.density * np.sum(self.mesh.area * square))
+        return float(
+            0.5
+            * self.part.thickness
+            / self.case.properties.density
+            * np.sum(self.mesh.area * square)
+        )
 
     def above(self, y: np.ndarray, datum: float) -> float:
         rho, height = self.case.properties.density, (self.part.elevation or 0.0) - datum

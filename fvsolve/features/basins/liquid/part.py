@@ -11,14 +11,19 @@ class LiquidStart(VelocityStart):
     """Keys of the table `start` of a liquid that is not at rest at the start."""
 
     pressure: Annotated[
-        SpatialField | None, SpatialFieldKey("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]")
+        SpatialField | None,
+        SpatialFieldKey("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]"),
     ] = None
 
 
 class Liquid(Physics, name="liquid"):
     """Density r, mass-flow density m, pressure p: r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0."""
 
-    states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
+    states: ClassVar[dict[str, str]] = {
+        "density": "kg/m3",
+        "flow_x": "kg/(m2 s)",
+        "flow_y": "kg/(m2 s)",
+    }
     fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **VELOCITY_FIELDS}
     starts: ClassVar[type[VelocityStart]] = LiquidStart
     laws: ClassVar[tuple[str, ...]] = ("linear", "log", "table")
@@ -30,14 +35,24 @@ class Liquid(Physics, name="liquid"):
     pressure: Annotated[
         float,
         Quantity(
-            "pressure", positive, "pressure at rest (on a body: at the middle of the basin) [Pa]; required for a liquid"
+            "pressure",
+            positive,
+            "pressure at rest (on a body: at the middle of the basin) [Pa]; required for a liquid",
         ),
     ]
     thickness: Annotated[
-        float, Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1")
+        float,
+        Quantity(
+            "length",
+            positive,
+            "thickness normal to the plane [m]; required for a liquid, else default 1",
+        ),
     ]
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "wave speed of a liquid [m/s]; default: wave speed of the fluid")
+        float | None,
+        Quantity(
+            "velocity", positive, "wave speed of a liquid [m/s]; default: wave speed of the fluid"
+        ),
     ] = None
 
     @classmethod

@@ -23,7 +23,9 @@ def locate(table, grid, x, size):
     grid : W_OF_R if x is a deviation of density, OF_W if x is an invariant; size : number of coefficients per interval
     For NaN the result is the first interval and s = NaN.
     """
-    z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
+    z = x * table[grid]
+    first = table[grid + 1]
+    last = table[grid + 2]
     k = z - first
     k = k if k > 0.0 else 0.0
     k = k if k < last else last
@@ -35,7 +37,9 @@ def locate(table, grid, x, size):
 def invariant(table, r):
     """(w [m/s], dw/dr = c / rho) at a deviation r of density from rest [kg/m3]; table : see `riemann_invariants`."""
     k, s = locate(table, W_OF_R, r, 4)
-    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    b = table[k + 1]
+    c = table[k + 2]
+    d = table[k + 3]
     return table[k] + s * (b + s * (c + s * d)), table[W_OF_R] * (b + s * (2.0 * c + 3.0 * s * d))
 
 
@@ -54,7 +58,9 @@ def state(table, w):
 def speed(table, rho, w):
     """Wave speed c [m/s] at the invariant w [m/s]; table : see `riemann_invariants`; rho : density at rest [kg/m3]"""
     k, s = locate(table, OF_W, w, 8)
-    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    b = table[k + 1]
+    c = table[k + 2]
+    d = table[k + 3]
     dense = rho + table[k] + s * (b + s * (c + s * d))
     return dense / (table[OF_W] * (b + s * (2.0 * c + 3.0 * s * d)))
 

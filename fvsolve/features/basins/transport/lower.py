@@ -21,9 +21,12 @@ if TYPE_CHECKING:
 
 COLUMNS = (("x", "y", "u", "v"), ("x", "y", "psi"))  # of a file
 DIMENSIONS = {"x": "length", "y": "length", "u": "velocity", "v": "velocity", "psi": "diffusivity"}
-EXACT_BITS = 50  # bits of a stream function after rounding, so that sums of its differences are exact
-ROUNDING = 64 * np.finfo(float).eps  # relative error of a stream function and of the positions of corners
-ROUNDED_CROSSFLOW = 1e-9  # of the greatest velocity: smaller velocities across the outline are rounding, set to zero
+# bits of a stream function after rounding, so that sums of its differences are exact
+EXACT_BITS = 50
+# relative error of a stream function and of the positions of corners
+ROUNDING = 64 * np.finfo(float).eps
+# of the greatest velocity: smaller velocities across the outline are rounding, set to zero
+ROUNDED_CROSSFLOW = 1e-9
 
 
 class TransportRows(BasinRows):
@@ -35,7 +38,9 @@ class TransportRows(BasinRows):
     given = banded = True
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        yield RhsTerms(package="fvsolve.features.basins", observe="basin_scalars: observe_given_flows")
+        yield RhsTerms(
+            package="fvsolve.features.basins", observe="basin_scalars: observe_given_flows"
+        )
 
     @property
     def forms_stages(self) -> bool:
@@ -56,7 +61,9 @@ class TransportRows(BasinRows):
             through = np.maximum(along[:, 1:], along[:, :-1]) + np.maximum(across[1:], across[:-1])
             row["fastest"] = (kx * ky[:, None] * through).max()
             worst = np.unravel_index(np.argmax(kx * ky[:, None] * through), through.shape)
-            self.share = float(np.maximum(along[:, 1:], along[:, :-1])[worst] / max(through[worst], 1e-300))
+            self.share = float(
+                np.maximum(along[:, 1:], along[:, :-1])[worst] / max(through[worst], 1e-300)
+            )
         else:
             row["flows"], inner = draft.to_plane(flows), mesh.inner
             through = np.bincount(mesh.left, np.abs(flows), self.n)
@@ -69,8 +76,11 @@ class TransportRows(BasinRows):
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
             speed = np.abs(flows[own]) / mesh.length[own]
-            around = is_outer_loop(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
-            at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
+            # report the outer outline, before the outlines of holes
+            around = is_outer_loop(mesh)[own - mesh.inner]
+            at = mesh.middle[
+                own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]
+            ]
             text = f"the flow crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m"
             remedy = "where there is no named patch; expected a patch with a name there"
             draft.fault(f"nodes.{self.name}.velocity", f"{text}, {remedy}")
@@ -101,7 +111,9 @@ class TransportRows(BasinRows):
         """
         given, mesh = self.part.velocity.given, self.mesh
         if self.part.velocity.form == "u, v":
-            return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))
+            return velocity_flows(
+                mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv")
+            )
         if self.part.velocity.form == "stream":
             given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
         try:
@@ -153,7 +165,8 @@ def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
 
 # Stream functions psi(x, y, parameters) [m2/s] with u = psi_y, v = -psi_x. To add an expression, add a function here.
 EXPRESSIONS: dict[str, Callable[..., np.ndarray]] = {
-    function.__name__: function for function in (constant, rotation, swirl, shear, parabolic, cellular)
+    function.__name__: function
+    for function in (constant, rotation, swirl, shear, parabolic, cellular)
 }
 
 
@@ -168,7 +181,9 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
     kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
     given = [kind for kind in kinds if kind in velocity]
     if len(given) != 1:
-        raise ValueError(f"velocity has {listing(velocity) or 'nothing'}; expected one of {listing(kinds)}")
+        raise ValueError(
+            f"velocity has {listing(velocity) or 'nothing'}; expected one of {listing(kinds)}"
+        )
     return kinds[given[0]](mesh, **velocity)
 
 
@@ -184,7 +199,10 @@ def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError("the mesh is not a full rectangle; expected a rectangle without holes")
     j, i = np.divmod(mesh.left, grid.nx)
     flow_x, flow_y = np.zeros(grid.ny * (grid.nx + 1)), np.zeros((grid.ny + 1) * grid.nx)
-    for to, part, first, step in ((flow_x, 0, j * (grid.nx + 1) + i, 1), (flow_y, 1, j * grid.nx + i, grid.nx)):
+    for to, part, first, step in (
+        (flow_x, 0, j * (grid.nx + 1) + i, 1),
+        (flow_y, 1, j * grid.nx + i, grid.nx),
+    ):
         ahead, behind = mesh.normal[:, part] > 0.5, mesh.normal[:, part] < -0.5
         to[first[ahead] + step] = flows[ahead]
         to[first[behind]] = -flows[behind]
@@ -200,10 +218,14 @@ def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
     for name in parameters:
         if name not in known:
             close = did_you_mean(name, known)
-            raise ValueError(f'velocity "{expression}" has no parameter {name}; expected {listing(known)}{close}')
+            raise ValueError(
+                f'velocity "{expression}" has no parameter {name}; expected {listing(known)}{close}'
+            )
     missing = [name for name, p in known.items() if p.default is p.empty and name not in parameters]
     if missing:
-        raise ValueError(f'velocity "{expression}" needs values of more parameters: {listing(missing)}')
+        raise ValueError(
+            f'velocity "{expression}" needs values of more parameters: {listing(missing)}'
+        )
     return _by_corners(mesh, function(mesh.points[:, 0], mesh.points[:, 1], **parameters))
 
 
@@ -233,15 +255,22 @@ def connected(points: int, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    return connected_components(coo_array((np.ones(start.size), (start, stop)), shape=(points, points)))[1]
+    return connected_components(
+        coo_array((np.ones(start.size), (start, stop)), shape=(points, points))
+    )[1]
 
 
 def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     """Stream function, made constant along boundary parts where it varies by rounding errors only : float64[p]."""
     steps = np.abs(np.diff(stream[mesh.ends], axis=1)[:, 0])
-    reach = (steps / mesh.length).max() * np.abs(mesh.points).max()  # effect of rounding errors of positions
-    start, stop = mesh.ends[mesh.inner :][steps[mesh.inner :] <= ROUNDING * (np.abs(stream).max() + reach)].T
-    _, first, stretch = np.unique(connected(stream.size, start, stop), return_index=True, return_inverse=True)
+    # effect of rounding errors of positions
+    reach = (steps / mesh.length).max() * np.abs(mesh.points).max()
+    start, stop = mesh.ends[mesh.inner :][
+        steps[mesh.inner :] <= ROUNDING * (np.abs(stream).max() + reach)
+    ].T
+    _, first, stretch = np.unique(
+        connected(stream.size, start, stop), return_index=True, return_inverse=True
+    )
     return stream[first[stretch]]
 
 
@@ -279,7 +308,9 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
             header = show(", ".join(rows.header))
-            raise CsvError(path.name, f"its header is {header}; expected x, y, u, v or x, y, psi", 1)
+            raise CsvError(
+                path.name, f"its header is {header}; expected x, y, u, v or x, y, psi", 1
+            )
         columns = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
     except CsvError as error:
         raise MeshError([Fault("", error.message, error.line)], str(path)) from None
@@ -291,7 +322,9 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
     return columns
 
 
-def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def _interpolated(
+    file: str | Path, places: np.ndarray, values: np.ndarray, positions: np.ndarray
+) -> np.ndarray:
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
@@ -305,5 +338,7 @@ def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, posi
         (x, y), (low, high) = positions[outside][0], (places.min(axis=0), places.max(axis=0))
         text = f"the points do not enclose {outside.sum()} of {len(positions)} positions of the mesh, the first "
         span = f"({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) m"
-        raise MeshError([Fault("", f"{text}({x:.6g}, {y:.6g}) m; the points span {span}")], str(file))
+        raise MeshError(
+            [Fault("", f"{text}({x:.6g}, {y:.6g}) m; the points span {span}")], str(file)
+        )
     return result

@@ -10,7 +10,16 @@ from fvsolve.errors import listing
 from fvsolve.parts.basin import File, Physics
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.table_model import read_keys
-from fvsolve.parts.value import PROFILE, Quantity, ReadContext, Rows, Text, Value, ValueFault, positive
+from fvsolve.parts.value import (
+    PROFILE,
+    Quantity,
+    ReadContext,
+    Rows,
+    Text,
+    Value,
+    ValueFault,
+    positive,
+)
 from fvsolve.units import show
 
 
@@ -58,12 +67,18 @@ class VelocityValue(Value):
     def read(self, given: Any, setting: ReadContext) -> Velocity:
         if isinstance(given, Velocity):
             return given
-        forms = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
+        forms = [
+            way
+            for way in ("u", "v", "stream", "expression", "file")
+            if isinstance(given, dict) and way in given
+        ]
         if "expression" in forms and not {"stream", "file"} & {*forms}:
             forms = ["expression"]  # which may have parameters u and v
         if not forms or (len(forms) > 1 and forms != ["u", "v"]):
             has = (
-                f"has {listing(given) or 'nothing'}" if isinstance(given, dict) else f"{show(given)} is not a velocity"
+                f"has {listing(given) or 'nothing'}"
+                if isinstance(given, dict)
+                else f"{show(given)} is not a velocity"
             )
             raise ValueError(f"{has}; expected {self.about}")
         keys = {key: value for key, value in given.items() if key != "period"}
@@ -72,7 +87,11 @@ class VelocityValue(Value):
             period = stated["period"] = Quantity("time", positive).read(given["period"], setting)
         way = "u, v" if forms[0] in "uv" else forms[0]
         known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(keys))
-        faults = [((key,), f"unknown key; expected {listing([*known, 'period'])}") for key in keys if key not in known]
+        faults = [
+            ((key,), f"unknown key; expected {listing([*known, 'period'])}")
+            for key in keys
+            if key not in known
+        ]
         if faults:
             raise ValueFault(faults)
         if way in ("u, v", "stream"):
@@ -95,7 +114,11 @@ class Transport(Physics, name="transport"):
     velocity: Annotated[Any, VelocityValue()]
     thickness: Annotated[
         float | None,
-        Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1"),
+        Quantity(
+            "length",
+            positive,
+            "thickness normal to the plane [m]; required for a liquid, else default 1",
+        ),
     ] = None
 
     @classmethod

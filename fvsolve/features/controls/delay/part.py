@@ -14,7 +14,9 @@ class Delay(SingleInput, kind="delay"):
 
     same_unit: ClassVar[bool] = True
 
-    delay: Annotated[float, Quantity("time", positive, "time by which the output follows the input [s]")]
+    delay: Annotated[
+        float, Quantity("time", positive, "time by which the output follows the input [s]")
+    ]
 
     @property
     def passes_at_once(self) -> bool:

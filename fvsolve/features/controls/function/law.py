@@ -24,7 +24,9 @@ def formula_value(t, y, tables, control, g):
 def decide(t, y, tables, control):
     """Output before its limits."""
     floats, at = tables.floats, control["data"]
-    return floats[at + START] + (formula_value(t, y, tables, control, tables.armed[:0]) - floats[at + VALUE])
+    return floats[at + START] + (
+        formula_value(t, y, tables, control, tables.armed[:0]) - floats[at + VALUE]
+    )
 
 
 @njit

@@ -28,7 +28,9 @@ class FunctionRows(StaticRows, kind="function"):
         return program_of(start.case, start.block).value(start.time, start.time, start.inputs)
 
     def begin(self, control, start, numbers):
-        numbers[[law.START, law.VALUE]] = self.start_and_value(control, start, self.value(control, start))
+        numbers[[law.START, law.VALUE]] = self.start_and_value(
+            control, start, self.value(control, start)
+        )
 
     def flags_at_start(self, control, start, numbers):
         """Flags of the kinks: blocks that remember read a consistent value from the first moment."""

@@ -18,7 +18,10 @@ class InputNames(Value):
 
     about: str = "name in the formula, and its probe or controls.NAME"
     takes: ClassVar[str] = "`{ NAME = PROBE }`"
-    schema: ClassVar[dict[str, Any]] = {"type": "object", "additionalProperties": {"type": "string"}}
+    schema: ClassVar[dict[str, Any]] = {
+        "type": "object",
+        "additionalProperties": {"type": "string"},
+    }
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
@@ -54,7 +57,11 @@ class FormulaBlock(Control, kind="function"):
     @classmethod
     def inputs_of(cls, given: dict[str, Any]) -> dict[tuple[str, ...], Any]:
         inputs = given.get("inputs")
-        return {("inputs", name): text for name, text in inputs.items()} if isinstance(inputs, dict) else {}
+        return (
+            {("inputs", name): text for name, text in inputs.items()}
+            if isinstance(inputs, dict)
+            else {}
+        )
 
     @classmethod
     def own_dimension(cls, given: dict[str, Any]) -> str | None:
@@ -63,15 +70,23 @@ class FormulaBlock(Control, kind="function"):
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
-        names, formula, unit = given.get("inputs", {}), given.get("formula"), given.get("unit", "")
+        names = given.get("inputs", {})
+        formula = given.get("formula")
+        unit = given.get("unit", "")
         sound = isinstance(names, dict) and not any(map(name_fault, names))
         if sound and isinstance(formula, str) and isinstance(unit, str):
             output = setting.block_units[1]
             try:
-                program = program_in(unit if output else "", output, formula, tuple(names), setting.ambient)
+                program = program_in(
+                    unit if output else "", output, formula, tuple(names), setting.ambient
+                )
             except ValueFault as error:
                 raise ValueFault(error.faults, given) from None
-            if not names and setting.span is not None and (text := program.pole_fault(*setting.span)):
+            if (
+                not names
+                and setting.span is not None
+                and (text := program.pole_fault(*setting.span))
+            ):
                 raise ValueFault([(("formula",), text)], given)
         return given
 

@@ -128,7 +128,9 @@ def apply_output(t, tables, k, output):
 @njit
 def write_outputs(t, y, out, tables, late):
     """Write the outputs of the blocks that decide before (late 0) or after (late 1) the nodes are solved."""
-    controls, applied, at = tables.controls, tables.applied, tables.block_settings[0]["outputs"]
+    controls = tables.controls
+    applied = tables.applied
+    at = tables.block_settings[0]["outputs"]
     for k in range(controls.size):
         control = controls[k]
         if control["late"] == late:
@@ -192,13 +194,18 @@ def decide_late(t, y, dydt, out, handle):
 def control_rates(t, y, dydt, out, handle):
     """Write the rates of filters and other states of blocks to `dydt`, and the first input of each block to `out`."""
     tables = open_blocks(handle)
-    controls, applied, at = tables.controls, tables.applied, tables.block_settings[0]["outputs"]
-    if tables.block_settings[0]["late_sensors"] == 1:  # others have been read before the nodes were solved
+    controls = tables.controls
+    applied = tables.applied
+    at = tables.block_settings[0]["outputs"]
+    # others have been read before the nodes were solved
+    if tables.block_settings[0]["late_sensors"] == 1:
         read_sensors(t, y, out, tables)
     for k in range(controls.size):
         control = controls[k]
         if control["input_count"] > 0:
-            out[at + 2 * k + 1] = tables.floats[control["starts"]] + input_change(y, tables, control, 0)
+            out[at + 2 * k + 1] = tables.floats[control["starts"]] + input_change(
+                y, tables, control, 0
+            )
         if dydt.size == 0:
             continue
         for j in range(control["filters"]):
@@ -208,7 +215,9 @@ def control_rates(t, y, dydt, out, handle):
         hook = tables.block_hooks[control["hooks"], ADAPT]
         # States of sampled blocks change at samples alone.
         if hook != 0 and control["y"] >= 0 and control["period"] == 0.0:
-            call_adapt(hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k])
+            call_adapt(
+                hook, t, y, dydt, tables, control, applied[controls.size + k], out[at + 2 * k]
+            )
         if not abs(applied[k]) < inf:
             dydt[0] = nan  # the run must not go on, whatever a driven part makes of this output
 
@@ -225,7 +234,9 @@ def outputs_for_events(t, y, out, handle, g):
 def control_events(t, y, out, handle, g):
     """Write the event functions of all blocks to g, from solved nodes."""
     tables = open_blocks(handle)
-    controls, applied, none = tables.controls, tables.applied, tables.armed[:0]
+    controls = tables.controls
+    applied = tables.applied
+    none = tables.armed[:0]
     read_sensors(t, y, out, tables)
     write_outputs(t, y, out, tables, 1)
     for k in range(controls.size):
@@ -263,7 +274,11 @@ def let_breaks_arrive(t, tables):
     found = False
     for k in range(tables.controls.size):
         control = tables.controls[k]
-        if control["delay"] > 0.0 and control["period"] == 0.0 and break_arrives(tables.histories, control, t):
+        if (
+            control["delay"] > 0.0
+            and control["period"] == 0.0
+            and break_arrives(tables.histories, control, t)
+        ):
             admit_breaks(tables, k, t)
             found = True
     return found
@@ -307,7 +322,8 @@ def record_controls(t, y, out, handle, values):
     """
     tables = open_blocks(handle)
     record_inputs(t, out, tables)
-    arrives, ends = out[ARRIVES] if tables.settings[0]["arrivals"] == 1 else NEVER, t >= tables.clock[0]["limit"]
+    arrives = out[ARRIVES] if tables.settings[0]["arrivals"] == 1 else NEVER
+    ends = t >= tables.clock[0]["limit"]
     for k in range(tables.controls.size):
         control = tables.controls[k]
         if control["period"] > 0.0 and not (ends and is_due(t, tables, control)):
@@ -326,7 +342,9 @@ def restore_outputs(t, y, out, handle, values):
     """Write the outputs of blocks at this state to `applied`, before other functions read schedules."""
     tables = open_blocks(handle)
     for k in range(tables.controls.size):  # there is none behind the handle of the sensors
-        tables.applied[k] = applied_output(tables.controls[k], out[tables.block_settings[0]["outputs"] + 2 * k])
+        tables.applied[k] = applied_output(
+            tables.controls[k], out[tables.block_settings[0]["outputs"] + 2 * k]
+        )
 
 
 @njit

@@ -30,8 +30,10 @@ HEADER = POINTS + MOST_POINTS  # size of the header
 ENTRY = 3  # numbers of an entry
 SMOOTH = -1.0
 JUMP, KINK, LAST_LEVEL, NONE = 0.0, 1.0, 5.0, 9.0
-ROUNDING = 1e-12  # of times, relative to the time and the delay, and of jumps, relative to the greatest change
-MIDDLE = (0.5 * 1.5 * 2.5) ** 2  # product of the distances of the middle of six equal steps from their ends
+# of times, relative to the time and the delay, and of jumps, relative to the greatest change
+ROUNDING = 1e-12
+# product of the distances of the middle of six equal steps from their ends
+MIDDLE = (0.5 * 1.5 * 2.5) ** 2
 FAR = 1e300  # [s]
 LEAST_RATIO = 0.3  # least ratio of a step in a polynomial to that in which the polynomial is used
 
@@ -72,7 +74,9 @@ def value_before(tables, control, t):
     last = int(histories[at + COUNT] if histories[at + NEXT] < 0.0 else histories[at + NEXT]) - 1
     first, time = int(histories[at + ARRIVED]), t - control["delay"]
     oldest = max(0, int(histories[at + COUNT]) - int(histories[CAPACITY]))
-    if first >= oldest and time < time_of(histories, at, first) - ROUNDING * (abs(t) + control["delay"]):
+    if first >= oldest and time < time_of(histories, at, first) - ROUNDING * (
+        abs(t) + control["delay"]
+    ):
         if first == 0:  # this and the next line: a part of the last step is computed again
             return before
         first, last = oldest, first - 1
@@ -96,11 +100,9 @@ def interpolated(histories, at, first, last, time):
             high = middle
     if is_after_break(histories, at, high):  # the time is that of a break, but for rounding
         return histories[place_of(histories, at, low) + 1]
-    points, base, value = (
-        choose_points(histories, at, first, last, low),
-        histories[place_of(histories, at, low) + 1],
-        0.0,
-    )
+    points = choose_points(histories, at, first, last, low)
+    base = histories[place_of(histories, at, low) + 1]
+    value = 0.0
     # Lagrange polynomial of the differences from entry `low`.
     for i in range(POINTS, POINTS + points):
         here, weight = place_of(histories, at, int(histories[i])), 1.0
@@ -108,7 +110,8 @@ def interpolated(histories, at, first, last, time):
             if j != i:
                 other = time_of(histories, at, int(histories[j]))
                 weight *= (time - other) / (histories[here] - other)
-        value += weight * (histories[here + 1] - base)  # so that a constant input has a constant output
+        # so that a constant input has a constant output
+        value += weight * (histories[here + 1] - base)
     return base + value
 
 
@@ -121,18 +124,26 @@ def choose_points(histories, at, first, last, low):
     of at least the number of points that there are without: their error is not greater than that of so few points.
     """
     histories[POINTS], histories[POINTS + 1], points, left, right = low, low + 1, 2, low, low + 1
-    gap, count_left, count_right = LEAST_RATIO * (time_of(histories, at, right) - time_of(histories, at, left)), 1, 1
+    gap = LEAST_RATIO * (time_of(histories, at, right) - time_of(histories, at, left))
+    count_left = 1
+    count_right = 1
     # In the second turn, breaks of high derivatives may be crossed, which so few points do not resolve.
     for turn in range(2):
-        crossed, goes_left, goes_right = NONE if turn == 0 else float(points), True, True
+        crossed = NONE if turn == 0 else float(points)
+        goes_left = True
+        goes_right = True
         while points < MOST_POINTS and (goes_left or goes_right):
             # Points are added on the side with fewer of them: in the middle a polynomial is most accurate.
             if goes_left and (not goes_right or count_left <= count_right):
                 chosen = point_before(histories, at, left, first, gap, crossed)
-                goes_left, left, count_left = chosen >= 0, left if chosen < 0 else chosen, count_left + 1
+                goes_left = chosen >= 0
+                left = left if chosen < 0 else chosen
+                count_left = count_left + 1
             else:
                 chosen = point_after(histories, at, right, last, gap, crossed)
-                goes_right, right, count_right = chosen >= 0, right if chosen < 0 else chosen, count_right + 1
+                goes_right = chosen >= 0
+                right = right if chosen < 0 else chosen
+                count_right = count_right + 1
             if chosen >= 0:
                 histories[POINTS + points] = chosen
                 points += 1
@@ -190,7 +201,8 @@ def record_inputs(t, out, tables):
     if histories.size == 0 or out[STATUS] != OK:
         return
     flags, longest = flags_as_number(tables.armed), 0.0
-    switched, caused = flags != histories[FLAGS] or histories[BEGINS] > 0.0, histories[BREAK_TIME] == t
+    switched = flags != histories[FLAGS] or histories[BEGINS] > 0.0
+    caused = histories[BREAK_TIME] == t
     for k in range(tables.controls.size):
         control = tables.controls[k]
         if control["delay"] > 0.0:
@@ -200,8 +212,12 @@ def record_inputs(t, out, tables):
                 level = KINK
             elif caused and histories[at + BREAK_LEVEL] <= LAST_LEVEL:
                 level = max(KINK, histories[at + BREAK_LEVEL])
-            change = out[tables.block_settings[0]["outputs"] + 2 * k + 1] - tables.floats[control["starts"]]
-            before, small = tables.floats[control["data"] + BEFORE], tables.floats[control["data"] + SMALL]
+            change = (
+                out[tables.block_settings[0]["outputs"] + 2 * k + 1]
+                - tables.floats[control["starts"]]
+            )
+            before = tables.floats[control["data"] + BEFORE]
+            small = tables.floats[control["data"] + SMALL]
             store_input(histories, at, t, change, level, before, small)
             limit = accurate_step(histories, at, tables.settings[0]["tolerance"])
             longest = limit if longest == 0.0 else min(longest, limit)
@@ -232,7 +248,8 @@ def accurate_step(histories, at, tolerance):
                 product *= time_of(histories, at, i) - time_of(histories, at, j)
         # Relative to the first value, so that a constant input gives exactly zero.
         difference += (
-            histories[place_of(histories, at, i) + 1] - histories[place_of(histories, at, first) + 1]
+            histories[place_of(histories, at, i) + 1]
+            - histories[place_of(histories, at, first) + 1]
         ) / product
     step = time_of(histories, at, count - 1) - time_of(histories, at, count - 2)
     # Error in the middle interval of equal steps as long as the last one.
@@ -344,5 +361,7 @@ def set_breaks(tables, number, t, level):
             for i in range(control["source_count"] + control["later_count"]):
                 if integers[control["sources"] + i] == number:
                     own = level if i < control["source_count"] else level + 1.0
-            histories[at + BREAK_LEVEL] = min(own, histories[at + BREAK_LEVEL]) if histories[BREAK_TIME] == t else own
+            histories[at + BREAK_LEVEL] = (
+                min(own, histories[at + BREAK_LEVEL]) if histories[BREAK_TIME] == t else own
+            )
     histories[BREAK_TIME] = t

@@ -8,15 +8,18 @@ from fvsolve.core.kernels.dtypes import FEATURE_VALUE, PROBE, f8, i8, record, ta
 from fvsolve.jit import COMPILING, Intrinsic
 
 SLOT = 1
-BLOCK_VALUE = FEATURE_VALUE + SLOT  # probe kind; `side` is 0 for the output, 1 for the input, 2 for the error
+# probe kind; `side` is 0 for the output, 1 for the input, 2 for the error
+BLOCK_VALUE = FEATURE_VALUE + SLOT
 
-CONTROL = record(  # block of `controls`, in an order in which each block comes after those that it reads at once
+# block of `controls`, in an order in which each block comes after those that it reads at once
+CONTROL = record(
     hooks=i8,  # row of `hooks`, the functions of its law
     y=i8,  # offset in y of its states: filtered inputs first; -1 for none
     filters=i8,  # number of filtered inputs
     filter_rate=f8,  # 1 / time constant of the filters [1/s]
     data=i8,  # offset of the numbers of its law in `floats`
-    inputs=i8,  # offset in `integers` of its inputs: number of a sensor, or -1 - number of another block
+    # offset in `integers` of its inputs: number of a sensor, or -1 - number of another block
+    inputs=i8,
     input_count=i8,
     starts=i8,  # offset in `floats` of the values of its inputs at the start
     setpoint=i8,  # schedule of its setpoint; -1 for none
@@ -58,10 +61,21 @@ BLOCK_SETTINGS = record(
 # block_hooks : addresses of functions of laws, a row for each law, with the columns of HOOKS
 BlockTables = namedtuple(
     "BlockTables",
-    ("controls", "sensors", "driven", "block_settings", "block_hooks", "discrete", "histories", "readings", "sensing"),
+    (
+        "controls",
+        "sensors",
+        "driven",
+        "block_settings",
+        "block_hooks",
+        "discrete",
+        "histories",
+        "readings",
+        "sensing",
+    ),
 )
 
-HOOKS = {  # functions of the law of a block: types of arguments and of the result, see `kernels.calls.HOOKS`
+# functions of the law of a block: types of arguments and of the result, see `kernels.calls.HOOKS`
+HOOKS = {
     "decide": ("tVBC", "t"),  # t, y, tables, control: its output before its limits
     # t, y, dydt, tables, control, v, u: rates of its states; v, u : output before and after its limits
     "adapt": ("tVVBCtt", ""),
@@ -77,7 +91,9 @@ def block_types() -> BlockTables:
     """Numba types of these tables."""
     from numba import from_dtype, types
 
-    records = [types.Array(from_dtype(kind), 1, "C") for kind in (CONTROL, PROBE, DRIVEN, BLOCK_SETTINGS)]
+    records = [
+        types.Array(from_dtype(kind), 1, "C") for kind in (CONTROL, PROBE, DRIVEN, BLOCK_SETTINGS)
+    ]
     floats, integers = types.Array(types.float64, 1, "C"), types.Array(types.int64, 1, "C")
     return BlockTables(*records, types.Array(types.int64, 2, "C"), floats, floats, floats, integers)
 

@@ -32,13 +32,18 @@ class PointsValue(Value):
         if isinstance(given, Points):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is not a table; expected {{ input = [...], output = [...] }}")
+            raise ValueError(
+                f"{show(given)} is not a table; expected {{ input = [...], output = [...] }}"
+            )
 
         def few(inputs, outputs):
             return [(("input",), "has one value; expected two or more")] if len(inputs) < 2 else []
 
         def read(known: tuple[str, ...]) -> Points:
-            keys = {key: (Rows(dimension), NEEDED) for key, dimension in zip(("input", "output"), known, strict=True)}
+            keys = {
+                key: (Rows(dimension), NEEDED)
+                for key, dimension in zip(("input", "output"), known, strict=True)
+            }
             return Points(*read_lists(given, keys, setting, "inputs", few))
 
         return read_in(setting.block_units, read, given, Points((0.0, 1.0), (0.0, 1.0)))

@@ -16,7 +16,9 @@ derivative; c; N / Td [1/s]."""
 @njit
 def decide(t, y, tables, control):
     """Output v before its limits."""
-    floats, at, i = tables.floats, control["data"], control["y"] + control["filters"]
+    floats = tables.floats
+    at = control["data"]
+    i = control["y"] + control["filters"]
     r, x = setpoint_change(t, tables, control), input_change(y, tables, control, 0)
     v = floats[at + START] + floats[at + GAIN] * (floats[at + WEIGHT] * r - x)
     if floats[at + INTEGRAL] > 0.0:
@@ -30,9 +32,14 @@ def decide(t, y, tables, control):
 @njit
 def sample(t, y, tables, control):
     """Output v of a sample; the integral and the filter of the derivative take a step of backward Euler."""
-    floats, at, own, h = tables.floats, control["data"], control["memory"] + 2, control["period"]
+    floats = tables.floats
+    at = control["data"]
+    own = control["memory"] + 2
+    h = control["period"]
     r, x = setpoint_change(t, tables, control), input_change(y, tables, control, 0)
-    memory, z, rate = tables.discrete, floats[at + LEAD_WEIGHT] * r - x, h * floats[at + LEAD_RATE]
+    memory = tables.discrete
+    z = floats[at + LEAD_WEIGHT] * r - x
+    rate = h * floats[at + LEAD_RATE]
     memory[own] += floats[at + GAIN] * h * (floats[at + ERROR] + (r - x)) * floats[at + INTEGRAL]
     memory[own + 1] = (memory[own + 1] + rate * z) / (1.0 + rate)
     v = floats[at + START] + floats[at + GAIN] * (floats[at + WEIGHT] * r - x) + memory[own]
@@ -45,11 +52,15 @@ def sample(t, y, tables, control):
 @njit
 def adapt(t, y, dydt, tables, control, v, u):
     """Write the rates of the integral, and of the filtered input of the derivative, to `dydt`."""
-    floats, at, i = tables.floats, control["data"], control["y"] + control["filters"]
+    floats = tables.floats
+    at = control["data"]
+    i = control["y"] + control["filters"]
     r, x = setpoint_change(t, tables, control), input_change(y, tables, control, 0)
     if floats[at + INTEGRAL] > 0.0:
         error = floats[at + ERROR] + (r - x)
-        dydt[i] = floats[at + GAIN] * error * floats[at + INTEGRAL] + (u - v) * floats[at + TRACKING]
+        dydt[i] = (
+            floats[at + GAIN] * error * floats[at + INTEGRAL] + (u - v) * floats[at + TRACKING]
+        )
         i += 1
     if floats[at + LEAD] != 0.0:
         dydt[i] = ((floats[at + LEAD_WEIGHT] * r - x) - y[i]) * floats[at + LEAD_RATE]

@@ -18,7 +18,9 @@ class PiRows(ControlRows, kind="pi"):
     law = law
 
     def states(self, control):
-        return ("integral",) * control.integrates + ("derivative",) * (derivative(control)[0] != 0.0)
+        return ("integral",) * control.integrates + ("derivative",) * (
+            derivative(control)[0] != 0.0
+        )
 
     def is_static(self, control):
         return not self.states(control)
@@ -30,7 +32,15 @@ class PiRows(ControlRows, kind="pi"):
         control = block.control
         integral = 1.0 / control.integral_time if control.integrates else 0.0
         tracking = 1.0 / control.tracking_time if control.tracking_time else integral
-        return [0.0, 0.0, control.gain, control.setpoint_weight, integral, tracking, *derivative(control)]
+        return [
+            0.0,
+            0.0,
+            control.gain,
+            control.setpoint_weight,
+            integral,
+            tracking,
+            *derivative(control),
+        ]
 
     def sampled_numbers(self, control):
         return 2
@@ -41,7 +51,10 @@ class PiRows(ControlRows, kind="pi"):
     def residual(self, control, start):
         if control.integrates:
             return start_error(start)
-        return control.gain * (control.setpoint_weight * start.setpoint - start.inputs[0]) - start.output
+        return (
+            control.gain * (control.setpoint_weight * start.setpoint - start.inputs[0])
+            - start.output
+        )
 
     def output_rate(self, control, start, rates):
         return -control.gain * rates[0]

@@ -29,7 +29,9 @@ def rate_of(y, tables, control, armed, g):
 @njit
 def adapt(t, y, dydt, tables, control, v, u):
     """Write the rate of the output to `dydt`."""
-    dydt[control["y"] + control["filters"]] = rate_of(y, tables, control, tables.armed, tables.armed[:0])
+    dydt[control["y"] + control["filters"]] = rate_of(
+        y, tables, control, tables.armed, tables.armed[:0]
+    )
 
 
 @njit

@@ -13,7 +13,9 @@ class RateLimit(Unsampled, SingleInput, kind="rate-limit"):
 
     rising: Annotated[float, OfRate("greatest rate of rise of the output")]
     falling: Annotated[float, OfRate("greatest rate of fall of the output, above 0")]
-    time_constant: Annotated[float, Quantity("time", positive, "time constant T of small changes [s]")]
+    time_constant: Annotated[
+        float, Quantity("time", positive, "time constant T of small changes [s]")
+    ]
 
     @property
     def passes_at_once(self) -> bool:

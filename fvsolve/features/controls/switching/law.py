@@ -38,7 +38,9 @@ def write_pair(g, at, left):
 @njit
 def switch(t, y, tables, control, g):
     """Write the event functions of the block to g."""
-    floats, at, armed = tables.floats, control["data"], tables.armed
+    floats = tables.floats
+    at = control["data"]
+    armed = tables.armed
     flag, x = int(floats[at + FLAG]), value_of(y, tables, control, 0)
     on = armed[flag] > 0.0
     if floats[at + MODE] == RELAY:

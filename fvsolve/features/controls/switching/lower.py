@@ -24,7 +24,9 @@ class SwitchingRows(StaticRows, kind=""):
 
     def state(self, control, start) -> bool:
         """State at the start."""
-        return bool(control.initial) if control.initial is not None else self.state_of(control, start)
+        return (
+            bool(control.initial) if control.initial is not None else self.state_of(control, start)
+        )
 
     def state_of(self, control, start) -> bool:
         """State that the inputs imply."""
@@ -50,13 +52,20 @@ class RelayRows(SwitchingRows, kind="relay"):
     def fault(self, control, start):
         low, high = sorted((control.on, control.off))
         if control.initial is None and low < start.inputs[0] < high:
-            value = start.case.amount(start.inputs[0], start.block.dimensions[0], 6).removesuffix(" -")
+            value = start.case.amount(start.inputs[0], start.block.dimensions[0], 6).removesuffix(
+                " -"
+            )
             return f"its input is {value} at the start, between `on` and `off`; give the key `initial`, 0 or 1"
-        if not low < start.inputs[0] < high and self.state(control, start) != self.state_of(control, start):
+        if not low < start.inputs[0] < high and self.state(control, start) != self.state_of(
+            control, start
+        ):
             known = [
-                start.case.amount(x, start.block.dimensions[0], 6) for x in (start.inputs[0], control.on, control.off)
+                start.case.amount(x, start.block.dimensions[0], 6)
+                for x in (start.inputs[0], control.on, control.off)
             ]
-            text = "`initial` is {}, but its input is {} at the start, with `on` at {} and `off` at {}"
+            text = (
+                "`initial` is {}, but its input is {} at the start, with `on` at {} and `off` at {}"
+            )
             text = text.format(control.initial, *(item.removesuffix(" -") for item in known))
             return f"{text}; expected {int(self.state_of(control, start))}, or leave this key out"
         return ""

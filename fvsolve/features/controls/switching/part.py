@@ -6,7 +6,9 @@ from fvsolve.parts.control import OfInputNumber, OfOutput, SingleInput, Unsample
 from fvsolve.parts.value import PROFILE, Quantity, Text, Whole, between, nonnegative
 from fvsolve.units import show
 
-STATE = Whole(between(0, 1), "state at the start: 0 off, 1 on; that of its input if left out", PROFILE)
+STATE = Whole(
+    between(0, 1), "state at the start: 0 off, 1 on; that of its input if left out", PROFILE
+)
 OUTPUTS = OfOutput("output while it is off, and while it is on", 2)
 
 
@@ -63,5 +65,9 @@ class Latch(Switching, kind="latch"):
 class Timer(Switching, SingleInput, kind="timer"):
     """Its state follows its input, above 0.5 or not, `on_delay` and `off_delay` later, if the input still holds."""
 
-    on_delay: Annotated[float, Quantity("time", nonnegative, "time that the input must hold to turn it on [s]")] = 0.0
-    off_delay: Annotated[float, Quantity("time", nonnegative, "time that the input must hold to turn it off [s]")] = 0.0
+    on_delay: Annotated[
+        float, Quantity("time", nonnegative, "time that the input must hold to turn it on [s]")
+    ] = 0.0
+    off_delay: Annotated[
+        float, Quantity("time", nonnegative, "time that the input must hold to turn it off [s]")
+    ] = 0.0

@@ -15,7 +15,9 @@ rows of M and the entries of g in z = M z_before + g (x + x_before), Tustin's me
 @njit
 def decide(t, y, tables, control):
     """Output v before its limits."""
-    floats, at, i = tables.floats, control["data"], control["y"] + control["filters"]
+    floats = tables.floats
+    at = control["data"]
+    i = control["y"] + control["filters"]
     n = int(floats[at + COUNT])
     v = floats[at + START]
     if floats[at + DIRECT] != 0.0:
@@ -28,7 +30,10 @@ def decide(t, y, tables, control):
 @njit
 def sample(t, y, tables, control):
     """Output v of a sample; the states take a step of the trapezoidal rule (Tustin)."""
-    floats, at, own, memory = tables.floats, control["data"], control["memory"] + 2, tables.discrete
+    floats = tables.floats
+    at = control["data"]
+    own = control["memory"] + 2
+    memory = tables.discrete
     n, x = int(floats[at + COUNT]), input_change(y, tables, control, 0)
     matrix, gain = at + OWN + 2 * n, at + OWN + 2 * n + n * n
     drive = x + memory[own + 2 * n] + 2.0 * floats[at + EXCESS]
@@ -47,7 +52,9 @@ def sample(t, y, tables, control):
 @njit
 def adapt(t, y, dydt, tables, control, v, u):
     """Write the rates of all states to `dydt`."""
-    floats, at, i = tables.floats, control["data"], control["y"] + control["filters"]
+    floats = tables.floats
+    at = control["data"]
+    i = control["y"] + control["filters"]
     n = int(floats[at + COUNT])
     rate = floats[at + EXCESS] + input_change(y, tables, control, 0)
     for k in range(n):

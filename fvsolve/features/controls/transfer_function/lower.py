@@ -22,7 +22,15 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
     def numbers(self, draft, name, block):
         control = block.control
         own, weights = coefficients(control)
-        return [0.0, control.direct, 0.0, float(len(own)), *own, *weights, *tustin(own, control.period)]
+        return [
+            0.0,
+            control.direct,
+            0.0,
+            float(len(own)),
+            *own,
+            *weights,
+            *tustin(own, control.period),
+        ]
 
     def sampled_numbers(self, control):
         return 2 * (len(control.denominator) - 1) + 1
@@ -46,7 +54,9 @@ class TransferFunctionRows(ControlRows, kind="transfer-function"):
         if weights[0] != 0.0:
             first = (start.output - control.direct * x) / weights[0]
         excess = x - own[0] * first
-        numbers[law.EXCESS] = 0.0 if abs(excess) <= 1e-12 * (abs(x) + abs(own[0] * first)) else excess
+        numbers[law.EXCESS] = (
+            0.0 if abs(excess) <= 1e-12 * (abs(x) + abs(own[0] * first)) else excess
+        )
 
 
 def coefficients(control) -> tuple[list[float], list[float]]:

@@ -21,8 +21,12 @@ class TransferFunction(SingleInput, kind="transfer-function"):
     Lag, lead-lag, integrator and oscillator are such blocks. `initial` is its output at the start.
     """
 
-    numerator: Annotated[tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI")]
-    denominator: Annotated[tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI")]
+    numerator: Annotated[
+        tuple[float, ...], Rows("number", about="b0 to bm, highest power of s first, in SI")
+    ]
+    denominator: Annotated[
+        tuple[float, ...], Rows("number", about="a0 to an, highest power of s first, in SI")
+    ]
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -30,7 +34,9 @@ class TransferFunction(SingleInput, kind="transfer-function"):
         lists = {key: numbers_in(given.get(key)) for key in ("numerator", "denominator")}
         for key, values in lists.items():
             if values and not any(values):
-                faults.append(((key,), f"{show(given[key])} has only zeros; expected a number that is not 0"))
+                faults.append(
+                    ((key,), f"{show(given[key])} has only zeros; expected a number that is not 0")
+                )
             elif values and values[0] == 0.0:
                 text = f"{show(given[key])} begins with a zero; expected the highest power of s first, and not 0"
                 faults.append(((key,), text))
@@ -50,7 +56,11 @@ class TransferFunction(SingleInput, kind="transfer-function"):
     @property
     def direct(self) -> float:
         """Gain at infinite frequency."""
-        return self.numerator[0] / self.denominator[0] if len(self.numerator) == len(self.denominator) else 0.0
+        return (
+            self.numerator[0] / self.denominator[0]
+            if len(self.numerator) == len(self.denominator)
+            else 0.0
+        )
 
     @property
     def passes_at_once(self) -> bool:

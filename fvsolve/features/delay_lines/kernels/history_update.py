@@ -19,7 +19,16 @@ are those of `wave_history`.
 """
 
 from fvsolve.core.kernels.calls import CLOSE, observe_in_turn, run_job
-from fvsolve.core.kernels.dtypes import ALONE, AMENDED, ARRIVES, JUNCTION, NEVER, PIPE_FLOW, PIPE_PRESSURE, STATUS
+from fvsolve.core.kernels.dtypes import (
+    ALONE,
+    AMENDED,
+    ARRIVES,
+    JUNCTION,
+    NEVER,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+    STATUS,
+)
 from fvsolve.core.kernels.dtypes import ARRIVED as LET_ARRIVE
 from fvsolve.core.kernels.observation import update_extremes
 from fvsolve.features.delay_lines.kernels import jumps
@@ -48,7 +57,9 @@ def spare_offsets(tables):
     - work array
     - arrival times of jumps and changes that they cause, see `arrival_arrays`
     """
-    at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
+    at = 2 * tables.layout[0]["size"]
+    probes = tables.probes.size
+    nodes = tables.nodes.size
     both = probes + nodes
     return at, at + probes, at + both, at + both + probes, at + 2 * both, at + 3 * both
 
@@ -87,9 +98,15 @@ def extremes_at_jump(t, time, y, state, handle):
     state : `out` at t, with the jumps that have arrived before this jump, or with this jump too
     """
     tables = open_lines(handle)
-    past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
+    past = tables.past
+    spare = tables.spare
+    marks = tables.marks
+    pipes = tables.pipes
+    nodes = tables.nodes
     first, second, third, fourth, fifth, _ = spare_offsets(tables)
-    probes, pressure, vapor = tables.probes.size, tables.layout[0]["pressure"], tables.settings[0]["vapor"]
+    probes = tables.probes.size
+    pressure = tables.layout[0]["pressure"]
+    vapor = tables.settings[0]["vapor"]
     before = history.time_of(past, int(past[history.COUNT]) - 1)
     share = (t - time) / (t - before)
     values = spare[fifth : fifth + probes]
@@ -112,7 +129,8 @@ def extremes_at_jump(t, time, y, state, handle):
 
 # multiple of the least jump above which a jump ends a step: about `numerics.delay_tolerance` of the greatest
 STEP_END_FACTOR = 4.0
-CROWDED_COUNT = 1e6  # jumps travelling at one time; with so many, only a jump as large as the greatest wave ends a step
+# jumps travelling at one time; with so many, only a jump as large as the greatest wave ends a step
+CROWDED_COUNT = 1e6
 
 
 @njit
@@ -126,7 +144,9 @@ def record_lines(t, y, out, handle, values):
     """
     tables = open_lines(handle)
     past = tables.past
-    k, places, status = int(past[history.COUNT]), history.offsets_of(past), out[STATUS]
+    k = int(past[history.COUNT])
+    places = history.offsets_of(past)
+    status = out[STATUS]
     before = history.INFINITE
     if status == LET_ARRIVE:
         admit_jumps(past, places, tables, t)
@@ -189,9 +209,11 @@ def record_step(past, places, tables, t, y, out, handle):
         remove_all_arrived_jumps(past, places, tables.delays, before)
         jumps.pass_jumps_at_joints(past, places, tables, t)
         passed = pass_jumps_at_ends(past, places, tables, t, y, out, handle)
-        if passed and jumps.has_short_lines(tables):  # jumps that have already passed are missing in the node pressures
+        # jumps that have already passed are missing in the node pressures
+        if passed and jumps.has_short_lines(tables):
             past[history.CORRECTED_TIME] = history.NAN
-        jumps.write_joint_arrivals(past, places, tables, t)  # again: nodes were solved without the jumps in between
+        # again: nodes were solved without the jumps in between
+        jumps.write_joint_arrivals(past, places, tables, t)
     entry, ends = history.begin_entry(past, t), tables.layout[0]["ends"]
     # NaN: jumps have corrected the state, which must be evaluated again.
     if past[history.CORRECTED_TIME] != past[history.CORRECTED_TIME]:
@@ -202,12 +224,16 @@ def record_step(past, places, tables, t, y, out, handle):
         history.write_entry(past, places, line, 0, entry, 0, out[at])
         history.write_entry(past, places, line, last, entry, 1, out[at + 3])
         sent = max(abs(out[at]), abs(out[at + 3]))
-        past[history.GREATEST_WAVE] = max(past[history.GREATEST_WAVE], sent / tables.pipes[line["pipe"]]["admittance"])
+        past[history.GREATEST_WAVE] = max(
+            past[history.GREATEST_WAVE], sent / tables.pipes[line["pipe"]]["admittance"]
+        )
         # A wave that arrives at a joint is sent into the next stretch.
         for q in range(last):
             joint = places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q)
             history.write_entry(past, places, line, q + 1, entry, 0, past[joint + 1])
-            history.write_entry(past, places, line, q, entry, 1, past[joint + history.ARRIVALS_SIZE])
+            history.write_entry(
+                past, places, line, q, entry, 1, past[joint + history.ARRIVALS_SIZE]
+            )
     return before if live else history.INFINITE
 
 
@@ -229,9 +255,15 @@ def remove_all_arrived_jumps(past, places, delays, before):
     for i in range(delays.size):
         line = delays[i]
         for s in range(line["stretch"], line["stretch"] + line["stretches"]):
-            for at in range(history.jump_head(places, s, 0), history.jump_head(places, s + 1, 0), history.HEAD_SIZE):
+            for at in range(
+                history.jump_head(places, s, 0),
+                history.jump_head(places, s + 1, 0),
+                history.HEAD_SIZE,
+            ):
                 if past[at + history.ARRIVED_COUNT] > 0.0:
-                    history.remove_arrived_jumps(past, places, at, before - line["hold"] - history.time_tolerance(past))
+                    history.remove_arrived_jumps(
+                        past, places, at, before - line["hold"] - history.time_tolerance(past)
+                    )
 
 
 # jumps at nodes ----------
@@ -267,10 +299,14 @@ def ends_step(past, tables, line, pipe, q, wave, size):
         return False
     crowd = past[history.MOST_JUMPS_TRAVELLING] / CROWDED_COUNT
     greatest = max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
-    if abs(size) <= max(STEP_END_FACTOR * least_jump(past, tables, pipe), crowd * greatest * pipe["admittance"]):
+    if abs(size) <= max(
+        STEP_END_FACTOR * least_jump(past, tables, pipe), crowd * greatest * pipe["admittance"]
+    ):
         return False
     first, last = q == 0 and acts % 2 == 1, q + 1 == line["stretches"] and acts >= 2
-    return (first and (wave == 1 or has_friction(pipe))) or (last and (wave == 0 or has_friction(pipe)))
+    return (first and (wave == 1 or has_friction(pipe))) or (
+        last and (wave == 0 or has_friction(pipe))
+    )
 
 
 @njit
@@ -289,7 +325,9 @@ def next_arrival(past, places, tables, t):
         for q in range(0, line["stretches"], max(1, line["stretches"] - 1)):
             for wave in range(2):
                 at = history.jump_head(places, line["stretch"] + q, wave)
-                for i in range(int(past[at + history.ARRIVED_COUNT]), int(past[at + history.JUMP_COUNT])):
+                for i in range(
+                    int(past[at + history.ARRIVED_COUNT]), int(past[at + history.JUMP_COUNT])
+                ):
                     place = history.jump_place(past, places, at, i)
                     arrival, size = past[place] + line["tau"], past[place + queue]
                     if ends_step(past, tables, line, pipe, q, wave, size):
@@ -311,7 +349,10 @@ def admit_jumps(past, places, tables, t):
         line = tables.delays[number]
         for q in range(line["stretches"]):
             jumps.pass_waiting_jumps(past, places, tables, line, q, t, latest, t)
-    past[history.NEXT_ARRIVAL], past[history.ARRIVALS_TIME] = next_arrival(past, places, tables, t), history.NAN
+    past[history.NEXT_ARRIVAL], past[history.ARRIVALS_TIME] = (
+        next_arrival(past, places, tables, t),
+        history.NAN,
+    )
 
 
 @njit
@@ -328,7 +369,8 @@ def arrival_of(past, places, tables, number, slot, latest):
     place = first_waiting_jump(past, places, line["stretch"] + q, wave)
     if place < 0:
         return history.INFINITE
-    size, time = past[place + int(past[history.JUMP_CAPACITY])], history.arrival_until(past[place], line["tau"], latest)
+    size = past[place + int(past[history.JUMP_CAPACITY])]
+    time = history.arrival_until(past[place], line["tau"], latest)
     if time <= latest and ends_step(past, tables, line, tables.pipes[line["pipe"]], q, wave, size):
         return history.INFINITE
     return time
@@ -337,7 +379,9 @@ def arrival_of(past, places, tables, number, slot, latest):
 @njit(forceinline=True)
 def arrival_arrays(tables):
     """Tree of arrival times of jumps (`write_arrival`), and changes that they cause (`clear_changes`), in `spare`."""
-    slots, first, n = 4 * tables.delays.size, spare_offsets(tables)[5], 1
+    slots = 4 * tables.delays.size
+    first = spare_offsets(tables)[5]
+    n = 1
     while n < slots:
         n *= 2
     middle = first + 2 * n
@@ -373,7 +417,9 @@ def write_all_times(past, places, tables, tree, latest):
     n = tree.size // 2
     for k in range(n):
         within = k < 4 * tables.delays.size
-        tree[n + k] = arrival_of(past, places, tables, k // 4, k % 4, latest) if within else history.INFINITE
+        tree[n + k] = (
+            arrival_of(past, places, tables, k // 4, k % 4, latest) if within else history.INFINITE
+        )
     for k in range(n - 1, 0, -1):
         tree[k] = min(tree[2 * k], tree[2 * k + 1])
 
@@ -386,7 +432,9 @@ def times_may_change(past, tables, t):
     """
     h = t - history.time_of(past, int(past[history.COUNT]) - 1)
     for i in range(tables.delays.size):
-        if tables.delays[i]["acts"] != 0 or tables.delays[i]["tau"] < h + 4.0 * history.time_tolerance(past):
+        if tables.delays[i]["acts"] != 0 or tables.delays[i][
+            "tau"
+        ] < h + 4.0 * history.time_tolerance(past):
             return True
     return False
 
@@ -421,7 +469,9 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
     while tree[1] <= latest:
         time = min(tree[1], t)
         extremes_at_jump(t, time, y, state, handle)
-        alone, times = pass_next_jumps(past, places, own, tables, tree, changes, t, y, state, latest)
+        alone, times = pass_next_jumps(
+            past, places, own, tables, tree, changes, t, y, state, latest
+        )
         if not alone:
             solve_nodes_again(past, places, tables, t, y, state, changes, sharp, times)
         send_changes(past, places, tables, changes, time)
@@ -441,7 +491,8 @@ def pass_next_jumps(past, places, own, tables, tree, changes, t, y, state, lates
     Jumps that were sent within the step have other times than older ones; their mean is weighted by size.
     own, tables : tables of the run, and those with lines shorter than a step as longer lines
     """
-    until, queue = min(latest, tree[1] + history.time_tolerance(past)), int(past[history.JUMP_CAPACITY])
+    until = min(latest, tree[1] + history.time_tolerance(past))
+    queue = int(past[history.JUMP_CAPACITY])
     alone, total, since, booked = True, 0.0, 0.0, 0.0
     while tree[1] <= until:
         slot = earliest_arrival(tree)
@@ -453,11 +504,20 @@ def pass_next_jumps(past, places, own, tables, tree, changes, t, y, state, lates
         share = jumps.reflected_part(past, places, line, pipe, q, wave, jump, t)
         past[history.jump_head(places, line["stretch"] + q, wave) + history.ARRIVED_COUNT] += 1.0
         times = jumps.change_times(past, tables, t, min(sent + line["tau"], t), sent)
-        closed = leave_stretch(past, places, tables, y, state, changes, number, q, wave, jump - share, times)
-        closed = leave_stretch(past, places, tables, y, state, changes, number, q, 1 - wave, share, times) and closed
+        closed = leave_stretch(
+            past, places, tables, y, state, changes, number, q, wave, jump - share, times
+        )
+        closed = (
+            leave_stretch(
+                past, places, tables, y, state, changes, number, q, 1 - wave, share, times
+            )
+            and closed
+        )
         if not closed:
             alone, weight = False, abs(jump) / pipe["admittance"]
-            total, since, booked = total + weight, since + weight * times[0], booked + weight * times[1]
+            total = total + weight
+            since = since + weight * times[0]
+            booked = booked + weight * times[1]
         write_arrival(tree, slot, arrival_of(past, places, own, number, slot % 4, latest))
     return alone, (since / total, booked / total) if total > 0.0 else (0.0, 0.0)
 
@@ -491,7 +551,9 @@ def enter_plain_node(past, tables, y, state, changes, number, side, size, times)
     changes : see `clear_changes`; number : number of the line; size : change of the wave [kg/s]
     times : result of `change_times`
     """
-    line, pipe, layout = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]], tables.layout[0]
+    line = tables.delays[number]
+    pipe = tables.pipes[tables.delays[number]["pipe"]]
+    layout = tables.layout[0]
     i = pipe["to_node"] if side == 1 else pipe["from_node"]
     node, at = tables.nodes[i], layout["ends"] + 4 * line["pipe"]
     state[at + 1 + side] += size
@@ -525,7 +587,8 @@ def solve_nodes_again(past, places, tables, t, y, state, changes, sharp, times):
     solved = tables.spare[size : 2 * size]
     run_job(CLOSE, t, y, y[:0], solved, sharp)
     for i in range(tables.delays.size):
-        pipe, at = tables.pipes[tables.delays[i]["pipe"]], layout["ends"] + 4 * tables.delays[i]["pipe"]
+        pipe = tables.pipes[tables.delays[i]["pipe"]]
+        at = layout["ends"] + 4 * tables.delays[i]["pipe"]
         for side in range(2):
             come = solved[at + 1 + side] - state[at + 1 + side]
             change = solved[at + 3 * side] - state[at + 3 * side]

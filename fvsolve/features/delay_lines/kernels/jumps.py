@@ -44,7 +44,9 @@ def least_jump(past, tables, pipe):
 
     A quarter of `numerics.delay_tolerance` times the greatest jump or wave so far, and at least rounding.
     """
-    least = tables.line_settings[0]["jumps"] * max(past[history.GREATEST_JUMP], past[history.GREATEST_WAVE])
+    least = tables.line_settings[0]["jumps"] * max(
+        past[history.GREATEST_JUMP], past[history.GREATEST_WAVE]
+    )
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
@@ -56,7 +58,9 @@ def store_jump(past, places, s, wave, t, size, pipe):
     size : change of the wave [kg/s]
     """
     if not history.insert_jump(past, places, history.jump_head(places, s, wave), t, size):
-        past[history.GREATEST_UNSTORED_JUMP] = max(past[history.GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"])
+        past[history.GREATEST_UNSTORED_JUMP] = max(
+            past[history.GREATEST_UNSTORED_JUMP], abs(size) / pipe["admittance"]
+        )
 
 
 @njit
@@ -102,7 +106,9 @@ def send_changes(past, places, tables, changes, time):
         line, wave = tables.delays[place // 4], place % 2
         first = place % 4 // 2  # 0 at a node, 1 at a joint
         s = line["stretch"] + (line["stretches"] - 1 - first if wave == 1 else first)
-        store_large_jump(past, places, tables, s, wave, time, changes[place], tables.pipes[line["pipe"]])
+        store_large_jump(
+            past, places, tables, s, wave, time, changes[place], tables.pipes[line["pipe"]]
+        )
         changes[place] = history.INFINITE
     changes[2 * n] = 0.0
 
@@ -112,7 +118,9 @@ def first_waiting_jump(past, places, s, wave):
     """Offset in `past` of the time of the oldest jump of a wave that has not left stretch s; -1 without such a jump."""
     at = history.jump_head(places, s, wave)
     waits = past[at + history.ARRIVED_COUNT] < past[at + history.JUMP_COUNT]
-    return history.jump_place(past, places, at, int(past[at + history.ARRIVED_COUNT])) if waits else -1
+    return (
+        history.jump_place(past, places, at, int(past[at + history.ARRIVED_COUNT])) if waits else -1
+    )
 
 
 @njit
@@ -141,12 +149,20 @@ def next_to_leave(past, places, line, q, latest):
 
     Jumps that leave after `latest` are left out.
     """
-    time, first, at = history.INFINITE, 0, -1
+    time = history.INFINITE
+    first = 0
+    at = -1
     for wave in range(2):
         place = first_waiting_jump(past, places, line["stretch"] + q, wave)
-        arrival = history.arrival_until(past[place], line["tau"], latest) if place >= 0 else history.INFINITE
+        arrival = (
+            history.arrival_until(past[place], line["tau"], latest)
+            if place >= 0
+            else history.INFINITE
+        )
         if arrival < time:
-            time, first, at = arrival, wave, place
+            time = arrival
+            first = wave
+            at = place
     return time, first, at
 
 
@@ -158,10 +174,13 @@ def pass_waiting_jumps(past, places, tables, line, q, t, latest, least):
     the smooth part (`least_jump`).
     latest : latest time of arrival [s]; least : earliest time at which a jump may enter the next stretch [s]
     """
-    queue, pipe, s = int(past[history.JUMP_CAPACITY]), tables.pipes[line["pipe"]], line["stretch"] + q
+    queue = int(past[history.JUMP_CAPACITY])
+    pipe = tables.pipes[line["pipe"]]
+    s = line["stretch"] + q
     time, wave, place = next_to_leave(past, places, line, q, latest)
     while time <= latest:
-        when, until = max(min(time, t), least), min(latest, max(time, least) + history.time_tolerance(past))
+        when = max(min(time, t), least)
+        until = min(latest, max(time, least) + history.time_tolerance(past))
         ahead, back = 0.0, 0.0
         while time <= until:
             size = past[place + queue]
@@ -221,7 +240,8 @@ def complete_short_arrivals(past, places, tables, t):
             head = history.jump_head(places, line["stretch"], 0)
             r = history.arrived_until(past, places, clock, head, t, line["tau"])
             l = history.arrived_until(past, places, clock, head + history.HEAD_SIZE, t, line["tau"])
-            delta, at = friction_loss(tables.pipes[line["pipe"]], line, u + r, v + l), ring + 2 * (newest & mask)
+            delta = friction_loss(tables.pipes[line["pipe"]], line, u + r, v + l)
+            at = ring + 2 * (newest & mask)
             arrivals = places[0] + history.ARRIVALS_SIZE * line["stretch"]
             past[arrivals] = v + beta * (past[at + 1] - v) + l + delta
             past[arrivals + 1] = u + beta * (past[at] - u) + r - delta
@@ -232,7 +252,9 @@ def last_sent_wave(past, places, line, q, wave, k):
     """Wave sent into stretch q of a delay line at entry k: its smooth part and all jumps so far [kg/s]."""
     ring, mask = history.ring_of(places, line, q)
     jumps = history.jump_head(places, line["stretch"] + q, wave)
-    return past[ring + 2 * (k & mask) + wave] + history.jumps_until(past, places, jumps, history.INFINITE)
+    return past[ring + 2 * (k & mask) + wave] + history.jumps_until(
+        past, places, jumps, history.INFINITE
+    )
 
 
 @njit
@@ -242,7 +264,9 @@ def waves_differ(past, places, tables, k, out):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
         for side in range(2):
-            old = last_sent_wave(past, places, line, line["stretches"] - 1 if side == 1 else 0, side, k)
+            old = last_sent_wave(
+                past, places, line, line["stretches"] - 1 if side == 1 else 0, side, k
+            )
             if not abs(out[at + 3 * side] - old) <= NOISE * 0.5e5 * pipe["admittance"]:
                 return True
     return False
@@ -256,7 +280,9 @@ def detect_jumps(past, places, tables, t, y, out, short):
     short : True to solve nodes again, with the waves of that entry in lines shorter than a step. A jump then sets
         out[STATUS] to AMENDED, because the state must be evaluated again.
     """
-    k, ends, state = int(past[history.COUNT]) - 1, tables.layout[0]["ends"], out
+    k = int(past[history.COUNT]) - 1
+    ends = tables.layout[0]["ends"]
+    state = out
     # In short lines a part of a sent wave arrives at once, so nodes must be solved with it.
     if short:
         state = tables.spare[: tables.layout[0]["size"]]
@@ -273,7 +299,9 @@ def detect_jumps(past, places, tables, t, y, out, short):
                 q, new = line["stretches"] - 1 if side == 1 else 0, state[at + 3 * side]
                 old = last_sent_wave(past, places, line, q, side, k)
                 if stage == 0:
-                    past[history.GREATEST_JUMP] = max(past[history.GREATEST_JUMP], abs(new - old) / pipe["admittance"])
+                    past[history.GREATEST_JUMP] = max(
+                        past[history.GREATEST_JUMP], abs(new - old) / pipe["admittance"]
+                    )
                     continue
                 if abs(new - old) > least_jump(past, tables, pipe):
                     store_jump(past, places, line["stretch"] + q, side, t, new - old, pipe)
@@ -296,7 +324,10 @@ def change_times(past, tables, t, time, sent):
     if sent > history.time_of(past, int(past[history.COUNT]) - 1) + history.time_tolerance(past):
         return t - time, 0.0
     before, settings = history.time_of(past, int(past[history.COUNT]) - 1), tables.line_settings[0]
-    h, booked, at, stages = t - before, 0.0, settings["weights"], settings["stages"]
+    h = t - before
+    booked = 0.0
+    at = settings["weights"]
+    stages = settings["stages"]
     # A stage at or after the change has counted it with its weight for the whole step.
     for i in range(stages):
         if before + tables.floats[at + stages + i] * h >= time - history.time_tolerance(past):
@@ -325,7 +356,9 @@ def stores_inflow(tables, i):
     if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
         return False
     k = EVENTS * node["row"]
-    return node["kind"] != TANK or (tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0)
+    return node["kind"] != TANK or (
+        tables.armed[k + BOTTOM] <= 0.0 and tables.armed[k + RIM] <= 0.0
+    )
 
 
 @njit(forceinline=True)
@@ -359,7 +392,8 @@ def correct_columns(past, tables, y, i, change, times):
     for k in range(columns.size):
         side = 1 * (columns[k]["from_node"] == i) - 1 * (columns[k]["to_node"] == i)
         if side != 0 and change != 0.0:
-            share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
+            share = columns[k]["area"] / columns[k]["length"]
+            admittance = tables.nodes[i]["admittance"]
             # The pressure relaxes as the flow of the column changes, against the admittance of pipes.
             rate = share / admittance if admittance > 0.0 else 0.0
             y[columns[k]["y"]] += side * change * share * missing_time(times, rate)
@@ -374,8 +408,12 @@ def correct_behind_valves(past, tables, y, spare, out, times):
     in proportion to the change.
     spare, out : values of the right-hand side before and after the jump
     """
-    layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
-    pressure, given, fed = layout["pressure"], 0.0, 0.0
+    layout = tables.layout[0]
+    valves = tables.valves
+    nodes = tables.nodes
+    pressure = layout["pressure"]
+    given = 0.0
+    fed = 0.0
     if tables.columns.size > 0:
         for i in range(nodes.size):
             correct_columns(past, tables, y, i, out[pressure + i] - spare[pressure + i], times)

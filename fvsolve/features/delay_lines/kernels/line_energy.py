@@ -86,14 +86,21 @@ def stretch_integrals(t, out, tables, number, q):
     line with a travel time tau below the step h stores the fraction tau / h of the waves sent in h. There the integrals
     are those of the waves sent in h; the energies are multiplied by tau / h, the first result by (tau / h)^2.
     """
-    past, line, st = tables.past, tables.delays[number], tables.settings[0]
-    pipe, places, hold, share = tables.pipes[line["pipe"]], history.offsets_of(past), line["hold"], 1.0 - line["now"]
+    past = tables.past
+    line = tables.delays[number]
+    st = tables.settings[0]
+    pipe = tables.pipes[line["pipe"]]
+    places = history.offsets_of(past)
+    hold = line["hold"]
+    share = 1.0 - line["now"]
     first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
     height = st["rho"] * st["gravity"] * (first["elevation"] - st["datum"])
     fall = pipe["drag"] * line["tau"]  # decrease of q0 along a stretch
     top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
     net, ahead, back = 0.0, 0.0, 0.0
-    end, oldest, middle = t, t - hold + history.time_tolerance(past), t - 0.5 * hold
+    end = t
+    oldest = t - hold + history.time_tolerance(past)
+    middle = t - 0.5 * hold
     # Pieces end at kinks, and in the middle where friction acts, so that quadrature sees smooth waves.
     while end > oldest:
         least = middle if end > middle + history.time_tolerance(past) else t - hold
@@ -134,15 +141,21 @@ def line_power(t, out, tables, number, rows):
     rows[0] : power that enters at the ends of the line, set before
     """
     line = tables.delays[number]
-    pipe, beta, at = tables.pipes[line["pipe"]], line["now"], tables.layout[0]["ends"] + 4 * line["pipe"]
+    pipe = tables.pipes[line["pipe"]]
+    beta = line["now"]
+    at = tables.layout[0]["ends"] + 4 * line["pipe"]
     per, length = 1.0 / (tables.settings[0]["rho"] * pipe["area"]), pipe["speed"] * line["tau"]
     friction, taken = 0.0, 0.0
     for q in range(line["stretches"]):
         # Friction acts on the waves in the middle, sent half a travel time ago; in a short line a step ago.
-        r, l = sent_waves(t, out, tables, number, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
+        r, l = sent_waves(
+            t, out, tables, number, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"])
+        )
         delta = friction_loss(pipe, line, r, l)
         flow = pipe["flow"] + (r - l - delta)
-        pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+        pull = drag(
+            pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow
+        )
         friction += length * flow * pull
         taken += length * (pull - pipe["drag"]) * flow
         mean = 0.0

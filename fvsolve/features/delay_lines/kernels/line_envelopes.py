@@ -11,8 +11,16 @@ from fvsolve.core.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
 from fvsolve.core.kernels.observation import update_envelope, update_extremes
 from fvsolve.features.delay_lines.kernels import wave_bounds
 from fvsolve.features.delay_lines.kernels import wave_history as history
-from fvsolve.features.delay_lines.kernels.line_rates import joint_at, smooth_wave_linear, waves_in_stretch
-from fvsolve.features.delay_lines.kernels.wave_bounds import BOUND_ROUNDING, GRID_ROUNDING, wave_at_jump
+from fvsolve.features.delay_lines.kernels.line_rates import (
+    joint_at,
+    smooth_wave_linear,
+    waves_in_stretch,
+)
+from fvsolve.features.delay_lines.kernels.wave_bounds import (
+    BOUND_ROUNDING,
+    GRID_ROUNDING,
+    wave_at_jump,
+)
 from fvsolve.jit import njit
 
 SLACK = 1e-9  # by which cells count as longer, as fraction of a stretch
@@ -32,7 +40,9 @@ NOWHERE = (history.INFINITE, -history.INFINITE)  # range that contains no wave
 
 
 @njit
-def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin, span, waves, most, known):
+def line_extremes_at_jumps(
+    past, places, clock, line, both, shares, sign, begin, span, waves, most, known
+):
     """Extremes of r + sign l on both sides of the jumps that pass a point of a delay line, without friction loss.
 
     Returns (least, time of the least, greatest, time of the greatest) [kg/s, s]; without a jump, least is INFINITE.
@@ -43,8 +53,14 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
     begin : positions in the lists of forward and backward jumps to begin with; most : bound of the friction loss [kg/s]
     """
     before, t = span
-    least, t_least, greatest, t_greatest = history.INFINITE, t, -history.INFINITE, t
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"], clock[4]
+    least = history.INFINITE
+    t_least = t
+    greatest = -history.INFINITE
+    t_greatest = t
+    queue = int(past[history.JUMP_CAPACITY])
+    tau = line["tau"]
+    s = line["stretch"]
+    same = clock[4]
     for wave in range(2):
         head = history.jump_head(places, s + both[wave], wave)
         other = history.jump_head(places, s + both[1 - wave], 1 - wave)
@@ -55,14 +71,18 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
         share, other_bounds = shares[wave], waves[1 - wave]
         # a jump meets a wave sent `back` later
         begins, back = before - share * tau + same, (share - shares[1 - wave]) * tau
-        first, reached = history.count_until(past, places, head, begin[wave], begins), begin[1 - wave]
+        first = history.count_until(past, places, head, begin[wave], begins)
+        reached = begin[1 - wave]
         for i in range(first, int(past[head + history.JUMP_COUNT])):
             place = history.jump_place(past, places, head, i)
             sent, size = past[place], past[place + queue]
             if sent > t - share * tau + same:
                 break
-            low, high = past[place + 3 * queue] + other_bounds[0], past[place + 4 * queue] + other_bounds[1]
-            if (low >= least or low - most >= known[0]) and (high <= greatest or high + most <= known[1]):
+            low = past[place + 3 * queue] + other_bounds[0]
+            high = past[place + 4 * queue] + other_bounds[1]
+            if (low >= least or low - most >= known[0]) and (
+                high <= greatest or high + most <= known[1]
+            ):
                 continue
             reached = history.count_until(past, places, other, reached, sent + back + same)
             here = wave_at_jump(past, places, clock, ring, mask, head, wave, i)
@@ -71,7 +91,9 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
             for side in range(2):
                 # jumps that cross at the point change both waves at once
                 moved = here - (1 - side) * size
-                opposite = there + history.sum_of_first(past, places, other, earlier if side == 0 else reached)
+                opposite = there + history.sum_of_first(
+                    past, places, other, earlier if side == 0 else reached
+                )
                 value = moved + sign * opposite if wave == 0 else opposite + sign * moved
                 if value < least:
                     least, t_least = value, sent + share * tau
@@ -83,12 +105,17 @@ def line_extremes_at_jumps(past, places, clock, line, both, shares, sign, begin,
 @njit
 def bounds_of_jumps(past, places, at, begin, end):
     """(position in a list of the first jump after time `end`, bounds of the jumps from position `begin` up to it)."""
-    queue, low, high, i = int(past[history.JUMP_CAPACITY]), history.INFINITE, -history.INFINITE, begin
+    queue = int(past[history.JUMP_CAPACITY])
+    low = history.INFINITE
+    high = -history.INFINITE
+    i = begin
     while i < int(past[at + history.JUMP_COUNT]):
         place = history.jump_place(past, places, at, i)
         if past[place] > end:
             break
-        low, high, i = min(low, past[place + 3 * queue]), max(high, past[place + 4 * queue]), i + 1
+        low = min(low, past[place + 3 * queue])
+        high = max(high, past[place + 4 * queue])
+        i = i + 1
     return i, (low, high)
 
 
@@ -99,13 +126,18 @@ def list_crossed_jumps(past, places, at, begin, stop, ahead, known, crossed):
     Returns (number of these jumps, their bounds).
     ahead : bounds of the forward wave; crossed : receives the offsets of the jumps in `past`
     """
-    queue, count, low, high = int(past[history.JUMP_CAPACITY]), 0, history.INFINITE, -history.INFINITE
+    queue = int(past[history.JUMP_CAPACITY])
+    count = 0
+    low = history.INFINITE
+    high = -history.INFINITE
     for j in range(begin, stop):
         place = history.jump_place(past, places, at, j)
         own = past[place + 3 * queue], past[place + 4 * queue]
         if not stays_within(own[0], own[1], ahead, 0.0, known):
             crossed[count] = place
-            low, high, count = min(low, own[0]), max(high, own[1]), count + 1
+            low = min(low, own[0])
+            high = max(high, own[1])
+            count = count + 1
     return count, (low, high)
 
 
@@ -118,10 +150,16 @@ def envelope_where_jumps_cross(past, places, clock, tables, line, q, x, at, begi
     begin : positions in the lists of forward and backward jumps to begin with
     """
     before, t = span
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
-    forward, backward, envelope = history.jump_head(places, s, 0), history.jump_head(places, s, 1), tables.envelope
+    queue = int(past[history.JUMP_CAPACITY])
+    tau = line["tau"]
+    s = line["stretch"] + q
+    same = clock[4]
+    forward = history.jump_head(places, s, 0)
+    backward = history.jump_head(places, s, 1)
+    envelope = tables.envelope
     delta = abs(past[places[0] + history.ARRIVALS_SIZE * s + 2])
-    first, end = history.count_until(past, places, forward, begin[0], before - x[1] * tau - same), t - x[0] * tau + same
+    first = history.count_until(past, places, forward, begin[0], before - x[1] * tau - same)
+    end = t - x[0] * tau + same
     stop, ahead = bounds_of_jumps(past, places, forward, first, end)
     last, _ = bounds_of_jumps(past, places, backward, begin[1], t - (1.0 - x[1]) * tau + 2.0 * same)
     crossed, known = tables.scratch[3 * line["places"] :], (envelope[0, at], envelope[2, at])
@@ -145,18 +183,28 @@ def cross_jumps(past, places, clock, tables, line, q, x, at, i, bounds, crossed,
     crossed : offsets of backward jumps in `past`; other arguments are those of `envelope_where_jumps_cross`
     """
     before, t = span
-    queue, tau, s, same = int(past[history.JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
+    queue = int(past[history.JUMP_CAPACITY])
+    tau = line["tau"]
+    s = line["stretch"] + q
+    same = clock[4]
     first_cell, (ring, mask) = tables.pipes[line["pipe"]]["cell"], history.ring_of(places, line, q)
-    forward, backward, envelope = history.jump_head(places, s, 0), history.jump_head(places, s, 1), tables.envelope
-    delta, n, r = past[places[0] + history.ARRIVALS_SIZE * s + 2], line["places"], history.NAN
+    forward = history.jump_head(places, s, 0)
+    backward = history.jump_head(places, s, 1)
+    envelope = tables.envelope
+    delta = past[places[0] + history.ARRIVALS_SIZE * s + 2]
+    n = line["places"]
+    r = history.NAN
     place = history.jump_place(past, places, forward, i)
     sent, size = past[place], past[place + queue]
     # Times of sending with which a backward jump crosses this jump within the step and the cell.
     opens, ends = max(2.0 * before - tau - sent, sent - tau), min(2.0 * t - tau - sent, sent + tau)
-    opens, ends = max(opens, sent - tau + 2.0 * tau * x[0]), min(ends, sent - tau + 2.0 * tau * x[1])
+    opens = max(opens, sent - tau + 2.0 * tau * x[0])
+    ends = min(ends, sent - tau + 2.0 * tau * x[1])
     for k in range(crossed.size):
         other, known = int(crossed[k]), (envelope[0, at], envelope[2, at])
-        if stays_within(bounds[0], bounds[1], (past[other + 3 * queue], past[other + 4 * queue]), 0.0, known):
+        if stays_within(
+            bounds[0], bounds[1], (past[other + 3 * queue], past[other + 4 * queue]), 0.0, known
+        ):
             continue  # a pair at the end of the cell is looked at with the next cell too
         opposite, change = past[other], past[other + queue]
         if opposite <= opens + same or opposite > ends + same:
@@ -177,7 +225,10 @@ def cross_jumps(past, places, clock, tables, line, q, x, at, i, bounds, crossed,
 @njit(forceinline=True)
 def jump_until(past, places, at, i, t):
     """True if jump i of a list exists and was sent up to t."""
-    return i < int(past[at + history.JUMP_COUNT]) and past[history.jump_place(past, places, at, i)] <= t
+    return (
+        i < int(past[at + history.JUMP_COUNT])
+        and past[history.jump_place(past, places, at, i)] <= t
+    )
 
 
 @njit
@@ -187,40 +238,49 @@ def update_stretch_extremes(past, places, clock, tables, line, q, before, t, unc
     The first time below vapour pressure is updated too.
     unchanged : float64[n]  receives 1 for cells where no value in this step can change anything
     """
-    pipe, stretches, n, tau = tables.pipes[line["pipe"]], line["stretches"], line["places"], line["tau"]
-    head, newest, envelope, cell = (
-        history.jump_head(places, line["stretch"] + q, 0),
-        clock[0],
-        tables.envelope,
-        pipe["cell"],
-    )
+    pipe = tables.pipes[line["pipe"]]
+    stretches = line["stretches"]
+    n = line["places"]
+    tau = line["tau"]
+    head = history.jump_head(places, line["stretch"] + q, 0)
+    newest = clock[0]
+    envelope = tables.envelope
+    cell = pipe["cell"]
     other = head + history.HEAD_SIZE
     bounds, (_, mask) = history.bounds_of(places, line, q), history.ring_of(places, line, q)
-    reach, delta = (
-        clock[4] + GRID_ROUNDING / clock[2],
-        past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2],
-    )
-    first, last, wrap, width = newest, newest, int(past[history.CAPACITY]) - 1, stretches / n
+    reach = clock[4] + GRID_ROUNDING / clock[2]
+    delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+    first = newest
+    last = newest
+    wrap = int(past[history.CAPACITY]) - 1
+    width = stretches / n
     back_first = back_last = wave_bounds.entry_back(past, wrap, newest, before - tau - reach)
     i, k = int(past[head + history.JUMP_COUNT]), 0
     for j in range((q * n) // stretches, min(n, ((q + 1) * n) // stretches + 1)):
         low, high = max(j * width - q, 0.0) - SLACK, min((j + 1) * width - q, 1.0) + SLACK
         first = wave_bounds.entry_back(past, wrap, first, before - high * tau - reach)
         last = wave_bounds.entry_back(past, wrap, last, t - low * tau + reach)
-        back_first = wave_bounds.entry_ahead(past, wrap, back_first, newest, before - (1.0 - low) * tau - reach)
-        back_last = wave_bounds.entry_ahead(past, wrap, back_last, newest, t - (1.0 - high) * tau + reach)
+        back_first = wave_bounds.entry_ahead(
+            past, wrap, back_first, newest, before - (1.0 - low) * tau - reach
+        )
+        back_last = wave_bounds.entry_ahead(
+            past, wrap, back_last, newest, t - (1.0 - high) * tau + reach
+        )
         ahead = wave_bounds.bounds_between(past, bounds, mask, 0, first, last)
         back = wave_bounds.bounds_between(past, bounds, mask, 1, back_first, back_last)
         most, floor = 0.0, envelope[0, cell + j]
         # Friction changes the sum of both waves by less than delta along the stretch.
         if delta != 0.0:
-            most = abs(delta) + BOUND_ROUNDING * (abs(ahead[0]) + abs(ahead[1]) + abs(back[0]) + abs(back[1]))
+            most = abs(delta) + BOUND_ROUNDING * (
+                abs(ahead[0]) + abs(ahead[1]) + abs(back[0]) + abs(back[1])
+            )
         # While the pipe has not boiled, values below vapour pressure must not be left out.
         if tables.marks[line["pipe"]] != tables.marks[line["pipe"]]:
             floor = max(floor, tables.profile[cell + j])
         known = (floor, envelope[2, cell + j])
         if stays_within(ahead[0], ahead[1], back, most, known):
-            if 2 * n * q < (2 * j + 1) * stretches < 2 * n * (q + 1):  # the centre is in this stretch, not at a joint
+            # the centre is in this stretch, not at a joint
+            if 2 * n * q < (2 * j + 1) * stretches < 2 * n * (q + 1):
                 unchanged[j] = 1.0
             continue
         i = history.count_back(past, places, head, i, before - high * tau - reach)
@@ -228,10 +288,25 @@ def update_stretch_extremes(past, places, clock, tables, line, q, before, t, unc
         forward = jump_until(past, places, head, i, t - low * tau + reach)
         backward = jump_until(past, places, other, k, t - (1.0 - high) * tau + reach)
         if high > low and (forward or backward):
-            extend_envelope(past, places, clock, tables, line, q, j, (i, k), (before, t), (ahead, back), most, known)
+            extend_envelope(
+                past,
+                places,
+                clock,
+                tables,
+                line,
+                q,
+                j,
+                (i, k),
+                (before, t),
+                (ahead, back),
+                most,
+                known,
+            )
         if high > low and forward and backward:
             ends, span = (low, high), (before, t)
-            envelope_where_jumps_cross(past, places, clock, tables, line, q, ends, cell + j, (i, k), span)
+            envelope_where_jumps_cross(
+                past, places, clock, tables, line, q, ends, cell + j, (i, k), span
+            )
 
 
 @njit
@@ -242,13 +317,19 @@ def extend_envelope(past, places, clock, tables, line, q, j, begin, span, waves,
     """
     share = (j + 0.5) / line["places"]
     x, joint = share * line["stretches"] - q, joint_at(share, line["stretches"])
-    both, shares, delta = (q, q), (x, 1.0 - x), past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+    both = (q, q)
+    shares = (x, 1.0 - x)
+    delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
     if joint > 0:  # as in `waves_at`; the bounds are those of one stretch
-        both, shares, delta = (joint, joint - 1), (0.0, 0.0), 0.0
+        both = (joint, joint - 1)
+        shares = (0.0, 0.0)
+        delta = 0.0
         begin, waves = (0, 0), (EVERYWHERE, EVERYWHERE)
     elif not 0.0 <= x < 1.0:
         return
-    found = line_extremes_at_jumps(past, places, clock, line, both, shares, 1.0, begin, span, waves, most, known)
+    found = line_extremes_at_jumps(
+        past, places, clock, line, both, shares, 1.0, begin, span, waves, most, known
+    )
     if found[0] == history.INFINITE:
         return
     pipe, mark = tables.pipes[line["pipe"]], line["pipe"]
@@ -271,19 +352,37 @@ def update_probe_extremes(past, places, clock, tables, before, t):
             continue
         line = tables.delays[tables.line_of[probe["index"]]]
         share = tables.floats[probe["weights"]]
-        q, joint = min(int(share * line["stretches"]), line["stretches"] - 1), joint_at(share, line["stretches"])
+        q = min(int(share * line["stretches"]), line["stretches"] - 1)
+        joint = joint_at(share, line["stretches"])
         x, sign = share * line["stretches"] - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0
         both, shares = (q, q), (x, 1.0 - x)
         delta = past[places[0] + history.ARRIVALS_SIZE * (line["stretch"] + q) + 2]
         if joint > 0:  # as in `waves_at`
-            both, shares, delta = (joint, joint - 1), (0.0, 0.0), 0.0
+            both = (joint, joint - 1)
+            shares = (0.0, 0.0)
+            delta = 0.0
         more = (1.0 - 2.0 * x) * delta if sign > 0.0 else pipe["flow"] - delta
         least, t_least, greatest, t_greatest = line_extremes_at_jumps(
-            past, places, clock, line, both, shares, sign, (0, 0), (before, t), (EVERYWHERE, EVERYWHERE), 0.0, NOWHERE
+            past,
+            places,
+            clock,
+            line,
+            both,
+            shares,
+            sign,
+            (0, 0),
+            (before, t),
+            (EVERYWHERE, EVERYWHERE),
+            0.0,
+            NOWHERE,
         )
         if least < history.INFINITE:
-            update_extremes(tables.extremes, k, t_least, probe["scale"] * (least + more) + probe["offset"])
-            update_extremes(tables.extremes, k, t_greatest, probe["scale"] * (greatest + more) + probe["offset"])
+            update_extremes(
+                tables.extremes, k, t_least, probe["scale"] * (least + more) + probe["offset"]
+            )
+            update_extremes(
+                tables.extremes, k, t_greatest, probe["scale"] * (greatest + more) + probe["offset"]
+            )
 
 
 @njit
@@ -296,7 +395,10 @@ def update_line_extremes(past, places, clock, tables, line, before, t, unchanged
         unchanged[j] = 0.0
     for q in range(line["stretches"]):
         head = history.jump_head(places, line["stretch"] + q, 0)
-        if past[head + history.JUMP_COUNT] + past[head + history.HEAD_SIZE + history.JUMP_COUNT] > 0.0:
+        if (
+            past[head + history.JUMP_COUNT] + past[head + history.HEAD_SIZE + history.JUMP_COUNT]
+            > 0.0
+        ):
             wave_bounds.write_bounds(past, places, clock, line, q, 0)
             wave_bounds.write_bounds(past, places, clock, line, q, 1)
             update_stretch_extremes(past, places, clock, tables, line, q, before, t, unchanged)
@@ -328,14 +430,20 @@ def update_line_envelopes(before, t, places, tables, recorded):
     for i in range(tables.delays.size):
         line = tables.delays[i]
         n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
-        r, l, low, high, j = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0, 0
+        r = tables.scratch[:n]
+        l = tables.scratch[n : 2 * n]
+        low = 0
+        high = 0
+        j = 0
         unchanged = tables.scratch[2 * n : 3 * n if before < t else 2 * n]
         if before < t:
             update_line_extremes(past, places, clock, tables, line, before, t, unchanged)
         if not recorded:
             continue
         for q in range(line["stretches"]):
-            j = waves_in_stretch(t, past, places, clock, line, q, j, r, l, unchanged, envelope[2, cell : cell + n])
+            j = waves_in_stretch(
+                t, past, places, clock, line, q, j, r, l, unchanged, envelope[2, cell : cell + n]
+            )
         write_waves_at_joints(t, past, places, clock, line, r, l)
         for j in range(n):
             s = r[j] + l[j]

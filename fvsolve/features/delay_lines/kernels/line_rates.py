@@ -16,7 +16,13 @@ the forward wave at x passed the middle, for x < 1/2 when the backward wave at x
 give the arriving waves. Arguments are those of `wave_history`.
 """
 
-from fvsolve.core.kernels.dtypes import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH, PIPE_FLOW, PIPE_PRESSURE
+from fvsolve.core.kernels.dtypes import (
+    FRICTION_HAZEN,
+    FRICTION_NONE,
+    FRICTION_ROUGH,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+)
 from fvsolve.core.kernels.steady_friction import EXPONENT, drag, power_of_square
 from fvsolve.features.delay_lines.kernels import wave_history as history
 from fvsolve.features.delay_lines.kernels.tables import open_lines
@@ -26,7 +32,8 @@ FLOW_TOLERANCE = 1e-6  # relative error of the flow at which Newton stops
 SLOPE_ERROR = 0.2  # relative error of the slope where the friction factor depends on the flow
 MAX_ITERATIONS = 60  # of Newton's method
 JOINT_TOLERANCE = 1e-9  # distance from a joint, as fraction of a stretch, that is rounding
-BEFORE_ALL = -(1 << 62)  # in place of the number of an entry: before all entries, where smooth parts are zero
+# in place of the number of an entry: before all entries, where smooth parts are zero
+BEFORE_ALL = -(1 << 62)
 
 
 @njit(forceinline=True)
@@ -37,9 +44,16 @@ def drag_and_slope(pipe, flow):
     """
     size = abs(flow)
     if pipe["friction"] == FRICTION_HAZEN:
-        loss, rough, p = pipe["loss"], pipe["rough"], power_of_square(size * size)  # same rounding as in `drag`
-        return loss * (size * flow) + rough * (p * flow), 2.0 * loss * size + (1.0 + EXPONENT) * rough * p
-    force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+        # same rounding as in `drag`
+        loss = pipe["loss"]
+        rough = pipe["rough"]
+        p = power_of_square(size * size)
+        return loss * (size * flow) + rough * (p * flow), 2.0 * loss * size + (
+            1.0 + EXPONENT
+        ) * rough * p
+    force = drag(
+        pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow
+    )
     return force, 2.0 * abs(force) / size if size > 0.0 else 0.0
 
 
@@ -58,7 +72,10 @@ def friction_loss(pipe, line, r, l):
     """
     if not has_friction(pipe):
         return 0.0
-    kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
+    kappa = 0.5 * line["tau"]
+    x = r - l
+    flow = pipe["flow"]
+    drag0 = pipe["drag"]
     rough = SLOPE_ERROR if pipe["friction"] == FRICTION_ROUGH else 0.0
     # Newton starts from friction linearised at the initial steady flow.
     m, least = x * line["transmission"], FLOW_TOLERANCE * (abs(x) + 1e-3 * abs(flow))
@@ -66,7 +83,8 @@ def friction_loss(pipe, line, r, l):
         force, slope = drag_and_slope(pipe, flow + m)
         step = (m + kappa * (force - drag0) - x) / (1.0 + kappa * slope)
         m -= step
-        left = abs(step) * kappa * slope  # remaining error, from the change of the slope within the step
+        # remaining error, from the change of the slope within the step
+        left = abs(step) * kappa * slope
         if not left * (abs(step) + rough * abs(flow + m)) > least * abs(flow + m):
             break
     return x - m
@@ -88,7 +106,9 @@ def write_arrivals(past, places, clock, line, pipe, q, t):
     # Of the smooth wave, 1 - beta was sent a step ago; the rest is sent now and depends on the nodes.
     if beta > 0.0:
         ahead -= beta * (u + history.jumps_until(past, places, head, t + clock[4]))
-        back -= beta * (v + history.jumps_until(past, places, head + history.HEAD_SIZE, t + clock[4]))
+        back -= beta * (
+            v + history.jumps_until(past, places, head + history.HEAD_SIZE, t + clock[4])
+        )
         # At p' = 0 a node sends minus its arriving wave: ahead = A - beta back, back = B - beta ahead.
         per = 1.0 / (1.0 - beta * beta)
         ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
@@ -104,7 +124,8 @@ def write_all_arrivals(past, tables, t):
     """
     if past[history.ARRIVALS_TIME] == t and past[history.ARRIVALS_COUNT] == past[history.COUNT]:
         return
-    places, clock = history.offsets_of(past), history.reading_data(past, history.newest_before(past, t))
+    places = history.offsets_of(past)
+    clock = history.reading_data(past, history.newest_before(past, t))
     delays, pipes = tables.delays, tables.pipes
     for i in range(delays.size):
         line = delays[i]
@@ -122,8 +143,13 @@ def outgoing_line_waves(t, y, dydt, out, handle):
     Twice the wave is the mass flow into the node at zero pressure deviation p'.
     """
     tables = open_lines(handle)
-    past, layout, lines = tables.past, tables.layout[0], tables.delays
-    started, place, ends, net = past[history.COUNT] > 0.0, history.offsets_of(past)[0], layout["ends"], layout["net"]
+    past = tables.past
+    layout = tables.layout[0]
+    lines = tables.delays
+    started = past[history.COUNT] > 0.0
+    place = history.offsets_of(past)[0]
+    ends = layout["ends"]
+    net = layout["net"]
     if started:
         write_all_arrivals(past, tables, t)
     for i in range(lines.size):
@@ -131,7 +157,8 @@ def outgoing_line_waves(t, y, dydt, out, handle):
         at, first = ends + 4 * line["pipe"], place + history.ARRIVALS_SIZE * line["stretch"]
         left, right = 0.0, 0.0
         if started:
-            left, right = past[first], past[first + history.ARRIVALS_SIZE * (line["stretches"] - 1) + 1]
+            left = past[first]
+            right = past[first + history.ARRIVALS_SIZE * (line["stretches"] - 1) + 1]
         out[at + 1], out[at + 2] = left, right
         out[net + pipe["from_node"]] += 2.0 * left
         out[net + pipe["to_node"]] += 2.0 * right
@@ -180,18 +207,25 @@ def sent_wave(t, out, tables, number, q, wave, at):
     newest = int(past[history.COUNT]) - 1
     if newest < 0:
         return 0.0
-    last, places, until = history.time_of(past, newest), history.offsets_of(past), at + history.time_tolerance(past)
-    both = history.smooth_waves(past, places, history.reading_data(past, newest), line, q, min(at, last))
+    last = history.time_of(past, newest)
+    places = history.offsets_of(past)
+    until = at + history.time_tolerance(past)
+    both = history.smooth_waves(
+        past, places, history.reading_data(past, newest), line, q, min(at, last)
+    )
     jumps = history.jump_head(places, line["stretch"] + q, wave)
     value = (both[1] if wave == 1 else both[0]) + history.jumps_until(past, places, jumps, until)
     if at <= last or t <= last:
         return value
-    if q == (line["stretches"] - 1 if wave == 1 else 0):  # interpolated to the wave that its node sends now
+    # interpolated to the wave that its node sends now
+    if q == (line["stretches"] - 1 if wave == 1 else 0):
         now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
         return value + (now - value) * (at - last) / (t - last)
     # Into an inner stretch goes the wave that leaves its neighbour, with the friction there.
     pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
-    r, l = history.read_waves(past, places, history.reading_data(past, newest), line, before, at - line["tau"])
+    r, l = history.read_waves(
+        past, places, history.reading_data(past, newest), line, before, at - line["tau"]
+    )
     delta = friction_loss(pipe, line, r, l)
     return l + delta if wave == 1 else r - delta
 
@@ -214,7 +248,9 @@ def waves_at(t, out, tables, number, share):
     pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
     joint = joint_at(share, stretches)
     if joint > 0:
-        return sent_wave(t, out, tables, number, joint, 0, t), sent_wave(t, out, tables, number, joint - 1, 1, t)
+        return sent_wave(t, out, tables, number, joint, 0, t), sent_wave(
+            t, out, tables, number, joint - 1, 1, t
+        )
     q = min(int(share * stretches), stretches - 1)
     x, tau = share * stretches - q, line["tau"]
     r = sent_wave(t, out, tables, number, q, 0, t - x * tau)
@@ -275,9 +311,15 @@ def waves_in_stretch(t, past, places, clock, line, q, first, r, l, unchanged, gr
     r, l : float64[n]  waves at the centres of n equal parts of the line
     unchanged : float64[n]  1 for places where r receives `greatest` and l receives 0, or empty
     """
-    stretches, tau, n, s, j = line["stretches"], line["tau"], r.size, line["stretch"] + q, first
+    stretches = line["stretches"]
+    tau = line["tau"]
+    n = r.size
+    s = line["stretch"] + q
+    j = first
     (ring, mask), jumps = history.ring_of(places, line, q), history.jump_head(places, s, 0)
-    delta, steps, others = past[places[0] + history.ARRIVALS_SIZE * s + 2], tau * clock[2], jumps + history.HEAD_SIZE
+    delta = past[places[0] + history.ARRIVALS_SIZE * s + 2]
+    steps = tau * clock[2]
+    others = jumps + history.HEAD_SIZE
     i, k = int(past[jumps + history.JUMP_COUNT]), 0
     # Equal steps over the whole travel time and no jumps: entries are read by their index.
     calm = steps + 2.0 < clock[3] and i + past[others + history.JUMP_COUNT] == 0.0
@@ -291,14 +333,17 @@ def waves_in_stretch(t, past, places, clock, line, q, first, r, l, unchanged, gr
             before, after = x * steps, (1.0 - x) * steps  # age of both waves [steps]
             u, v = int(before), int(after)
             a, b = ring + 2 * ((clock[0] - u) & mask), ring + 2 * ((clock[0] - u - 1) & mask)
-            c, d = ring + 2 * ((clock[0] - v) & mask) + 1, ring + 2 * ((clock[0] - v - 1) & mask) + 1
+            c = ring + 2 * ((clock[0] - v) & mask) + 1
+            d = ring + 2 * ((clock[0] - v - 1) & mask) + 1
             ahead = past[a] + (before - u) * (past[b] - past[a]) + past[jumps + history.REMOVED_SUM]
             back = past[c] + (after - v) * (past[d] - past[c]) + past[others + history.REMOVED_SUM]
-        else:  # i and k jumps were sent until the times of both readings, which fall and rise along the stretch
+        else:
+            # i and k jumps were sent until the times of both readings, which fall and rise along the stretch
             sent, returned = t - x * tau, t - (1.0 - x) * tau
             i = history.count_back(past, places, jumps, i, sent + clock[4])
             k = history.count_until(past, places, others, k, returned + clock[4])
-            ahead, back = history.sum_of_first(past, places, jumps, i), history.sum_of_first(past, places, others, k)
+            ahead = history.sum_of_first(past, places, jumps, i)
+            back = history.sum_of_first(past, places, others, k)
             ahead = smooth_wave_linear(past, clock, ring, mask, 0, sent) + ahead
             back = smooth_wave_linear(past, clock, ring, mask, 1, returned) + back
         r[j], l[j] = ahead - x * delta, back + (1.0 - x) * delta
@@ -316,6 +361,8 @@ def observe_lines(t, y, out, handle, values):
         if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
             pipe = tables.pipes[probe["index"]]
             if tables.line_of[probe["index"]] >= 0:
-                r, l = waves_at(t, out, tables, tables.line_of[probe["index"]], tables.floats[probe["weights"]])
+                r, l = waves_at(
+                    t, out, tables, tables.line_of[probe["index"]], tables.floats[probe["weights"]]
+                )
                 value = r + l if probe["kind"] == PIPE_PRESSURE else pipe["flow"] + (r - l)
                 values[k] = probe["scale"] * value + probe["offset"]

@@ -17,20 +17,25 @@ DELAY = record(  # delay line: stretches of equal travel time, friction in the m
     now=f8,  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
     ring=i8,  # number of entries of `past` before its own, see `kernels.delay_lines.wave_history`
     ring_size=i8,  # number of entries of each stretch
-    transmission=f8,  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
+    # fraction of a small change of flow transmitted by the friction in the middle of a stretch
+    transmission=f8,
     places=i8,  # number of places of fields and envelopes
-    couple=f8,  # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
+    # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
+    couple=f8,
     acts=i8,  # ends whose nodes respond instantly: 1 `from`, 2 `to`, 3 both
 )
 
 LINE_SETTINGS = record(
     jumps=f8,  # least jump that is stored as a jump, as fraction of the greatest wave
-    weights=i8,  # offset in `floats` of the weights b of the method, followed by its c; number of stages
+    # offset in `floats` of the weights b of the method, followed by its c; number of stages
+    weights=i8,
     stages=i8,
 )
 # node_ends : for each node the place of its first end, then that behind the last one; then the ends, 2 line + side
 # line_of : row of `delays` for each pipe, or -1; past, sharp : written by a run
-LineTables = namedtuple("LineTables", ("delays", "line_settings", "node_ends", "line_of", "past", "sharp"))
+LineTables = namedtuple(
+    "LineTables", ("delays", "line_settings", "node_ends", "line_of", "past", "sharp")
+)
 
 
 @functools.cache
@@ -38,7 +43,14 @@ def line_types() -> LineTables:
     """Numba types of these tables."""
     from numba import from_dtype, types
 
-    kinds = (from_dtype(DELAY), from_dtype(LINE_SETTINGS), types.int64, types.int64, types.float64, types.int64)
+    kinds = (
+        from_dtype(DELAY),
+        from_dtype(LINE_SETTINGS),
+        types.int64,
+        types.int64,
+        types.float64,
+        types.int64,
+    )
     return LineTables(*(types.Array(kind, 1, "C") for kind in kinds))
 
 

@@ -8,7 +8,11 @@ Arguments are those of `wave_history`; ring, mask : result of `ring_of`.
 """
 
 from fvsolve.features.delay_lines.kernels import wave_history as history
-from fvsolve.features.delay_lines.kernels.line_rates import BEFORE_ALL, entry_before, smooth_wave_linear
+from fvsolve.features.delay_lines.kernels.line_rates import (
+    BEFORE_ALL,
+    entry_before,
+    smooth_wave_linear,
+)
 from fvsolve.jit import njit
 
 BOUND_ROUNDING = 1e-12  # of sums of waves, relative to their parts
@@ -20,7 +24,9 @@ def wave_at_jump(past, places, clock, ring, mask, at, wave, i):
     """Wave sent into a stretch just after jump i of its list [kg/s]; ring, mask : result of `ring_of`."""
     sent = past[history.jump_place(past, places, at, i)]
     count = history.count_until(past, places, at, i + 1, sent + clock[4])
-    return smooth_wave_linear(past, clock, ring, mask, wave, sent) + history.sum_of_first(past, places, at, count)
+    return smooth_wave_linear(past, clock, ring, mask, wave, sent) + history.sum_of_first(
+        past, places, at, count
+    )
 
 
 @njit(forceinline=True)
@@ -30,7 +36,8 @@ def smooth_changes(past, clock, ring, mask, wave, t):
     if k == BEFORE_ALL:
         return 0.0
     a, b = past[ring + 2 * ((k - 1) & mask) + wave], past[ring + 2 * (k & mask) + wave]
-    c, d = past[ring + 2 * ((k + 1) & mask) + wave], past[ring + 2 * (min(k + 2, clock[0]) & mask) + wave]
+    c = past[ring + 2 * ((k + 1) & mask) + wave]
+    d = past[ring + 2 * (min(k + 2, clock[0]) & mask) + wave]
     return abs(b - a) + abs(c - b) + abs(d - c)
 
 
@@ -43,11 +50,15 @@ def write_jump_bounds(past, places, clock, ring, mask, at, wave, begin):
     queue = int(past[history.JUMP_CAPACITY])
     for i in range(begin, int(past[at + history.JUMP_COUNT])):
         place = history.jump_place(past, places, at, i)
-        sent, size, total = past[place], past[place + queue], past[place + 2 * queue]
+        sent = past[place]
+        size = past[place + queue]
+        total = past[place + 2 * queue]
         wave_after = wave_at_jump(past, places, clock, ring, mask, at, wave, i)
         smooth = smooth_wave_linear(past, clock, ring, mask, wave, sent)
         # Wave after the jump and before it; the third differs among jumps at times that count as equal.
-        first, second, third = wave_after, wave_after - size, smooth + total
+        first = wave_after
+        second = wave_after - size
+        third = smooth + total
         # Widened by the rounding of sums and of times, so that no value read later lies outside.
         rounding = BOUND_ROUNDING * (abs(smooth) + abs(total) + abs(size) + abs(wave_after))
         rounding += GRID_ROUNDING * smooth_changes(past, clock, ring, mask, wave, sent)
@@ -61,16 +72,27 @@ def write_bounds(past, places, clock, line, q, wave):
 
     If those of earlier entries are missing, write them too, for one travel time.
     """
-    newest, same, queue = clock[0], clock[4], int(past[history.JUMP_CAPACITY])
+    newest = clock[0]
+    same = clock[4]
+    queue = int(past[history.JUMP_CAPACITY])
     near = 2.0 * same + GRID_ROUNDING / clock[2]
-    at, (ring, mask) = history.jump_head(places, line["stretch"] + q, wave), history.ring_of(places, line, q)
+    at, (ring, mask) = (
+        history.jump_head(places, line["stretch"] + q, wave),
+        history.ring_of(places, line, q),
+    )
     k, bounds = newest, history.bounds_of(places, line, q) + 2 * wave
     written = bounds - history.BOUNDS_BEGIN - wave
     # Begin earlier: at an entry recorded again, or one travel time back if bounds are missing.
     if past[written] != newest - 1 or past[history.RESTATED_ENTRY] == newest - 1:
-        oldest = history.time_of(past, newest - 1) - (line["tau"] if past[written] != k - 1 else 0.0)
+        oldest = history.time_of(past, newest - 1) - (
+            line["tau"] if past[written] != k - 1 else 0.0
+        )
         k = newest - 1
-        while k > newest - mask + 1 and k > history.PROFILE_ENTRIES and history.time_of(past, k - 1) > oldest - near:
+        while (
+            k > newest - mask + 1
+            and k > history.PROFILE_ENTRIES
+            and history.time_of(past, k - 1) > oldest - near
+        ):
             k -= 1
     past[written], k = newest, max(k, history.PROFILE_ENTRIES)
     begin = history.time_of(past, k - 1) if k > history.PROFILE_ENTRIES else -history.INFINITE

@@ -27,15 +27,19 @@ all lines; wave : 0 forward, 1 backward; side : 0 end at `from`, 1 end at `to`; 
 from fvsolve.jit import njit
 
 HEADER_SIZE = 32
-COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, jumps of a wave, stretches
+# entries so far, capacity for times, jumps of a wave, stretches
+COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = 0, 1, 2, 3
 RING_FACTOR = 4  # factor by which rings are longer than at first
 LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
 STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of both before the last entry
 GREATEST_JUMP, GREATEST_UNSTORED_JUMP = 9, 10  # greatest jump, greatest jump that did not fit [Pa]
 JUMPS_TRAVELLING = 11  # number of jumps now
-ARRIVALS_TIME, ARRIVALS_COUNT = 12, 13  # time and number of entries for which the stored arrivals hold
-CORRECTED_TIME = 14  # time of a corrected state until it is recorded again [s]; NaN before its entry; else -INFINITE
-NEXT_ARRIVAL = 15  # arrival of the next jump that ends a step [s]; until it is admitted, no reading includes it
+# time and number of entries for which the stored arrivals hold
+ARRIVALS_TIME, ARRIVALS_COUNT = 12, 13
+# time of a corrected state until it is recorded again [s]; NaN before its entry; else -INFINITE
+CORRECTED_TIME = 14
+# arrival of the next jump that ends a step [s]; until it is admitted, no reading includes it
+NEXT_ARRIVAL = 15
 ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been passed on
 MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
 GREATEST_WAVE = 17  # greatest wave so far, deviation from the initial steady state [Pa]
@@ -43,18 +47,26 @@ RESTATED_ENTRY = 20  # number of the last entry that has been recorded again
 TOLERANCE = 21  # result of `time_tolerance` [s]
 REFLECTION_RATE = 22  # greatest number of stretches that a wave crosses in unit time [1/s]
 FIRST_TIME = 23  # time of the first entry [s]
-SEGMENT_END = 24  # end of the present segment of the run, where schedules may jump; INFINITE in the last segment [s]
+# end of the present segment of the run, where schedules may jump; INFINITE in the last segment [s]
+SEGMENT_END = 24
 RING_ENTRIES = 19  # capacity of all rings together before they are lengthened
 INFINITE = 1e300  # time [s]
 PROFILE_ENTRIES = 8  # entries of the initial steady state (zeros) before the first entry
-REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = 0, 1, 2, 3, 4  # head of a list of jumps, its size
-JUMP_SIZE = 5  # values per jump: time, size, running sum, least and greatest wave beside it (`wave_bounds`)
+# head of a list of jumps, its size
+REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = 0, 1, 2, 3, 4
+# values per jump: time, size, running sum, least and greatest wave beside it (`wave_bounds`)
+JUMP_SIZE = 5
 BOUNDS_BEGIN, BOUNDS_SIZE = 2, 4  # values in `bounds` before those of entries, values per entry
-ARRIVALS_SIZE = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
-RING_GAP = 8  # numbers between rings, one cache line: else entries of the same time would share a few cache sets
-TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
-UNIT_ROUNDING = 2.3e-16  # relative rounding of a time: the sums of two paths round by half of it each at a stretch
-GREATEST_SHARE = 1e-4  # greatest part of a step and of a travel time that counts as rounding of sums
+# values per stretch: backward wave at its beginning, forward wave at its end, delta
+ARRIVALS_SIZE = 3
+# numbers between rings, one cache line: else entries of the same time would share a few cache sets
+RING_GAP = 8
+# tolerance of equal times: fraction of a step, and at least of the time
+TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14
+# relative rounding of a time: the sums of two paths round by half of it each at a stretch
+UNIT_ROUNDING = 2.3e-16
+# greatest part of a step and of a travel time that counts as rounding of sums
+GREATEST_SHARE = 1e-4
 # ratio of neighbouring steps, where one was shortened, above which readings are linear; no ratio of round times, which
 # rounding would put on either side
 GREATEST_STEP_RATIO = 1.9000019
@@ -76,7 +88,8 @@ def offsets_of(past):
     stretches, arrivals = int(past[STRETCHES]), HEADER_SIZE + int(past[CAPACITY])
     heads = arrivals + ARRIVALS_SIZE * stretches
     jumps = heads + 2 * HEAD_SIZE * stretches
-    rings, factor = jumps + 2 * JUMP_SIZE * int(past[JUMP_CAPACITY]) * stretches, int(past[RING_FACTOR])
+    rings = jumps + 2 * JUMP_SIZE * int(past[JUMP_CAPACITY]) * stretches
+    factor = int(past[RING_FACTOR])
     bounds = rings + 2 * factor * int(past[RING_ENTRIES]) + RING_GAP * stretches
     return arrivals, heads, jumps, rings, factor, bounds
 
@@ -85,7 +98,9 @@ def offsets_of(past):
 def ring_of(places, line, q):
     """(offset in `past` of the entries of stretch q of a line, bit mask that wraps entry numbers)."""
     length = places[4] * line["ring_size"]
-    return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
+    return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (
+        line["stretch"] + q
+    ), length - 1
 
 
 @njit(forceinline=True)
@@ -112,14 +127,23 @@ def jump_place(past, places, at, i):
     """
     queue = int(past[JUMP_CAPACITY])
     k = int(past[at + FIRST_JUMP]) + i
-    return places[2] + JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE) + (k if k < queue else k - queue)
+    return (
+        places[2]
+        + JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE)
+        + (k if k < queue else k - queue)
+    )
 
 
 @njit(forceinline=True)
 def jump_number(past, places, at, place):
     """Position in a list of the jump whose time is at the offset `place` in `past`, see `jump_place`."""
     queue = int(past[JUMP_CAPACITY])
-    k = place - places[2] - JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE) - int(past[at + FIRST_JUMP])
+    k = (
+        place
+        - places[2]
+        - JUMP_SIZE * queue * ((at - places[1]) // HEAD_SIZE)
+        - int(past[at + FIRST_JUMP])
+    )
     return k if k >= 0 else k + queue
 
 
@@ -138,7 +162,9 @@ def update_tolerance(past, t, h):
     tolerance never decreases in a run: a jump that has been passed on as arrived must count as arrived later too.
     """
     rate = past[REFLECTION_RATE]
-    sums = min(UNIT_ROUNDING * rate * (t - past[FIRST_TIME]) * abs(t), GREATEST_SHARE * min(h, 1.0 / rate))
+    sums = min(
+        UNIT_ROUNDING * rate * (t - past[FIRST_TIME]) * abs(t), GREATEST_SHARE * min(h, 1.0 / rate)
+    )
     past[TOLERANCE] = max(past[TOLERANCE], TIME_TOLERANCE * h, ROUNDING * abs(t), sums)
 
 
@@ -173,18 +199,30 @@ def newest_before(past, t):
 @njit(forceinline=True)
 def lagrange_six(x):
     """Six Lagrange weights of entries k - 2 .. k + 3 at the fraction x in [0, 1) of the way from entry k to k + 1."""
-    a, b, d, e, f = x + 2.0, x + 1.0, x - 1.0, x - 2.0, x - 3.0
-    ab, de, ef = a * b, d * e, e * f
+    a = x + 2.0
+    b = x + 1.0
+    d = x - 1.0
+    e = x - 2.0
+    f = x - 3.0
+    ab = a * b
+    de = d * e
+    ef = e * f
     return (
-        b * x * d * ef / -120.0, a * x * d * ef / 24.0, ab * d * ef / -12.0, ab * x * ef / 12.0,
-        ab * x * d * f / -24.0, ab * x * de / 120.0,
-    )  # fmt: skip
+        b * x * d * ef / -120.0,
+        a * x * d * ef / 24.0,
+        ab * d * ef / -12.0,
+        ab * x * ef / 12.0,
+        ab * x * d * f / -24.0,
+        ab * x * de / 120.0,
+    )
 
 
 @njit(forceinline=True)
 def lagrange_four(x):
     """Lagrange weights of entries k - 1 .. k + 2 at the fraction x, in the order of `lagrange_six`, other weights 0."""
-    b, d, e = x + 1.0, x - 1.0, x - 2.0
+    b = x + 1.0
+    d = x - 1.0
+    e = x - 2.0
     return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
 
 
@@ -204,7 +242,8 @@ def find_interval(past, newest, t):
     From the time of `newest` on the result is (newest - 1, 1). Before the first entry, or all stored ones, it is
     (PROFILE_ENTRIES - 1, 0), an entry of the initial steady state.
     """
-    low, high = max(PROFILE_ENTRIES, int(past[COUNT]) - int(past[CAPACITY]) + PROFILE_ENTRIES), newest
+    low = max(PROFILE_ENTRIES, int(past[COUNT]) - int(past[CAPACITY]) + PROFILE_ENTRIES)
+    high = newest
     if t >= time_of(past, high):
         return high - 1, 1.0
     if t < time_of(past, low):
@@ -233,14 +272,23 @@ def lagrange_unequal(past, newest, t):
     if low + 2 > newest or low - 1 < PROFILE_ENTRIES:
         return low, line
     t0, t3 = time_of(past, low - 1), time_of(past, low + 2)
-    near, here, far = t1 - t0, t2 - t1, t3 - t2
+    near = t1 - t0
+    here = t2 - t1
+    far = t3 - t2
     if max(near, here, far) > GREATEST_STEP_RATIO * min(near, here, far):
         return low, line
-    a, b, c, d = t - t0, t - t1, t - t2, t - t3
+    a = t - t0
+    b = t - t1
+    c = t - t2
+    d = t - t3
     return low, (
-        0.0, b * c * d / ((t0 - t1) * (t0 - t2) * (t0 - t3)), a * c * d / (near * (t1 - t2) * (t1 - t3)),
-        a * b * d / ((t2 - t0) * here * (t2 - t3)), a * b * c / ((t3 - t0) * (t3 - t1) * far), 0.0,
-    )  # fmt: skip
+        0.0,
+        b * c * d / ((t0 - t1) * (t0 - t2) * (t0 - t3)),
+        a * c * d / (near * (t1 - t2) * (t1 - t3)),
+        a * b * d / ((t2 - t0) * here * (t2 - t3)),
+        a * b * c / ((t3 - t0) * (t3 - t1) * far),
+        0.0,
+    )
 
 
 @njit(forceinline=True)
@@ -263,7 +311,10 @@ def stencil(past, clock, t):
 
     After that entry its value is kept.
     """
-    newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
+    newest = clock[0]
+    latest = clock[1]
+    per_step = clock[2]
+    even = clock[3]
     if t >= latest:  # also before the first step, whose length is not known yet
         return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     place = (t - latest) * per_step
@@ -285,11 +336,34 @@ def stencil(past, clock, t):
 def smooth_waves(past, places, clock, line, q, t):
     """Smooth parts of both waves sent into stretch q of a delay line at t: (forward, backward) [kg/s]."""
     (at, mask), (k, w) = ring_of(places, line, q), stencil(past, clock, t)
-    a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
-    d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
-    r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
-    a, b, c, d, e, f = a + 1, b + 1, c + 1, d + 1, e + 1, f + 1
-    l = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
+    a = at + 2 * ((k - 2) & mask)
+    b = at + 2 * ((k - 1) & mask)
+    c = at + 2 * (k & mask)
+    d = at + 2 * ((k + 1) & mask)
+    e = at + 2 * ((k + 2) & mask)
+    f = at + 2 * ((k + 3) & mask)
+    r = (
+        w[0] * past[a]
+        + w[1] * past[b]
+        + w[2] * past[c]
+        + w[3] * past[d]
+        + w[4] * past[e]
+        + w[5] * past[f]
+    )
+    a = a + 1
+    b = b + 1
+    c = c + 1
+    d = d + 1
+    e = e + 1
+    f = f + 1
+    l = (
+        w[0] * past[a]
+        + w[1] * past[b]
+        + w[2] * past[c]
+        + w[3] * past[d]
+        + w[4] * past[e]
+        + w[5] * past[f]
+    )
     return r, l
 
 
@@ -346,7 +420,11 @@ def sum_listed_jumps(past, places, at, t):
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
     """Sum of the jumps of a wave sent up to t [kg/s], including jumps already removed from its list."""
-    return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
+    return (
+        sum_listed_jumps(past, places, at, t)
+        if past[at + JUMP_COUNT] > 0.0
+        else past[at + REMOVED_SUM]
+    )
 
 
 @njit(forceinline=True)
@@ -366,7 +444,8 @@ def arrived_until(past, places, clock, at, t, tau):
     """
     if past[ONLY_PASSED_JUMPS] > 0.0:
         return passed_jumps(past, places, at)
-    return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)  # `latest_arrival`
+    # `latest_arrival`
+    return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)
 
 
 @njit(forceinline=True)
@@ -374,7 +453,9 @@ def read_waves(past, places, clock, line, q, t):
     """Both waves sent into stretch q of a delay line at t, with their jumps: (forward, backward) [kg/s]."""
     r, l = smooth_waves(past, places, clock, line, q, t)
     until, ahead = t + clock[4], jump_head(places, line["stretch"] + q, 0)
-    return r + jumps_until(past, places, ahead, until), l + jumps_until(past, places, ahead + HEAD_SIZE, until)
+    return r + jumps_until(past, places, ahead, until), l + jumps_until(
+        past, places, ahead + HEAD_SIZE, until
+    )
 
 
 @njit(forceinline=True)
@@ -393,7 +474,9 @@ def insert_jump(past, places, at, t, size):
     listed becomes part of the smooth part, see `write_entry`.
     t : time at which the jump was sent [s]; size [kg/s]
     """
-    queue, count, tolerance = int(past[JUMP_CAPACITY]), int(past[at + JUMP_COUNT]), time_tolerance(past)
+    queue = int(past[JUMP_CAPACITY])
+    count = int(past[at + JUMP_COUNT])
+    tolerance = time_tolerance(past)
     i = count
     # From the end of the list, because jumps are inserted mostly in the order of their times.
     while i > 0 and past[jump_place(past, places, at, i - 1)] > t + tolerance:

@@ -15,8 +15,25 @@ from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.dtypes import BODY_OUT
 from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes, schedule_value
-from fvsolve.core.kernels.vectors import add_vector, cross, minus, plus, rotate, scaled, vector, write_vector
-from fvsolve.features.motion.kernels.tables import ABOUT, ALONG, BALL, FREE, PRISMATIC, REVOLUTE, open_motion
+from fvsolve.core.kernels.vectors import (
+    add_vector,
+    cross,
+    minus,
+    plus,
+    rotate,
+    scaled,
+    vector,
+    write_vector,
+)
+from fvsolve.features.motion.kernels.tables import (
+    ABOUT,
+    ALONG,
+    BALL,
+    FREE,
+    PRISMATIC,
+    REVOLUTE,
+    open_motion,
+)
 from fvsolve.jit import njit
 
 
@@ -33,7 +50,9 @@ def joint_coordinate(body, t, y, tables):
 def multiply_matrices(a, i, b, j, c, k):
     """Write the product A B of 3 x 3 matrices at a[i] and b[j] to c[k]; all are stored by rows."""
     for row in range(i, i + 9, 3):
-        x, y, z = a[row], a[row + 1], a[row + 2]
+        x = a[row]
+        y = a[row + 1]
+        z = a[row + 2]
         c[k] = x * b[j] + y * b[j + 3] + z * b[j + 6]
         c[k + 1] = x * b[j + 1] + y * b[j + 4] + z * b[j + 7]
         c[k + 2] = x * b[j + 2] + y * b[j + 5] + z * b[j + 8]
@@ -43,7 +62,11 @@ def multiply_matrices(a, i, b, j, c, k):
 @njit
 def rotation_about_axis(q, k, angle, axis):
     """Write the rotation matrix about a unit axis by an angle [rad], by rows, to q[k], (43) of docs/course.md."""
-    c, s, x, y, z = cos(angle), sin(angle), axis[0], axis[1], axis[2]
+    c = cos(angle)
+    s = sin(angle)
+    x = axis[0]
+    y = axis[1]
+    z = axis[2]
     rest = 1.0 - c
     write_vector(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
     write_vector(q, k + 3, x * y * rest + z * s, c + y * y * rest, y * z * rest - x * s)
@@ -66,7 +89,12 @@ def rotation_of_parameters(q, k, h, a, b, c):
 def joint_parameters(body, first, y):
     """Euler parameters (eta, eps) of a joint, not normalised; first : index of eta among the joint's coordinates."""
     at, e = body["y"] + first, body["start"]
-    return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
+    return (
+        e[first] + y[at],
+        e[first + 1] + y[at + 1],
+        e[first + 2] + y[at + 2],
+        e[first + 3] + y[at + 3],
+    )
 
 
 @njit(forceinline=True)
@@ -84,7 +112,9 @@ def set_free_body(body, y, own):
     rotation_of_parameters(own, layout.ATTITUDE, *joint_parameters(body, 3, y))
     centre, v = rotate(own, layout.ATTITUDE, body["centre"], 0), joint_velocities(body, 0, y)
     write_vector(own, layout.ARM, *scaled(-1.0, centre))
-    write_vector(own, layout.POSITION, *minus(plus(vector(body["start"], 0), vector(y, body["y"])), centre))
+    write_vector(
+        own, layout.POSITION, *minus(plus(vector(body["start"], 0), vector(y, body["y"])), centre)
+    )
     write_vector(own, layout.VELOCITY_AT_O, *v)
     write_vector(own, layout.SPIN, *rotate(own, layout.ATTITUDE, joint_velocities(body, 3, y), 0))
     # A spatial acceleration at o is the acceleration of the point there minus w x v.
@@ -114,8 +144,14 @@ def set_joint_frame(body, out, tables, own):
     write_vector(own, layout.POSITION, *plus(vector(up, layout.POSITION), offset))
     write_vector(own, layout.ARM, *plus(vector(up, layout.ARM), offset))
     for k in range(3):
-        own[layout.SPIN + k], own[layout.VELOCITY_AT_O + k] = up[layout.SPIN + k], up[layout.VELOCITY_AT_O + k]
-        own[layout.SPIN_BIAS + k], own[layout.BIAS_AT_O + k] = up[layout.SPIN_BIAS + k], up[layout.BIAS_AT_O + k]
+        own[layout.SPIN + k], own[layout.VELOCITY_AT_O + k] = (
+            up[layout.SPIN + k],
+            up[layout.VELOCITY_AT_O + k],
+        )
+        own[layout.SPIN_BIAS + k], own[layout.BIAS_AT_O + k] = (
+            up[layout.SPIN_BIAS + k],
+            up[layout.BIAS_AT_O + k],
+        )
 
 
 @njit
@@ -155,7 +191,11 @@ def add_joint_velocity(own, w, v):
     add_vector(own, layout.VELOCITY_AT_O, v)
     # V contains S q' by now, whose product with S q' itself is zero.
     add_vector(own, layout.SPIN_BIAS, cross(own, layout.SPIN, *w))
-    add_vector(own, layout.BIAS_AT_O, plus(cross(own, layout.SPIN, *v), cross(own, layout.VELOCITY_AT_O, *w)))
+    add_vector(
+        own,
+        layout.BIAS_AT_O,
+        plus(cross(own, layout.SPIN, *v), cross(own, layout.VELOCITY_AT_O, *w)),
+    )
 
 
 @njit
@@ -206,7 +246,9 @@ def centre_of(body, out, here):
     Both are in axes of the world.
     """
     centre = rotate(out, here + layout.ATTITUDE, body["centre"], 0)
-    return centre + plus(vector(out, here + layout.VELOCITY), cross(out, here + layout.SPIN, *centre))
+    return centre + plus(
+        vector(out, here + layout.VELOCITY), cross(out, here + layout.SPIN, *centre)
+    )
 
 
 @njit
@@ -257,7 +299,9 @@ def update_elements(out, tables):
     """
     offsets, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
-        line, at, to = lines[k], offsets["along"] + 3 * k, offsets["travel"] + 2 * lines[k]["push"]
+        line = lines[k]
+        at = offsets["along"] + 3 * k
+        to = offsets["travel"] + 2 * lines[k]["push"]
         i, j = line["from_point"], line["to_point"]
         if line["acts"] == ABOUT:
             a, b, c = spin_of(out, tables, i)
@@ -265,14 +309,20 @@ def update_elements(out, tables):
             # The axis is fixed in the body of `to` and turns with it.
             r = body_row(tables, tables.points[j]["body"]) + layout.ATTITUDE
             write_vector(out, at, *rotate(out, r, line["direction"], 0))
-            out[to], out[to + 1] = 0.0, out[at] * (u - a) + out[at + 1] * (v - b) + out[at + 2] * (w - c)
+            out[to], out[to + 1] = (
+                0.0,
+                out[at] * (u - a) + out[at + 1] * (v - b) + out[at + 2] * (w - c),
+            )
             continue
         root = root_of(tables, i)
         # Within a tree positions count from o, so that a body far from the origin of the world loses no digits.
         base = layout.ARM if root >= 0 and root == root_of(tables, j) else layout.POSITION
         x, y, z, a, b, c = point_at(out, tables, i, base)
         p, q, r, u, v, w = point_at(out, tables, j, base)
-        x, y, z, length = p - x, q - y, r - z, 0.0
+        x = p - x
+        y = q - y
+        z = r - z
+        length = 0.0
         if line["acts"] == ALONG:
             length = sqrt(x * x + y * y + z * z)
             write_vector(out, at, x / length, y / length, z / length)
@@ -301,7 +351,9 @@ def kinematics(t, y, dydt, out, handle):
         # Motion at o serves the equations; loads and points need that of the origin.
         turning = cross(own, layout.SPIN, *vector(own, layout.ARM))
         write_vector(own, layout.VELOCITY, *plus(vector(own, layout.VELOCITY_AT_O), turning))
-        write_vector(own, layout.BIAS, *origin_acceleration(own, layout.BIAS_AT_O, layout.SPIN_BIAS))
+        write_vector(
+            own, layout.BIAS, *origin_acceleration(own, layout.BIAS_AT_O, layout.SPIN_BIAS)
+        )
         weight = -body["mass"] * gravity
         # The weight acts at the centre of mass, so that it has a torque about the origin.
         x, y0, z = rotate(own, layout.ATTITUDE, body["centre"], 0)

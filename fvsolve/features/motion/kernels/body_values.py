@@ -27,22 +27,62 @@ from fvsolve.core.kernels.vectors import (
     vector,
     vector_product,
 )
-from fvsolve.features.motion.kernels.body_kinematics import centre_of, joint_coordinate, joint_parameters, point_at
+from fvsolve.features.motion.kernels.body_kinematics import (
+    centre_of,
+    joint_coordinate,
+    joint_parameters,
+    point_at,
+)
 from fvsolve.features.motion.kernels.tables import FREE, PRISMATIC, open_motion
 from fvsolve.jit import njit
 
 BODY_ROWS = 3  # rows of `power` for each body
 BODY_QUANTITIES = (
-    "x", "y", "z", "roll", "pitch", "yaw", "eta", "eps_x", "eps_y", "eps_z", "vx", "vy", "vz", "wx", "wy", "wz",
-    "ax", "ay", "az", "angle", "rate", "joint_fx", "joint_fy", "joint_fz", "joint_tx", "joint_ty", "joint_tz",
-    "kinetic_energy", "momentum_x", "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y",
+    "x",
+    "y",
+    "z",
+    "roll",
+    "pitch",
+    "yaw",
+    "eta",
+    "eps_x",
+    "eps_y",
+    "eps_z",
+    "vx",
+    "vy",
+    "vz",
+    "wx",
+    "wy",
+    "wz",
+    "ax",
+    "ay",
+    "az",
+    "angle",
+    "rate",
+    "joint_fx",
+    "joint_fy",
+    "joint_fz",
+    "joint_tx",
+    "joint_ty",
+    "joint_tz",
+    "kinetic_energy",
+    "momentum_x",
+    "momentum_y",
+    "momentum_z",
+    "angular_momentum_x",
+    "angular_momentum_y",
     "angular_momentum_z",
-)  # fmt: skip
+)
 LEAST_COSINE = 1e-12  # cosine of pitch below which roll and yaw rotate about the same axis
-ACCELERATION_PARTS = ("", "_relative", "_coriolis", "_transversal", "_centripetal")  # terms of an acceleration, (65)
+# terms of an acceleration, (65)
+ACCELERATION_PARTS = ("", "_relative", "_coriolis", "_transversal", "_centripetal")
 POINT_QUANTITIES = (
-    *"xyz", "vx", "vy", "vz", *(f"a{axis}{share}" for share in ACCELERATION_PARTS for axis in "xyz"),
-)  # fmt: skip
+    *"xyz",
+    "vx",
+    "vy",
+    "vz",
+    *(f"a{axis}{share}" for share in ACCELERATION_PARTS for axis in "xyz"),
+)
 
 
 @njit
@@ -51,7 +91,9 @@ def angular_momentum(body, out, here):
 
     J : inertia, w : angular velocity
     """
-    return inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN))
+    return inertia_product(
+        body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN)
+    )
 
 
 @njit
@@ -68,7 +110,8 @@ def kinetic_energy(body, out, here):
     """
     v = centre_of(body, out, here)[3:]
     return 0.5 * (
-        body["mass"] * scalar_product(v, v) + dot(out, here + layout.SPIN, *angular_momentum(body, out, here))
+        body["mass"] * scalar_product(v, v)
+        + dot(out, here + layout.SPIN, *angular_momentum(body, out, here))
     )
 
 
@@ -104,9 +147,14 @@ def joint_load(out, tables, i):
         centre, applied = centre_of(body, out, here)[:3], vector(out, here + layout.FORCE)
         # Newton for the force, Euler for the torque J alpha + w x J w, then both moved to the origin.
         push = scaled(body["mass"], acceleration_at(out, here, here + layout.ACCELERATION, *centre))
-        turn = inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE))
+        turn = inertia_product(
+            body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE)
+        )
         turn = plus(turn, cross(out, here + layout.SPIN, *angular_momentum(body, out, here)))
-        turn = minus(plus(turn, vector_product(plus(centre, offset), push)), vector(out, here + layout.TORQUE))
+        turn = minus(
+            plus(turn, vector_product(plus(centre, offset), push)),
+            vector(out, here + layout.TORQUE),
+        )
         # The joint supplies what the other loads on the bodies do not.
         force = minus(plus(force, push), applied)
         torque = plus(torque, minus(turn, vector_product(offset, applied)))
@@ -132,14 +180,19 @@ def extra_basin_load(out, tables, b):
     (x, y, z), (p, q, u) = arm, spin
     ax, ay, az = minus(vector(out, here + layout.ACCELERATION), vector(out, here + layout.BIAS))
     # Normal acceleration of the bed as coefficients of 1, x and y, times the moments of mass.
-    rises = dot(out, tank + layout.NORMAL, ax + q * z - u * y, ay + u * x - p * z, az + p * y - q * x)
+    rises = dot(
+        out, tank + layout.NORMAL, ax + q * z - u * y, ay + u * x - p * z, az + p * y - q * x
+    )
     north, east = -dot(out, tank + layout.NORTH, *spin), dot(out, tank + layout.EAST, *spin)
     m = tank + layout.MOMENTS
     push = -(out[m] * rises + out[m + 1] * north + out[m + 2] * east)
     about_x = -(out[m + 2] * rises + out[m + 4] * north + out[m + 5] * east)
     about_y = out[m + 1] * rises + out[m + 3] * north + out[m + 4] * east
     force = scaled(push, vector(out, tank + layout.NORMAL))
-    torque = plus(scaled(about_x, vector(out, tank + layout.EAST)), scaled(about_y, vector(out, tank + layout.NORTH)))
+    torque = plus(
+        scaled(about_x, vector(out, tank + layout.EAST)),
+        scaled(about_y, vector(out, tank + layout.NORTH)),
+    )
     return force + plus(torque, vector_product(arm, force))
 
 
@@ -170,20 +223,38 @@ def euler_parameters(body, y, out, here):
         return h / size, a / size, b / size, c / size
     r = here + layout.ATTITUDE
     # Entries of R give 4 eta eps by differences, 4 eps_i eps_j by sums, 4 e^2 by the diagonal.
-    xx, yy, zz = out[r], out[r + 4], out[r + 8]
-    x, y0, z = out[r + 7] - out[r + 5], out[r + 2] - out[r + 6], out[r + 3] - out[r + 1]
-    p, q, s = out[r + 1] + out[r + 3], out[r + 2] + out[r + 6], out[r + 5] + out[r + 7]
-    h, a, b, c = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz  # 4 e^2
+    xx = out[r]
+    yy = out[r + 4]
+    zz = out[r + 8]
+    x = out[r + 7] - out[r + 5]
+    y0 = out[r + 2] - out[r + 6]
+    z = out[r + 3] - out[r + 1]
+    p = out[r + 1] + out[r + 3]
+    q = out[r + 2] + out[r + 6]
+    s = out[r + 5] + out[r + 7]
+    # 4 e^2
+    h = 1.0 + xx + yy + zz
+    a = 1.0 + xx - yy - zz
+    b = 1.0 - xx + yy - zz
+    c = 1.0 - xx - yy + zz
     # Division by the greatest parameter: a small one would lose digits.
     greatest = max(max(h, a), max(b, c))
     if greatest == h:
-        a, b, c = x, y0, z
+        a = x
+        b = y0
+        c = z
     elif greatest == a:
-        h, b, c = x, p, q
+        h = x
+        b = p
+        c = q
     elif greatest == b:
-        h, a, c = y0, p, s
+        h = y0
+        a = p
+        c = s
     else:
-        h, a, b = z, q, s
+        h = z
+        a = q
+        b = s
     size = sqrt(h * h + a * a + b * b + c * c)
     # Both signs denote the same attitude.
     if h < 0.0:
@@ -211,7 +282,9 @@ def body_value(t, y, out, tables, i, number):
     if number < 19:
         return out[here + layout.ACCELERATION + number - 16]
     if number < 21:
-        return joint_coordinate(body, t, y, tables)[number - 19] if body["joint"] <= PRISMATIC else 0.0
+        return (
+            joint_coordinate(body, t, y, tables)[number - 19] if body["joint"] <= PRISMATIC else 0.0
+        )
     if number < 27:
         return joint_load(out, tables, i)[number - 21]
     if number == 27:
@@ -253,7 +326,8 @@ def point_value(out, tables, k, number):
     dragged = cross(out, b + layout.SPIN, *arm)
     # Velocity in the turning axes of the parent, of which Coriolis is twice the spin times it.
     velocity = minus(minus(moved[3:], vector(out, b + layout.VELOCITY)), dragged)
-    coriolis, transversal = cross(out, b + layout.SPIN, *scaled(2.0, velocity)), cross(out, b + layout.SPIN_RATE, *arm)
+    coriolis = cross(out, b + layout.SPIN, *scaled(2.0, velocity))
+    transversal = cross(out, b + layout.SPIN_RATE, *arm)
     centripetal = cross(out, b + layout.SPIN, *dragged)
     if share == 2:
         return coriolis[axis]
@@ -302,7 +376,9 @@ def body_energy_rate(body, out, here, gravity):
     """
     x, y, z, u, v, w = centre_of(body, out, here)
     a, b, c = acceleration_at(out, here, here + layout.ACCELERATION, x, y, z)
-    turn = inertia_product(body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE))
+    turn = inertia_product(
+        body["inertia"], out, here + layout.ATTITUDE, *vector(out, here + layout.SPIN_RATE)
+    )
     return body["mass"] * (u * a + v * b + w * (c + gravity)) + dot(out, here + layout.SPIN, *turn)
 
 
@@ -348,7 +424,9 @@ def power_bodies(t, y, dydt, out, handle, power):
         if bodies[i]["stiffness"] > 0.0:
             power[at] += joint_spring_energy(bodies[i], y)[1]
         power[at + 1] = joint_damping_power(bodies[i], y) if bodies[i]["damping"] > 0.0 else 0.0
-        power[at + 2] = joint_drive_power(t, y, out, tables, i) if bodies[i]["schedule"] >= 0 else 0.0
+        power[at + 2] = (
+            joint_drive_power(t, y, out, tables, i) if bodies[i]["schedule"] >= 0 else 0.0
+        )
         at += BODY_ROWS
 
 
@@ -362,7 +440,9 @@ def stored_bodies(t, y, dydt, out, handle, stored):
         body, here = bodies[i], body_row(tables, i)
         z = out[here + layout.POSITION + 2] + centre_of(body, out, here)[2]
         stored[at + i] = (
-            kinetic_energy(body, out, here) - body["energy"] + body["mass"] * gravity * (z - body["height"])
+            kinetic_energy(body, out, here)
+            - body["energy"]
+            + body["mass"] * gravity * (z - body["height"])
         )
         if body["stiffness"] > 0.0:
             stored[at + i] += joint_spring_energy(body, y)[0]

@@ -59,7 +59,9 @@ def add_element_end_force(out, tables, k, acts, f):
         if acts == ABOUT:
             add_torque(out, here, *f)
         else:
-            add_force(out, here, *rotate(out, here + layout.ATTITUDE, tables.points[k]["place"], 0), *f)
+            add_force(
+                out, here, *rotate(out, here + layout.ATTITUDE, tables.points[k]["place"], 0), *f
+            )
 
 
 @njit
@@ -80,13 +82,16 @@ def relative_motion(out, tables, link):
 
     The rate is the velocity of `to` relative to the axes of the body of `from`.
     """
-    i, to = body_of_point(tables, link["from_point"]), point_at(out, tables, link["to_point"], layout.POSITION)
+    i = body_of_point(tables, link["from_point"])
+    to = point_at(out, tables, link["to_point"], layout.POSITION)
     gap, rate = minus(to, point_at(out, tables, link["from_point"], layout.POSITION)), to[3:]
     if i >= 0:
         here = body_row(tables, i)
         # Minus the velocity that the body of `from` has at the place of `to`.
         arm = minus(to, vector(out, here + layout.POSITION))
-        rate = minus(minus(rate, vector(out, here + layout.VELOCITY)), cross(out, here + layout.SPIN, *arm))
+        rate = minus(
+            minus(rate, vector(out, here + layout.VELOCITY)), cross(out, here + layout.SPIN, *arm)
+        )
     return gap, rate
 
 
@@ -113,7 +118,9 @@ def bushing_motion(out, tables, bushing):
     to = point_at(out, tables, bushing["to_point"], layout.POSITION)
     begin = point_at(out, tables, bushing["from_point"], layout.POSITION)
     gap, velocity = minus(to, begin), minus(to[3:], begin[3:])
-    turning = plus(spin_of(out, tables, bushing["to_point"]), spin_of(out, tables, bushing["from_point"]))
+    turning = plus(
+        spin_of(out, tables, bushing["to_point"]), spin_of(out, tables, bushing["from_point"])
+    )
     half = scaled(0.5, gap)
     return gap, minus(velocity, vector_product(turning, half)), minus(to, half)
 
@@ -154,7 +161,9 @@ def rotation_deviation(out, tables, bushing):
     z = 0.5 * (deviation(out, tables, bushing, 1, 0) - deviation(out, tables, bushing, 0, 1))
     trace = deviation(out, tables, bushing, 0, 0) + deviation(out, tables, bushing, 1, 1)
     trace += deviation(out, tables, bushing, 2, 2)
-    turning = minus(spin_of(out, tables, bushing["to_point"]), spin_of(out, tables, bushing["from_point"]))
+    turning = minus(
+        spin_of(out, tables, bushing["to_point"]), spin_of(out, tables, bushing["from_point"])
+    )
     return (x, y, z), turning, 0.25 * (3.0 - trace)
 
 
@@ -164,7 +173,9 @@ def bushing_loads(out, tables, bushing):
     gap, rate, _ = bushing_motion(out, tables, bushing)
     turn, turning, _ = rotation_deviation(out, tables, bushing)
     force = minus(scaled(-bushing["stiffness"], gap), scaled(bushing["damping"], rate))
-    torque = minus(scaled(-bushing["turn_stiffness"], turn), scaled(bushing["turn_damping"], turning))
+    torque = minus(
+        scaled(-bushing["turn_stiffness"], turn), scaled(bushing["turn_damping"], turning)
+    )
     return force, torque
 
 
@@ -190,10 +201,13 @@ def bushing_rate_limit(t, y, dydt, out, handle):
         return
     tables = open_motion(handle)
     bushings, at = tables.bushings, 7 * tables.freedoms.size
-    stiffness, damping, none = 0.0, 0.0, (0.0, 0.0, 0.0)
+    stiffness = 0.0
+    damping = 0.0
+    none = (0.0, 0.0, 0.0)
     for k in range(bushings.size):
         bushing = bushings[k]
-        i, j = body_of_point(tables, bushing["from_point"]), body_of_point(tables, bushing["to_point"])
+        i = body_of_point(tables, bushing["from_point"])
+        j = body_of_point(tables, bushing["to_point"])
         p = bushing_motion(out, tables, bushing)[2]
         # Three directions of displacement, then three axes of rotation, each with its own stiffness.
         for axis in range(6):
@@ -205,7 +219,9 @@ def bushing_rate_limit(t, y, dydt, out, handle):
                 mass.add_body_wrench(tables, j, along, none, at)
                 mass.add_body_wrench(tables, i, scaled(-1.0, along), none, at)
             inverse_mass = mass.mobility(tables, at)
-            stiffness += inverse_mass * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
+            stiffness += inverse_mass * (
+                bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"]
+            )
             damping += inverse_mass * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
     out[RATE] = max(out[RATE], mass.oscillation_rate(stiffness, damping))
 
@@ -218,7 +234,10 @@ def observe_bushings(t, y, out, handle, values):
     for k in range(probes.size):
         if probes[k]["kind"] == BUSHING_VALUE:
             bushing = tables.bushings[probes[k]["index"]]
-            value, (force, torque) = bushing_motion(out, tables, bushing)[0], bushing_loads(out, tables, bushing)
+            value, (force, torque) = (
+                bushing_motion(out, tables, bushing)[0],
+                bushing_loads(out, tables, bushing),
+            )
             if probes[k]["side"] == 1:
                 value = force
             elif probes[k]["side"] == 2:
@@ -231,7 +250,11 @@ def power_bushings(t, y, dydt, out, handle, power):
     """Write two entries of `power` for each bushing [W]: rate of stored energy, dissipated power."""
     tables = open_motion(handle)
     # Bushings come before bodies, and these before devices.
-    at = device_power_row(tables, power) - BODY_ROWS * tables.bodies.size - BUSHING_ROWS * tables.bushings.size
+    at = (
+        device_power_row(tables, power)
+        - BODY_ROWS * tables.bodies.size
+        - BUSHING_ROWS * tables.bushings.size
+    )
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
         gap, rate, _ = bushing_motion(out, tables, bushing)
@@ -254,7 +277,10 @@ def stored_bushings(t, y, dydt, out, handle, stored):
     for k in range(tables.bushings.size):
         bushing, gap = tables.bushings[k], bushing_motion(out, tables, tables.bushings[k])[0]
         eps = rotation_deviation(out, tables, bushing)[2]
-        own = 0.5 * bushing["stiffness"] * scalar_product(gap, gap) + 2.0 * bushing["turn_stiffness"] * eps
+        own = (
+            0.5 * bushing["stiffness"] * scalar_product(gap, gap)
+            + 2.0 * bushing["turn_stiffness"] * eps
+        )
         stored[at + k] = own - bushing["energy"]
 
 
@@ -289,7 +315,10 @@ def relative_acceleration(out, tables, pin, velocity):
     # Minus the acceleration of the axes of `from` at this place, and minus Coriolis, 2 w x v.
     if i >= 0:
         here = body_row(tables, i)
-        arm = minus(point_at(out, tables, pin["to_point"], layout.POSITION), vector(out, here + layout.POSITION))
+        arm = minus(
+            point_at(out, tables, pin["to_point"], layout.POSITION),
+            vector(out, here + layout.POSITION),
+        )
         coriolis = cross(out, here + layout.SPIN, *scaled(2.0, velocity))
         a = minus(minus(a, acceleration_at(out, here, here + layout.ACCELERATION, *arm)), coriolis)
     return a
@@ -301,7 +330,10 @@ def fill_constraint_rows(out, tables):
 
     Returns the number of constrained directions.
     """
-    pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, constraint_offset(tables)
+    pins = tables.pins
+    work = tables.scratch
+    n = tables.freedoms.size
+    g = constraint_offset(tables)
     rows = 0
     for k in range(pins.size):
         rows += pins[k]["rows"]
@@ -322,8 +354,11 @@ def fill_constraint_rows(out, tables):
                 work[z + at + m] = work[g + at + m]
             mass.solve_factor(tables, z + at)
             # Baumgarte: a + 2 pull v + pull^2 gap = 0 lets a deviation decay with critical damping.
-            slip, left = scalar_product(direction, velocity), scalar_product(direction, gap) - pin["gap"][r]
-            work[last + row] = -(scalar_product(direction, acceleration) + 2.0 * pull * slip + pull * pull * left)
+            slip = scalar_product(direction, velocity)
+            left = scalar_product(direction, gap) - pin["gap"][r]
+            work[last + row] = -(
+                scalar_product(direction, acceleration) + 2.0 * pull * slip + pull * pull * left
+            )
             row += 1
     return rows
 
@@ -334,7 +369,9 @@ def multipliers(tables, rows):
 
     lambda replaces the right-hand sides in `scratch`, see the module. rows : number of constrained directions
     """
-    work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
+    work = tables.scratch
+    n = tables.freedoms.size
+    z = constraint_offset(tables) + rows * tables.freedoms.size
     h, last = z + rows * n, z + rows * n + rows * rows
     # Products Z' Z and their Cholesky factor C, row by row, in the same sweep.
     for i in range(rows):
@@ -378,7 +415,13 @@ def add_start_pin_forces(t, y, dydt, out, handle):
     for k in range(pins.size):
         for r in range(pins[k]["rows"]):
             force = scaled(pins[k]["force"][r], pin_direction(out, tables, pins[k], r))
-            add_pair_load(out, tables, pins[k], point_at(out, tables, pins[k]["to_point"], layout.POSITION), force)
+            add_pair_load(
+                out,
+                tables,
+                pins[k],
+                point_at(out, tables, pins[k]["to_point"], layout.POSITION),
+                force,
+            )
 
 
 @njit
@@ -388,7 +431,10 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
     The pin forces [N] are also added to the loads of bodies. out[RATE] is raised by `body_rate_limit` and to `pull`.
     """
     tables = open_motion(handle)
-    pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
+    pins = tables.pins
+    work = tables.scratch
+    n = tables.freedoms.size
+    at = tables.layout[0]["pin"]
     # lambda is then the change of the pin forces since the start, which is zero in an equilibrium.
     add_start_pin_forces(t, y, dydt, out, handle)
     mass.fill_mass_matrix(y, out, tables)
@@ -415,7 +461,13 @@ def solve_pinned_accelerations(t, y, dydt, out, handle):
         rate = max(rate, pins[k]["pull"])
         for r in range(pins[k]["rows"]):
             force = scaled(work[last + row], pin_direction(out, tables, pins[k], r))
-            add_pair_load(out, tables, pins[k], point_at(out, tables, pins[k]["to_point"], layout.POSITION), force)
+            add_pair_load(
+                out,
+                tables,
+                pins[k],
+                point_at(out, tables, pins[k]["to_point"], layout.POSITION),
+                force,
+            )
             out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
             row += 1
     # Once more, now with the pin forces.

@@ -73,7 +73,9 @@ def segment_energy_rate(tables, out, here, segment, d, z, rise):
 @njit
 def path_energy_rate(tables, out, here, path, change, flow, rate):
     """Rate of the energy M (v . C + W . Z) of a mass flow M along a flow path (C, Z) on a body [W]."""
-    motion, g, up = tables.scratch, tables.settings[0]["gravity"], vector(out, here + layout.ATTITUDE + 6)
+    motion = tables.scratch
+    g = tables.settings[0]["gravity"]
+    up = vector(out, here + layout.ATTITUDE + 6)
     # d/dt of v in axes of the body is a_o - W x v, which is minus `pull`.
     pull = cross(motion, fluid.BODY_SPIN, *vector(motion, fluid.BODY_VELOCITY))
     pull = plus(scaled(g, up), plus(pull, vector(motion, fluid.BODY_GRAVITY)))
@@ -87,13 +89,19 @@ def extra_head(y, out, tables, here, i):
 
     For a tank, the energy at its surface, above datum, also replaces the energy at the pressure of its bottom.
     """
-    st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
+    st = tables.settings[0]
+    node = tables.nodes[i]
+    motion = tables.scratch
     r = vector(tables.moving_segments[node["forcing"]]["start"], 0)
-    z, more, v = node["elevation"], 0.0, vector(motion, fluid.BODY_VELOCITY)
+    z = node["elevation"]
+    more = 0.0
+    v = vector(motion, fluid.BODY_VELOCITY)
     if node["kind"] == TANK:
         r = r[0], r[1], r[2] + fluid.level_at(y, tables, i)
         z = st["datum"]
-        more = -energy_head(st, tables.floats, node, node["pressure"] + out[tables.layout[0]["pressure"] + i])
+        more = -energy_head(
+            st, tables.floats, node, node["pressure"] + out[tables.layout[0]["pressure"] + i]
+        )
     turning = cross(motion, fluid.BODY_SPIN, *r)
     square = scalar_product(v, v) - scalar_product(turning, turning)
     return more + st["gravity"] * (height_on_body(out, here, r) - z) + 0.5 * square
@@ -114,7 +122,9 @@ def add_node_power(y, dydt, out, tables, here, i, power):
     if node["kind"] == FIXED or node["kind"] == JUNCTION:
         # Fluid from outside has the velocity of the node at which it enters.
         v = velocity_at(tables.scratch, segment[0])
-        head = st["gravity"] * (height_on_body(out, here, segment[0]) - z) + 0.5 * scalar_product(v, v)
+        head = st["gravity"] * (height_on_body(out, here, segment[0]) - z) + 0.5 * scalar_product(
+            v, v
+        )
         power[NODE * i] += head * out[tables.layout[0]["supply"] + i]
         return
     d = fluid.node_segment_rates(y, dydt, out, tables, i)
@@ -155,7 +165,9 @@ def pipe_energy_rate(y, dydt, out, tables, k, here):
     (m, flow) = fluid.pipe_moments(tables, y, k, length, 1.0)
     (d, rate) = fluid.pipe_moments(tables, dydt, k, length, 0.0)
     total = segment_energy_rate(tables, out, here, (r, t, m), d, z, rise)
-    total += path_energy_rate(tables, out, here, fluid.straight_path(r, t), fluid.ZERO_FLOW_PATH, flow, rate)
+    total += path_energy_rate(
+        tables, out, here, fluid.straight_path(r, t), fluid.ZERO_FLOW_PATH, flow, rate
+    )
     # In a tank the flow goes on from the end of the pipe to the surface.
     for right in range(2):
         i, flow = fluid.pipe_end(y, tables, k, right, 1.0)
@@ -193,15 +205,21 @@ def column_energy_rate(y, dydt, out, tables, k, here):
 
     Heights are those above the datum.
     """
-    column, z, total = tables.columns[k], tables.settings[0]["datum"], 0.0
+    column = tables.columns[k]
+    z = tables.settings[0]["datum"]
+    total = 0.0
     for m in range(column["forcings"]):
         total += segment_energy_rate(
             tables, out, here, fluid.column_segment(tables, column, m), fluid.ZERO_VECTOR, z, 0.0
         )
     i, j = column["from_node"], column["to_node"]
-    faster = fluid.tank_paths(tables, i, j, fluid.level_rate(dydt, tables, i), fluid.level_rate(dydt, tables, j))
+    faster = fluid.tank_paths(
+        tables, i, j, fluid.level_rate(dydt, tables, i), fluid.level_rate(dydt, tables, j)
+    )
     flow, rate = column["flow"] + y[column["y"]], dydt[column["y"]]
-    return total + path_energy_rate(tables, out, here, fluid.column_path(y, tables, column), faster, flow, rate)
+    return total + path_energy_rate(
+        tables, out, here, fluid.column_path(y, tables, column), faster, flow, rate
+    )
 
 
 @njit
@@ -210,8 +228,12 @@ def column_extra_energy(y, out, tables, k, here):
 
     Heights are those above the datum.
     """
-    column, z, motion = tables.columns[k], tables.settings[0]["datum"], tables.scratch
-    total = (column["flow"] + y[column["y"]]) * path_velocity(motion, fluid.column_path(y, tables, column))
+    column = tables.columns[k]
+    z = tables.settings[0]["datum"]
+    motion = tables.scratch
+    total = (column["flow"] + y[column["y"]]) * path_velocity(
+        motion, fluid.column_path(y, tables, column)
+    )
     for m in range(column["forcings"]):
         total += segment_energy(tables, out, here, fluid.column_segment(tables, column, m), z, 0.0)
     return total
@@ -227,9 +249,14 @@ def carrier(tables, out, row):
 def add_power(t, y, dydt, out, handle, power):
     """Add the power due to the motion of bodies to the entries of nodes, pipes and rigid columns in `power` [W]."""
     tables = open_motion(handle)
-    nodes, pipes, columns, motion = tables.nodes, tables.pipes, tables.columns, tables.scratch
+    nodes = tables.nodes
+    pipes = tables.pipes
+    columns = tables.columns
+    motion = tables.scratch
     for i in range(nodes.size):
-        here = carrier(tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
+        here = carrier(
+            tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1
+        )
         if here >= 0:
             add_node_power(y, dydt, out, tables, here, i, power)
     at = NODE * nodes.size
@@ -238,8 +265,12 @@ def add_power(t, y, dydt, out, handle, power):
         here = carrier(tables, out, pipe["forcing"])
         if here >= 0:
             # Fluid brings the energy of the motion at both ends with the flow there.
-            into = extra_head(y, out, tables, here, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
-            into -= extra_head(y, out, tables, here, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
+            into = extra_head(y, out, tables, here, pipe["from_node"]) * (
+                pipe["flow"] + (out[end] - out[end + 1])
+            )
+            into -= extra_head(y, out, tables, here, pipe["to_node"]) * (
+                pipe["flow"] + (out[end + 2] - out[end + 3])
+            )
             power[at] += into - path_velocity(motion, fluid.pipe_load(y, dydt, tables, k))
             power[at + 3] += pipe_energy_rate(y, dydt, out, tables, k, here)
         at += PIPE
@@ -264,9 +295,13 @@ def add_stored(t, y, dydt, out, handle, stored):
     heights are those above the datum instead.
     """
     tables = open_motion(handle)
-    nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
+    nodes = tables.nodes
+    pipes = tables.pipes
+    columns = tables.columns
     for i in range(nodes.size):
-        here = carrier(tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1)
+        here = carrier(
+            tables, out, nodes[i]["forcing"] if fluid.is_fluid_node(nodes[i]["kind"]) else -1
+        )
         if here >= 0:
             add_node_stored(y, out, tables, here, i, stored)
     at = nodes.size

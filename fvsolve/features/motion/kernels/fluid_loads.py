@@ -62,7 +62,9 @@ def set_body_motion(tables, out, i, wide, spin):
     g : acceleration of gravity; a_o : acceleration of its origin; W, W' : its angular velocity and acceleration
     wide, spin : offsets of a_o and W' in the data of the body in `out`
     """
-    here, motion, down = body_row(tables, i), tables.scratch, -tables.settings[0]["gravity"]
+    here = body_row(tables, i)
+    motion = tables.scratch
+    down = -tables.settings[0]["gravity"]
     r, (x, y, z) = here + layout.ATTITUDE, vector(out, here + wide)
     write_vector(motion, BODY_GRAVITY, *rotate_back(out, r, -x, -y, down - z))
     write_vector(motion, BODY_SPIN, *rotate_back(out, r, *vector(out, here + layout.SPIN)))
@@ -95,7 +97,9 @@ def segment_load(motion, r, t, m, d):
     s = plus(scaled(m[0], r), scaled(m[1], t))
     momentum = plus(plus(vector_product(w, s), scaled(d[0], r)), scaled(d[1], t))
     force = minus(minus(scaled(m[0], g), vector_product(e, s)), vector_product(w, momentum))
-    torque = minus(minus(vector_product(s, g), inertia_times(r, t, m, e)), inertia_times(r, t, d, w))
+    torque = minus(
+        minus(vector_product(s, g), inertia_times(r, t, m, e)), inertia_times(r, t, d, w)
+    )
     return force + minus(torque, vector_product(w, inertia_times(r, t, m, w)))
 
 
@@ -105,7 +109,9 @@ def flow_load(motion, path, change, flow, rate):
     # C and Z in axes of the world change as the body turns: C' + W x C, Z' + W x Z.
     straight = plus(change, cross(motion, BODY_SPIN, *path[:3]))
     around = plus(change[3:], cross(motion, BODY_SPIN, *path[3:]))
-    return minus(scaled(-rate, path), scaled(flow, straight)) + minus(scaled(-rate, path[3:]), scaled(flow, around))
+    return minus(scaled(-rate, path), scaled(flow, straight)) + minus(
+        scaled(-rate, path[3:]), scaled(flow, around)
+    )
 
 
 # tanks ----------
@@ -115,7 +121,11 @@ def flow_load(motion, path, change, flow, rate):
 def level_at(y, tables, i):
     """Level of the tank at node i [m]; 0 for nodes of other kinds."""
     node = tables.nodes[i]
-    return tank_level(node, tables.floats, node["density"], y[node["y"]]) if node["kind"] == TANK else 0.0
+    return (
+        tank_level(node, tables.floats, node["density"], y[node["y"]])
+        if node["kind"] == TANK
+        else 0.0
+    )
 
 
 @njit
@@ -156,8 +166,16 @@ def node_segment(y, tables, i):
     node = tables.nodes[i]
     r = vector(tables.moving_segments[node["forcing"]]["start"], 0)
     if node["kind"] == TANK:
-        return r, (0.0, 0.0, 1.0), vertical_moments(node["mass"] + y[node["y"]], level_at(y, tables, i))
-    return r, ZERO_VECTOR, (node["mass"] + y[node["y"]] if node["kind"] == CHAMBER else 0.0, 0.0, 0.0)
+        return (
+            r,
+            (0.0, 0.0, 1.0),
+            vertical_moments(node["mass"] + y[node["y"]], level_at(y, tables, i)),
+        )
+    return (
+        r,
+        ZERO_VECTOR,
+        (node["mass"] + y[node["y"]] if node["kind"] == CHAMBER else 0.0, 0.0, 0.0),
+    )
 
 
 @njit
@@ -209,11 +227,22 @@ def pipe_moments(tables, y, k, length, share):
     length : distance between the ends of the pipe [m]
     """
     pipe = tables.pipes[k]
-    n, o, per = pipe["cells"], pipe["y"], 1.0 / pipe["speed"]
-    step, m0, m1, m2, flow = length / n, 0.0, 0.0, 0.0, share * n * pipe["flow"]
+    n = pipe["cells"]
+    o = pipe["y"]
+    per = 1.0 / pipe["speed"]
+    step = length / n
+    m0 = 0.0
+    m1 = 0.0
+    m2 = 0.0
+    flow = share * n * pipe["flow"]
     for i in range(n):
-        mass, s = (share * mass_per_length(tables, pipe, i) + per * (y[o + i] + y[o + n + i])) * pipe["dx"], i + 0.5
-        m0, m1, m2 = m0 + mass, m1 + mass * s, m2 + mass * s * s
+        mass = (share * mass_per_length(tables, pipe, i) + per * (y[o + i] + y[o + n + i])) * pipe[
+            "dx"
+        ]
+        s = i + 0.5
+        m0 = m0 + mass
+        m1 = m1 + mass * s
+        m2 = m2 + mass * s * s
         flow += y[o + i] - y[o + n + i]
     # 1 / 12: the mass of a cell is spread over its length, not concentrated at its centre.
     return (m0, m1 * step, (m2 + m0 / 12.0) * step * step), flow * step
@@ -247,7 +276,10 @@ def pipe_load(y, dydt, tables, k):
     motion, (r, t, length) = tables.scratch, pipe_segment(tables, k)
     m, flow = pipe_moments(tables, y, k, length, 1.0)
     d, rate = pipe_moments(tables, dydt, k, length, 0.0)
-    load = add_six(segment_load(motion, r, t, m, d), flow_load(motion, straight_path(r, t), ZERO_FLOW_PATH, flow, rate))
+    load = add_six(
+        segment_load(motion, r, t, m, d),
+        flow_load(motion, straight_path(r, t), ZERO_FLOW_PATH, flow, rate),
+    )
     # In a tank the flow goes on from the end of the pipe to the surface.
     for right in range(2):
         i, flow = pipe_end(y, tables, k, right, 1.0)
@@ -255,7 +287,9 @@ def pipe_load(y, dydt, tables, k):
             sign = 2.0 * right - 1.0
             up = tank_path(tables, i, sign * level_at(y, tables, i))
             faster = tank_path(tables, i, sign * level_rate(dydt, tables, i))
-            load = add_six(load, flow_load(motion, up, faster, flow, pipe_end(dydt, tables, k, right, 0.0)[1]))
+            load = add_six(
+                load, flow_load(motion, up, faster, flow, pipe_end(dydt, tables, k, right, 0.0)[1])
+            )
     return load
 
 
@@ -268,13 +302,17 @@ def column_path(y, tables, column):
 
     The paths in tanks at the ends of the column are included.
     """
-    segments, first, count = tables.moving_segments, column["forcing"], column["forcings"]
+    segments = tables.moving_segments
+    first = column["forcing"]
+    count = column["forcings"]
     span = minus(vector(segments[first + count - 1]["end"], 0), vector(segments[first]["start"], 0))
     swept = ZERO_VECTOR
     for k in range(count):
         swept = plus(swept, vector(segments[first + k]["swept"], 0))
     i, j = column["from_node"], column["to_node"]
-    return add_six(span + swept, tank_paths(tables, i, j, level_at(y, tables, i), level_at(y, tables, j)))
+    return add_six(
+        span + swept, tank_paths(tables, i, j, level_at(y, tables, i), level_at(y, tables, j))
+    )
 
 
 @njit
@@ -287,13 +325,18 @@ def column_segment(tables, column, k):
     for m in range(column["forcings"]):
         total += segment_length(tables.moving_segments[column["forcing"] + m])
     segment = tables.moving_segments[column["forcing"] + k]
-    long, mass = segment_length(segment), tables.settings[0]["rho"] * column["area"] * column["length"]
+    long = segment_length(segment)
+    mass = tables.settings[0]["rho"] * column["area"] * column["length"]
     r = vector(segment["start"], 0)
     # A column whose segments all have length zero has its mass at a point.
     if not long > 0.0:
         return r, ZERO_VECTOR, (mass if total == 0.0 else 0.0, 0.0, 0.0)
     span = minus(vector(segment["end"], 0), r)
-    return r, (span[0] / long, span[1] / long, span[2] / long), vertical_moments(mass * long / total, long)
+    return (
+        r,
+        (span[0] / long, span[1] / long, span[2] / long),
+        vertical_moments(mass * long / total, long),
+    )
 
 
 @njit(forceinline=True)
@@ -361,13 +404,17 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
 
     least : least code `loads_body` that is included, see `set_carrier_motion`
     """
-    nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
+    nodes = tables.nodes
+    pipes = tables.pipes
+    columns = tables.columns
     for i in range(nodes.size):
         row = nodes[i]["forcing"] if is_fluid_node(nodes[i]["kind"]) else -1
         here = set_carrier_motion(tables, out, row, least, wide, spin)
         if here >= 0:
             r, t, m = node_segment(y, tables, i)
-            load = segment_load(tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i))
+            load = segment_load(
+                tables.scratch, r, t, m, node_segment_rates(y, dydt, out, tables, i)
+            )
             add_load(out, here, load, sign)
     for k in range(pipes.size):
         here = set_carrier_motion(tables, out, pipes[k]["forcing"], least, wide, spin)
@@ -386,7 +433,9 @@ def add_fluid_loads(t, y, dydt, out, handle):
     The loads of moving segments with `loads_body` 0 are left out.
     """
     if dydt.size > 0:
-        add_all_fluid_loads(y, dydt, out, open_motion(handle), MOVED_BY_FORCES, 1.0, layout.BIAS, layout.SPIN_BIAS)
+        add_all_fluid_loads(
+            y, dydt, out, open_motion(handle), MOVED_BY_FORCES, 1.0, layout.BIAS, layout.SPIN_BIAS
+        )
 
 
 @njit(forceinline=True)
@@ -409,7 +458,8 @@ def add_segment_inertia(out, tables, i, segment):
     for p in range(count):
         j = tables.integers[path + p]
         v, a = freedom_velocity(work, 6 * j, start), cross(work, 6 * j, *along)
-        first, second = plus(scaled(m[0], v), scaled(m[1], a)), plus(scaled(m[1], v), scaled(m[2], a))
+        first = plus(scaled(m[0], v), scaled(m[1], a))
+        second = plus(scaled(m[1], v), scaled(m[2], a))
         row = 8 * tables.freedoms.size + tables.freedoms[j]["row"]
         # M is symmetric: row j has only the degrees of freedom from the root to j.
         for q in range(p + 1):
@@ -437,11 +487,14 @@ def subtract_sliding_inertia(out, tables, i, flow_path, slides):
     slides : mass of the fluid over the square of its length [kg/m2]; if the path has unit length, this value times the
         square of the distance between the ends of the fluid [kg]
     """
-    work, n, here = tables.scratch, tables.freedoms.size, body_row(tables, i)
+    work = tables.scratch
+    n = tables.freedoms.size
+    here = body_row(tables, i)
     path, count = freedom_path(tables, nearest_free_body(tables, i))
     for p in range(count):
         j = tables.integers[path + p]
-        row, first = 8 * n + tables.freedoms[j]["row"], path_component(out, work, here, 6 * j, flow_path)
+        row = 8 * n + tables.freedoms[j]["row"]
+        first = path_component(out, work, here, 6 * j, flow_path)
         for q in range(p + 1):
             second = path_component(out, work, here, 6 * tables.integers[path + q], flow_path)
             work[row + q] -= slides * first * second
@@ -466,7 +519,9 @@ def add_pipe_inertia(y, out, tables, k):
 @njit
 def add_fluid_inertia(y, out, tables):
     """Add the fluid of nodes, pipes and rigid columns to the mass matrix M of bodies that forces can move."""
-    nodes, pipes, columns = tables.nodes, tables.pipes, tables.columns
+    nodes = tables.nodes
+    pipes = tables.pipes
+    columns = tables.columns
     if tables.moving_segments.size == 0:
         return
     for i in range(nodes.size):
@@ -496,15 +551,22 @@ def add_basin_inertia(out, tables):
     J : coefficients of 1, x, y in the normal acceleration of the bed, a column for each degree of freedom
     N : matrix of the moments of mass of 1, x, y
     """
-    work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
+    work = tables.scratch
+    freedoms = tables.freedoms
+    paths = tables.integers
+    n = tables.freedoms.size
     for b in range(tables.basins.size):
-        i, tank = nearest_free_body(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+        i = nearest_free_body(tables, tables.basins[b]["body"])
+        tank = tables.layout[0]["tank"] + TANK_OUT * b
         if i < 0:
             continue
         path, count = freedom_path(tables, i)
         for p in range(count):
             j = paths[path + p]
-            row, (a, c, d) = 8 * n + freedoms[j]["row"], normal_accelerations(out, work, tank, 6 * j)
+            row, (a, c, d) = (
+                8 * n + freedoms[j]["row"],
+                normal_accelerations(out, work, tank, 6 * j),
+            )
             # N times the column of J for j; its products with the other columns are entries of M.
             m = tank + layout.MOMENTS
             e = out[m] * a + out[m + 1] * c + out[m + 2] * d
@@ -523,4 +585,8 @@ def normal_accelerations(out, work, tank, s):
     tank : offset of the numbers of the basin in `out`
     """
     v, w = freedom_velocity(work, s, vector(out, tank + layout.BASIN_ARM)), vector(work, s)
-    return dot(out, tank + layout.NORMAL, *v), -dot(out, tank + layout.NORTH, *w), dot(out, tank + layout.EAST, *w)
+    return (
+        dot(out, tank + layout.NORMAL, *v),
+        -dot(out, tank + layout.NORTH, *w),
+        dot(out, tank + layout.EAST, *w),
+    )

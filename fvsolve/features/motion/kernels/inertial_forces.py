@@ -16,10 +16,27 @@ of flow are corrected for q''.
 
 from fvsolve.core.kernels import moving_frames as layout
 from fvsolve.core.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.core.kernels.dtypes import LAW_LINEAR, NO_WEIGHT, RATE, RATE_UNWANTED, STATUS, TANK, WHERE
+from fvsolve.core.kernels.dtypes import (
+    LAW_LINEAR,
+    NO_WEIGHT,
+    RATE,
+    RATE_UNWANTED,
+    STATUS,
+    TANK,
+    WHERE,
+)
 from fvsolve.core.kernels.moving_frames import body_row
 from fvsolve.core.kernels.tanks import tank_level
-from fvsolve.core.kernels.vectors import cross, dot, minus, plus, rotate, rotate_back, scalar_product, vector
+from fvsolve.core.kernels.vectors import (
+    cross,
+    dot,
+    minus,
+    plus,
+    rotate,
+    rotate_back,
+    scalar_product,
+    vector,
+)
 from fvsolve.features.motion.kernels import fluid_loads as fluid
 from fvsolve.features.motion.kernels.mass_matrix import add_body_force, clear_column, mobility
 from fvsolve.features.motion.kernels.tables import JOINT_LOAD_READ, open_motion
@@ -52,7 +69,9 @@ def set_segment_drives(t, y, dydt, out, handle):
     The values are for q'' = 0 (zero joint accelerations), minus those of gravity at the start.
     """
     tables = open_motion(handle)
-    segments, at, last = tables.moving_segments, tables.layout[0]["forcing"], -1
+    segments = tables.moving_segments
+    at = tables.layout[0]["forcing"]
+    last = -1
     for k in range(segments.size):
         segment = segments[k]
         # Segments of a body follow each other, so that its motion is set once for them.
@@ -100,7 +119,9 @@ def moving_tank_pressures(t, y, dydt, out, handle):
     For the density law `linear`: p' = rho (bottom pressure over density - its value under gravity at the start).
     """
     tables = open_motion(handle)
-    nodes, rho, pressure = tables.nodes, tables.settings[0]["rho"], tables.layout[0]["pressure"]
+    nodes = tables.nodes
+    rho = tables.settings[0]["rho"]
+    pressure = tables.layout[0]["pressure"]
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK and nodes[i]["forcing"] >= 0:
             level = tank_level(nodes[i], tables.floats, rho, y[nodes[i]["y"]])
@@ -116,7 +137,9 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
     `bottom_pressure_per_density`.
     """
     tables = open_motion(handle)
-    st, nodes, pressure = tables.settings[0], tables.nodes, tables.layout[0]["pressure"]
+    st = tables.settings[0]
+    nodes = tables.nodes
+    pressure = tables.layout[0]["pressure"]
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK and nodes[i]["forcing"] >= 0:
             drive, rest = tank_drives(tables, out, i, fluid.level_at(y, tables, i))
@@ -134,13 +157,19 @@ def moving_column_rates(t, y, dydt, out, handle):
     times the drive in out[forcing], plus the constant `offset` of the column.
     """
     tables = open_motion(handle)
-    columns, p, at = tables.columns, tables.layout[0]["pressure"], tables.layout[0]["forcing"]
+    columns = tables.columns
+    p = tables.layout[0]["pressure"]
+    at = tables.layout[0]["forcing"]
     for k in range(columns.size):
         column, drive = columns[k], 0.0
         # A column that is not on a body has no drive.
         for m in range(column["forcings"] if column["forcing"] >= 0 else 0):
             drive += out[at + column["forcing"] + m]
-        drop = out[p + column["from_node"]] - out[p + column["to_node"]] + tables.settings[0]["rho"] * drive
+        drop = (
+            out[p + column["from_node"]]
+            - out[p + column["to_node"]]
+            + tables.settings[0]["rho"] * drive
+        )
         dydt[column["y"]] = column["area"] / column["length"] * (drop + column["offset"])
 
 
@@ -153,10 +182,14 @@ def add_cell_drives(t, y, dydt, out, handle):
     M : mass flow, A : area, rho : density, dx : length of a cell
     """
     tables = open_motion(handle)
-    pipes, rho, at = tables.pipes, tables.settings[0]["rho"], tables.layout[0]["forcing"]
+    pipes = tables.pipes
+    rho = tables.settings[0]["rho"]
+    at = tables.layout[0]["forcing"]
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
-        n, o, first = pipe["cells"], pipe["y"], pipe["forcing"]
+        n = pipe["cells"]
+        o = pipe["y"]
+        first = pipe["forcing"]
         # Half for each wave, with opposite signs: the drive changes M = r - l and not m.
         half = 0.5 * pipe["area"] * rho / pipe["dx"]
         for k in range(n if first >= 0 else 0):
@@ -173,10 +206,14 @@ def add_cell_drives_barotropic(t, y, dydt, out, handle):
     length, dx : length of a cell
     """
     tables = open_motion(handle)
-    pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["forcing"]
+    pipes = tables.pipes
+    profile = tables.profile
+    at = tables.layout[0]["forcing"]
     for i in range(pipes.size if dydt.size > 0 else 0):
         pipe = pipes[i]
-        n, o, first = pipe["cells"], pipe["y"], pipe["forcing"]
+        n = pipe["cells"]
+        o = pipe["y"]
+        first = pipe["forcing"]
         for k in range(n if first >= 0 else 0):
             # Mass that waves add is driven too, unlike under the density law `linear`.
             m = profile[pipe["center"] + k] + (y[o + k] + y[o + n + k]) / pipe["speed"]
@@ -216,7 +253,9 @@ def accelerate_pipe_flow(y, dydt, out, tables, k):
     linear = tables.settings[0]["law"] == LAW_LINEAR
     for i in range(n):
         # Under `linear` the mass that waves add does not slide, as in `fluid_loads.add_pipe_inertia`.
-        m = fluid.mass_per_length(tables, pipe, i) + (0.0 if linear else (y[o + i] + y[o + n + i]) / pipe["speed"])
+        m = fluid.mass_per_length(tables, pipe, i) + (
+            0.0 if linear else (y[o + i] + y[o + n + i]) / pipe["speed"]
+        )
         dydt[o + i] -= m * push
         dydt[o + n + i] += m * push
 
@@ -234,16 +273,24 @@ def accelerate_network_flow(t, y, dydt, out, handle):
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
     # Before the rates of flow change, with which these loads were added.
-    fluid.add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, -1.0, layout.BIAS, layout.SPIN_BIAS)
+    fluid.add_all_fluid_loads(
+        y, dydt, out, tables, JOINT_LOAD_READ, -1.0, layout.BIAS, layout.SPIN_BIAS
+    )
     for k in range(pipes.size):
         if fluid.free_carrier(tables, pipes[k]["forcing"]) >= 0:
             accelerate_pipe_flow(y, dydt, out, tables, k)
     for k in range(columns.size):
         column, segment = columns[k], columns[k]["forcing"]
         if fluid.free_carrier(tables, segment) >= 0:
-            acceleration = path_acceleration(out, tables, segment, fluid.column_path(y, tables, column))
-            dydt[column["y"]] -= tables.settings[0]["rho"] * column["area"] / column["length"] * acceleration
-    fluid.add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, 1.0, layout.ACCELERATION, layout.SPIN_RATE)
+            acceleration = path_acceleration(
+                out, tables, segment, fluid.column_path(y, tables, column)
+            )
+            dydt[column["y"]] -= (
+                tables.settings[0]["rho"] * column["area"] / column["length"] * acceleration
+            )
+    fluid.add_all_fluid_loads(
+        y, dydt, out, tables, JOINT_LOAD_READ, 1.0, layout.ACCELERATION, layout.SPIN_RATE
+    )
 
 
 @njit
@@ -267,5 +314,7 @@ def pipe_rate_limit(t, y, dydt, out, handle):
         p = plus(rotate(out, here + layout.ATTITUDE, r, 0), vector(out, here + layout.POSITION))
         clear_column(tables, at)
         add_body_force(out, tables, i, p, rotate(out, here + layout.ATTITUDE, direction, 0), at)
-        damping += 2.0 * tables.settings[0]["rho"] * pipe["area"] * pipe["speed"] * mobility(tables, at)
+        damping += (
+            2.0 * tables.settings[0]["rho"] * pipe["area"] * pipe["speed"] * mobility(tables, at)
+        )
     out[RATE] = max(out[RATE], damping)

@@ -19,7 +19,8 @@ from fvsolve.features.motion.kernels.tables import open_motion
 from fvsolve.jit import njit
 
 CONTACT_STEPS = (
-    0.6  # times the rate of a contact: `step_control.closing_step` then takes a quarter of a radian in a step
+    # times the rate of a contact: `step_control.closing_step` then takes a quarter of a radian in a step
+    0.6
 )
 
 
@@ -55,15 +56,21 @@ def write_travels(y, out, tables):
 
     Elements between points of bodies are written by `body_kinematics`.
     """
-    braces, stops, pistons = tables.braces, tables.stops, tables.pistons
+    braces = tables.braces
+    stops = tables.stops
+    pistons = tables.pistons
     at = tables.layout[0]["travel"]
     for k in range(braces.size):
         if braces[k]["line"] < 0:
-            out[at], out[at + 1] = relative_motion(tables, y, braces[k]["from_mass"], braces[k]["to_mass"])
+            out[at], out[at + 1] = relative_motion(
+                tables, y, braces[k]["from_mass"], braces[k]["to_mass"]
+            )
         at += 2
     for k in range(stops.size):
         if stops[k]["line"] < 0:
-            out[at], out[at + 1] = relative_motion(tables, y, stops[k]["from_mass"], stops[k]["to_mass"])
+            out[at], out[at + 1] = relative_motion(
+                tables, y, stops[k]["from_mass"], stops[k]["to_mass"]
+            )
         at += 2
     for k in range(pistons.size):
         if pistons[k]["line"] < 0:
@@ -146,7 +153,9 @@ def piston_chambers(t, y, dydt, out, handle):
     state of its chambers is their mass. First, `write_travels` writes the travels of force elements between masses.
     """
     tables = open_motion(handle)
-    layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    pistons = tables.pistons
     write_travels(y, out, tables)
     for k in range(pistons.size):
         piston = pistons[k]
@@ -187,8 +196,12 @@ def forces(t, y, out, tables):
 
     Forces that have not changed since the start add exactly zero.
     """
-    layout, masses, braces = tables.layout[0], tables.masses, tables.braces
-    stops, pistons, armed = tables.stops, tables.pistons, tables.armed
+    layout = tables.layout[0]
+    masses = tables.masses
+    braces = tables.braces
+    stops = tables.stops
+    pistons = tables.pistons
+    armed = tables.armed
     for i in range(masses.size):
         out[layout["net_force"] + i] = masses[i]["force"]
     for k in range(braces.size):
@@ -210,7 +223,15 @@ def forces(t, y, out, tables):
         if armed[first + 2 * k + 1] > 0.0:
             total -= contact_force(stop["stiffness"], stop["damping"], x - stop["above"], speed)
         at = braces.size + k
-        add_push(out, tables, at, stop["from_mass"], stop["to_mass"], total - stop["force"], stop["force"])
+        add_push(
+            out,
+            tables,
+            at,
+            stop["from_mass"],
+            stop["to_mass"],
+            total - stop["force"],
+            stop["force"],
+        )
     for k in range(pistons.size):
         piston = pistons[k]
         _, speed = piston_travel(out, tables, k)
@@ -218,7 +239,15 @@ def forces(t, y, out, tables):
         change = piston["area_a"] * out[layout["pressure"] + piston["a"]]
         change -= piston["area_b"] * out[layout["pressure"] + piston["b"]]
         change -= piston["damping"] * (speed - piston["speed"])
-        add_push(out, tables, braces.size + stops.size + k, piston["case"], piston["rod"], change, piston["force"])
+        add_push(
+            out,
+            tables,
+            braces.size + stops.size + k,
+            piston["case"],
+            piston["rod"],
+            change,
+            piston["force"],
+        )
 
 
 @njit(forceinline=True)
@@ -235,7 +264,10 @@ def add_stiffness(tables, i, j, stiffness, damping):
 @njit
 def push_stiffness(out, tables, k):
     """Present (stiffness [N/m], damping [N s/m]) of element k: spring, closed stop, or piston between its chambers."""
-    braces, stops, pistons, armed = tables.braces, tables.stops, tables.pistons, tables.armed
+    braces = tables.braces
+    stops = tables.stops
+    pistons = tables.pistons
+    armed = tables.armed
     if k < braces.size:
         return braces[k]["stiffness"], braces[k]["damping"]
     k -= braces.size
@@ -244,10 +276,16 @@ def push_stiffness(out, tables, k):
         if armed[first] + armed[first + 1] > 0.0:
             return stops[k]["stiffness"], stops[k]["damping"]
         return 0.0, 0.0
-    piston, stiffness, nodes = pistons[k - stops.size], tables.layout[0]["stiffness"], tables.nodes
+    piston = pistons[k - stops.size]
+    stiffness = tables.layout[0]["stiffness"]
+    nodes = tables.nodes
     # A chamber acts as a spring: its pressure rises by the swept mass, and pushes on the area.
-    stiff_a, stiff_b = out[stiffness + nodes[piston["a"]]["row"]], out[stiffness + nodes[piston["b"]]["row"]]
-    stiff = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
+    stiff_a = out[stiffness + nodes[piston["a"]]["row"]]
+    stiff_b = out[stiffness + nodes[piston["b"]]["row"]]
+    stiff = (
+        piston["area_a"] * stiff_a * piston["sweep_a"]
+        - piston["area_b"] * stiff_b * piston["sweep_b"]
+    )
     return stiff, piston["damping"]
 
 
@@ -257,16 +295,30 @@ def mechanical_rate(out, tables):
 
     k : stiffness of all elements at the mass, with chambers, per mass [1/s2]; c : their damping per mass [1/s]
     """
-    masses, braces, stops, pistons, work = tables.masses, tables.braces, tables.stops, tables.pistons, tables.scratch
+    masses = tables.masses
+    braces = tables.braces
+    stops = tables.stops
+    pistons = tables.pistons
+    work = tables.scratch
     for i in range(2 * masses.size):
         work[i] = 0.0
     for k in range(braces.size):
-        add_stiffness(tables, braces[k]["from_mass"], braces[k]["to_mass"], *push_stiffness(out, tables, k))
+        add_stiffness(
+            tables, braces[k]["from_mass"], braces[k]["to_mass"], *push_stiffness(out, tables, k)
+        )
     for k in range(stops.size):
-        add_stiffness(tables, stops[k]["from_mass"], stops[k]["to_mass"], *push_stiffness(out, tables, braces.size + k))
+        add_stiffness(
+            tables,
+            stops[k]["from_mass"],
+            stops[k]["to_mass"],
+            *push_stiffness(out, tables, braces.size + k),
+        )
     for k in range(pistons.size):
         add_stiffness(
-            tables, pistons[k]["case"], pistons[k]["rod"], *push_stiffness(out, tables, braces.size + stops.size + k)
+            tables,
+            pistons[k]["case"],
+            pistons[k]["rod"],
+            *push_stiffness(out, tables, braces.size + stops.size + k),
         )
     rate = 0.0
     for i in range(masses.size):
@@ -285,8 +337,12 @@ def contact_rate(out, tables):
     that at rest, x_0 = x + (x'' + c x') / k, with an amplitude (x - x_0)^2 + x'^2 / k; it opens again if the amplitude
     exceeds x_0. A load at rest on a stop does not limit the step.
     """
-    masses, stops, armed = tables.masses, tables.stops, tables.armed
-    net, first, greatest = tables.layout[0]["net_force"], tables.motion_settings[0]["flag"], 0.0
+    masses = tables.masses
+    stops = tables.stops
+    armed = tables.armed
+    net = tables.layout[0]["net_force"]
+    first = tables.motion_settings[0]["flag"]
+    greatest = 0.0
     for k in range(stops.size):
         stop = stops[k]
         i, j = stop["from_mass"], stop["to_mass"]
@@ -317,12 +373,15 @@ def mass_rates(t, y, dydt, out, handle):
     STATUS is NO_VOLUME if a piston has used up its chamber.
     """
     tables = open_motion(handle)
-    layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    masses = tables.masses
     forces(t, y, out, tables)
     if out[rec.RATE] != rec.RATE_UNWANTED:
         out[rec.RATE] = max(out[rec.RATE], mechanical_rate(out, tables))
         if tables.stops.size > 0:
-            closing = out[rec.CLOSING] if tables.columns.size > 0 else 0.0  # columns have cleared it in this call
+            # columns have cleared it in this call
+            closing = out[rec.CLOSING] if tables.columns.size > 0 else 0.0
             out[rec.CLOSING] = max(closing, contact_rate(out, tables))
     for k in range(tables.pistons.size):
         for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
@@ -342,7 +401,10 @@ def mass_rates(t, y, dydt, out, handle):
 def observe_masses(t, y, out, handle, values):
     """Write the values of the probes of masses, force elements and pistons to `values`."""
     tables = open_motion(handle)
-    layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
+    layout = tables.layout[0]
+    masses = tables.masses
+    pistons = tables.pistons
+    probes = tables.probes
     for k in range(probes.size):
         kind, i = probes[k]["kind"], probes[k]["index"]
         if kind == rec.POSITION:

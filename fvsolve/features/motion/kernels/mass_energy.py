@@ -41,7 +41,10 @@ def power_masses(t, y, dydt, out, tables, power, at):
 
     Returns the index after them.
     """
-    layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
+    layout = tables.layout[0]
+    masses = tables.masses
+    braces = tables.braces
+    stops = tables.stops
     armed = tables.armed
     for i in range(masses.size):
         power[at] = 0.0
@@ -77,7 +80,9 @@ def power_masses(t, y, dydt, out, tables, power, at):
 @njit
 def stored_masses(y, out, tables, stored, at):
     """Write the energy changes since the start [J] of masses, springs, dampers, forces and stops from stored[at] on."""
-    masses, braces, stops = tables.masses, tables.braces, tables.stops
+    masses = tables.masses
+    braces = tables.braces
+    stops = tables.stops
     for i in range(masses.size):
         stored[at] = 0.0
         if masses[i]["y"] >= 0:
@@ -121,7 +126,10 @@ def power_pistons(y, dydt, out, tables, power, at):
     Also write the rate of energy stored in the chambers to the entries of their nodes: that of V p^2 / (2 beta), with
     volume V, gauge pressure p and bulk modulus beta, and of the potential energy of the mass.
     """
-    st, layout, nodes, pistons = tables.settings[0], tables.layout[0], tables.nodes, tables.pistons
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    nodes = tables.nodes
+    pistons = tables.pistons
     per = 1.0 / st["rho"]
     for k in range(pistons.size):
         piston = pistons[k]
@@ -139,10 +147,16 @@ def power_pistons(y, dydt, out, tables, power, at):
                 excess -= sweep * speed
             # Part of d/dt (V p^2 / (2 beta)) due to the change of volume at constant excess.
             own = p * swept * (0.5 * p / st["beta"] - change / st["beta"])
-            power[NODE * i + 1] = per * (p * excess + height_pressure(st, nodes[i]) * (excess + sweep * speed)) + own
+            power[NODE * i + 1] = (
+                per * (p * excess + height_pressure(st, nodes[i]) * (excess + sweep * speed)) + own
+            )
             # Power that the swept flow carries minus work of the piston: unequal at constant density.
             law += (per * p * sweep * speed - p * swept) - own
-        power[at] = drop * piston["leakage"] * (gauge_pressure(tables, out, a) - gauge_pressure(tables, out, b))
+        power[at] = (
+            drop
+            * piston["leakage"]
+            * (gauge_pressure(tables, out, a) - gauge_pressure(tables, out, b))
+        )
         power[at + 1], power[at + 2] = piston["damping"] * speed * speed, law
         at += PISTON
 
@@ -164,8 +178,11 @@ def power_pistons_barotropic(y, dydt, out, tables, power, at):
             i, area, sweep = piston_side(tables, piston, side)
             # The excess does not contain the mass that the piston sweeps.
             gained = dydt[nodes[i]["y"]] + (sweep * speed if piston["line"] < 0 else 0.0)
-            power[NODE * i + 1] = total_head(tables, out, i) * gained - gauge_pressure(tables, out, i) * area * speed
-        p_a, p_b = nodes[a]["pressure"] + out[pressure + a], nodes[b]["pressure"] + out[pressure + b]
+            power[NODE * i + 1] = (
+                total_head(tables, out, i) * gained - gauge_pressure(tables, out, i) * area * speed
+            )
+        p_a = nodes[a]["pressure"] + out[pressure + a]
+        p_b = nodes[b]["pressure"] + out[pressure + b]
         leak = leak_flow(tables, piston, p_a, p_b)
         power[at] = (total_head(tables, out, a) - total_head(tables, out, b)) * leak
         power[at + 1], power[at + 2] = piston["damping"] * speed * speed, 0.0
@@ -181,7 +198,9 @@ def moving_chamber_energy(out, tables, i, growth, gained):
     st, node = tables.settings[0], tables.nodes[i]
     change, p0 = out[tables.layout[0]["pressure"] + i], node["pressure"] - st["ambient"]
     # V p^2 - V_0 p_0^2, expanded in the changes of pressure and volume.
-    squeezed = node["volume"] * change * (2.0 * p0 + change) + growth * (p0 + change) * (p0 + change)
+    squeezed = node["volume"] * change * (2.0 * p0 + change) + growth * (p0 + change) * (
+        p0 + change
+    )
     height = 1.0 / st["rho"] * height_pressure(st, node) * gained
     return 0.5 * squeezed / st["beta"] + height
 
@@ -189,7 +208,10 @@ def moving_chamber_energy(out, tables, i, growth, gained):
 @njit
 def moving_chamber_energy_barotropic(out, tables, i, growth, gained):
     """Result of `moving_chamber_energy` under the density laws `log` and `table` [J]."""
-    st, floats, node, p0 = tables.settings[0], tables.floats, tables.nodes[i], tables.nodes[i]["pressure"]
+    st = tables.settings[0]
+    floats = tables.floats
+    node = tables.nodes[i]
+    p0 = tables.nodes[i]["pressure"]
     mass, volume = node["mass"] + gained, node["volume"] + growth
     now = vessel_energy(st, floats, node, mass, volume, p0 + out[tables.layout[0]["pressure"] + i])
     return now - vessel_energy(st, floats, node, node["mass"], node["volume"], p0)
@@ -215,11 +237,16 @@ def _add_stored(t, y, dydt, out, handle, stored):
             i, area, sweep = piston_side(tables, piston, side)
             gained = excess_of(y, tables, piston, i, sweep, x) + sweep * x
             stored[i] = MOVING_CHAMBER_ENERGY(out, tables, i, area * x, gained)
-    stored_masses(y, out, tables, stored, tables.nodes.size + 2 * tables.pipes.size + tables.columns.size)
+    stored_masses(
+        y, out, tables, stored, tables.nodes.size + 2 * tables.pipes.size + tables.columns.size
+    )
 
 
 LINEAR = {"PISTON_POWER": power_pistons, "MOVING_CHAMBER_ENERGY": moving_chamber_energy}
-OTHERS = {"PISTON_POWER": power_pistons_barotropic, "MOVING_CHAMBER_ENERGY": moving_chamber_energy_barotropic}
+OTHERS = {
+    "PISTON_POWER": power_pistons_barotropic,
+    "MOVING_CHAMBER_ENERGY": moving_chamber_energy_barotropic,
+}
 add_power_linear = specialise(_add_power, "add_power_linear", **LINEAR)
 add_power_barotropic = specialise(_add_power, "add_power_barotropic", **OTHERS)
 add_stored_linear = specialise(_add_stored, "add_stored_linear", **LINEAR)

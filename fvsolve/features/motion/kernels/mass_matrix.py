@@ -52,7 +52,9 @@ def joint_columns(body, own, s):
 
     They are the columns S of the joint, six numbers each; o : reference point, see `body_layout`
     """
-    kind, arm, first = body["joint"], vector(own, layout.ARM), 0
+    kind = body["joint"]
+    arm = vector(own, layout.ARM)
+    first = 0
     if kind == FREE:
         for k in range(18):
             s[k] = 0.0
@@ -84,10 +86,14 @@ def inertia_about_o(body, own, result):
 
     The numbers are mass, mass times centre (3), and moments of inertia xx yy zz xy xz yz.
     """
-    m, inertia, r = body["mass"], body["inertia"], layout.ATTITUDE
+    m = body["mass"]
+    inertia = body["inertia"]
+    r = layout.ATTITUDE
     # Centre of mass from o: from the origin of the body, plus the arm from o to the origin.
     gx, gy, gz = rotate(own, r, body["centre"], 0)
-    gx, gy, gz = gx + own[layout.ARM], gy + own[layout.ARM + 1], gz + own[layout.ARM + 2]
+    gx = gx + own[layout.ARM]
+    gy = gy + own[layout.ARM + 1]
+    gz = gz + own[layout.ARM + 2]
     result[0] = m
     write_vector(result, 1, m * gx, m * gy, m * gz)
     # Rows of R J; their products with R' follow in the moments below.
@@ -106,7 +112,9 @@ def inertia_about_o(body, own, result):
 @njit(forceinline=True)
 def inertia_row(own, r, inertia):
     """Row of the rotation matrix R, at own[r], times the inertia matrix of a body in its own axes."""
-    x, y, z = own[r], own[r + 1], own[r + 2]
+    x = own[r]
+    y = own[r + 1]
+    z = own[r + 2]
     return (
         x * inertia[0] + y * inertia[3] + z * inertia[6],
         x * inertia[1] + y * inertia[4] + z * inertia[7],
@@ -121,7 +129,12 @@ def spatial_momentum(inertia, w, v):
     inertia : ten numbers, see `inertia_about_o`. For accelerations in place of w and v, the result is torque and force.
     """
     m, h = inertia[0], vector(inertia, 1)
-    xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
+    xx = inertia[4]
+    yy = inertia[5]
+    zz = inertia[6]
+    xy = inertia[7]
+    xz = inertia[8]
+    yz = inertia[9]
     angular = (
         xx * w[0] + xy * w[1] + xz * w[2] + h[1] * v[2] - h[2] * v[1],
         xy * w[0] + yy * w[1] + yz * w[2] + h[2] * v[0] - h[0] * v[2],
@@ -143,12 +156,20 @@ def bias_load(own, inertia, load):
     q'' = 0; x* : spatial cross product of motion and force (Featherstone 2008); o : reference point, see `body_layout`
     """
     # I V, then I A; V x* I V adds w x L + v x p to the torque and w x p to the force.
-    angular, linear = spatial_momentum(inertia, vector(own, layout.SPIN), vector(own, layout.VELOCITY_AT_O))
-    torque, force = spatial_momentum(inertia, vector(own, layout.SPIN_BIAS), vector(own, layout.BIAS_AT_O))
-    torque = plus(plus(torque, cross(own, layout.SPIN, *angular)), cross(own, layout.VELOCITY_AT_O, *linear))
+    angular, linear = spatial_momentum(
+        inertia, vector(own, layout.SPIN), vector(own, layout.VELOCITY_AT_O)
+    )
+    torque, force = spatial_momentum(
+        inertia, vector(own, layout.SPIN_BIAS), vector(own, layout.BIAS_AT_O)
+    )
+    torque = plus(
+        plus(torque, cross(own, layout.SPIN, *angular)), cross(own, layout.VELOCITY_AT_O, *linear)
+    )
     applied = vector(own, layout.FORCE)
     # The applied loads are about the origin of the body and are moved to o.
-    write_vector(load, 0, *minus(minus(torque, vector(own, layout.TORQUE)), cross(own, layout.ARM, *applied)))
+    write_vector(
+        load, 0, *minus(minus(torque, vector(own, layout.TORQUE)), cross(own, layout.ARM, *applied))
+    )
     write_vector(load, 3, *minus(plus(force, cross(own, layout.SPIN, *linear)), applied))
 
 
@@ -159,12 +180,17 @@ def fill_mass_matrix(y, out, tables):
     The forces contain the loads of all bodies, bias, and springs and dampers of joints. Forces at the start that are
     only rounding of its equilibrium are subtracted. M contains the fluid in basins and networks on bodies.
     """
-    bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
+    bodies = tables.bodies
+    freedoms = tables.freedoms
+    work = tables.scratch
+    paths = tables.integers
     n = freedoms.size
     first, loads = scratch_offsets(tables)
     for i in range(bodies.size):  # views of rows: constant indices then compile to fast code
         here, at = body_row(tables, i), first + INERTIA_SIZE * i
-        own, inertia, load = out[here : here + BODY_OUT], work[at : at + INERTIA_SIZE], work[loads + LOAD_SIZE * i :]
+        own = out[here : here + BODY_OUT]
+        inertia = work[at : at + INERTIA_SIZE]
+        load = work[loads + LOAD_SIZE * i :]
         if bodies[i]["freedoms"] > 0:
             joint_columns(bodies[i], own, work[6 * bodies[i]["freedom"] :])
         inertia_about_o(bodies[i], own, inertia)
@@ -174,7 +200,9 @@ def fill_mass_matrix(y, out, tables):
         body, at = bodies[i], first + INERTIA_SIZE * i
         inertia, load = work[at : at + INERTIA_SIZE], work[loads + LOAD_SIZE * i :]
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
-            s, path, depth = work[6 * j :], paths[freedoms[j]["path"] :], freedoms[j]["depth"]
+            s = work[6 * j :]
+            path = paths[freedoms[j]["path"] :]
+            depth = freedoms[j]["depth"]
             row = work[8 * n + freedoms[j]["row"] :]
             # Generalised force: minus the load of all carried bodies along the column S.
             force = -dot(s, 0, *vector(load, 0)) - dot(s, 3, *vector(load, 3))
@@ -191,7 +219,8 @@ def fill_mass_matrix(y, out, tables):
                 c = work[6 * path[k] :]
                 row[k] = dot(c, 0, *torque) + dot(c, 3, *push)
         if body["parent"] >= 0:
-            over, up = work[first + INERTIA_SIZE * body["parent"] :], work[loads + LOAD_SIZE * body["parent"] :]
+            over = work[first + INERTIA_SIZE * body["parent"] :]
+            up = work[loads + LOAD_SIZE * body["parent"] :]
             for k in range(INERTIA_SIZE):
                 over[k] += inertia[k]
             for k in range(LOAD_SIZE):
@@ -207,9 +236,14 @@ def factor_mass_matrix(tables):
 
     The diagonal contains the reciprocals of the diagonal of L, because later solutions divide by it.
     """
-    freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
+    freedoms = tables.freedoms
+    work = tables.scratch
+    paths = tables.integers
+    n = tables.freedoms.size
     for j in range(n - 1, -1, -1):
-        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        row = work[8 * n + freedoms[j]["row"] :]
+        depth = freedoms[j]["depth"]
+        path = paths[freedoms[j]["path"] :]
         per = 1.0 / sqrt(row[depth])
         row[depth] = per
         for k in range(depth):
@@ -224,10 +258,15 @@ def factor_mass_matrix(tables):
 @njit
 def solve_factor(tables, at):
     """Solve L' z = b in place, b at scratch[at], with the factored mass matrix M = L'L; |z|^2 = b' M^-1 b."""
-    freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
+    freedoms = tables.freedoms
+    work = tables.scratch
+    paths = tables.integers
+    n = tables.freedoms.size
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
-        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        row = work[8 * n + freedoms[j]["row"] :]
+        depth = freedoms[j]["depth"]
+        path = paths[freedoms[j]["path"] :]
         z = b[j] * row[depth]
         b[j] = z
         for k in range(depth):
@@ -237,12 +276,17 @@ def solve_factor(tables, at):
 @njit
 def solve_mass_matrix(tables, at):
     """Solve M x = b in place, b at scratch[at], with the mass matrix M factored."""
-    freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
+    freedoms = tables.freedoms
+    work = tables.scratch
+    paths = tables.integers
+    n = tables.freedoms.size
     solve_factor(tables, at)
     b = work[at : at + n]
     # Second half, L x = z, from the root to the leaves.
     for j in range(n):
-        row, depth, path = work[8 * n + freedoms[j]["row"] :], freedoms[j]["depth"], paths[freedoms[j]["path"] :]
+        row = work[8 * n + freedoms[j]["row"] :]
+        depth = freedoms[j]["depth"]
+        path = paths[freedoms[j]["path"] :]
         x = b[j]
         for k in range(depth):
             x -= row[k] * b[path[k]]
@@ -255,10 +299,14 @@ def spread_accelerations(out, tables):
 
     Those are in `scratch` after the columns S; the torques and forces of bodies in `scratch` are overwritten.
     """
-    bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
+    bodies = tables.bodies
+    work = tables.scratch
+    n = tables.freedoms.size
     loads = scratch_offsets(tables)[1]
     for i in range(bodies.size):
-        body, at, acceleration = bodies[i], body_row(tables, i), work[loads + LOAD_SIZE * i :]
+        body = bodies[i]
+        at = body_row(tables, i)
+        acceleration = work[loads + LOAD_SIZE * i :]
         own = out[at : at + BODY_OUT]
         # A body has the acceleration of its parent and the columns of its own joint times their rates.
         if body["parent"] >= 0:
@@ -296,8 +344,13 @@ def coordinate_rates(body, y, dydt):
     x, y0, z = kinematics.joint_velocities(body, first, y)
     # e' = E(e) w / 2, with the Euler parameters e and the angular velocity w.
     dydt[at + first] = -0.5 * (a * x + b * y0 + c * z)
-    write_vector(dydt, at + first + 1, 0.5 * (h * x + b * z - c * y0), 0.5 * (h * y0 + c * x - a * z),
-        0.5 * (h * z + a * y0 - b * x))  # fmt: skip
+    write_vector(
+        dydt,
+        at + first + 1,
+        0.5 * (h * x + b * z - c * y0),
+        0.5 * (h * y0 + c * x - a * z),
+        0.5 * (h * z + a * y0 - b * x),
+    )
 
 
 @njit
@@ -310,7 +363,9 @@ def add_point_force(out, tables, point, acts, f, at):
     if acts == ABOUT:
         add_body_wrench(tables, i, f, (0.0, 0.0, 0.0), at)
     else:
-        add_body_force(out, tables, i, kinematics.point_at(out, tables, point, layout.POSITION)[:3], f, at)
+        add_body_force(
+            out, tables, i, kinematics.point_at(out, tables, point, layout.POSITION)[:3], f, at
+        )
 
 
 @njit
@@ -333,7 +388,9 @@ def add_pair_force(out, tables, link, p, f, at):
     link : row of a bushing or pin; the forces are added to the vector at scratch[at]
     """
     add_body_force(out, tables, kinematics.body_of_point(tables, link["to_point"]), p, f, at)
-    add_body_force(out, tables, kinematics.body_of_point(tables, link["from_point"]), p, scaled(-1.0, f), at)
+    add_body_force(
+        out, tables, kinematics.body_of_point(tables, link["from_point"]), p, scaled(-1.0, f), at
+    )
 
 
 @njit
@@ -391,8 +448,13 @@ def body_rate_limit(out, tables):
     """
     if out[RATE] == RATE_UNWANTED:
         return RATE_UNWANTED
-    bodies, work, lines = tables.bodies, tables.scratch, tables.lines
-    stiffness, damping, turns, at = 0.0, 0.0, 0.0, 7 * tables.freedoms.size
+    bodies = tables.bodies
+    work = tables.scratch
+    lines = tables.lines
+    stiffness = 0.0
+    damping = 0.0
+    turns = 0.0
+    at = 7 * tables.freedoms.size
     for i in range(bodies.size):
         own = out[body_row(tables, i) :]
         turns = max(turns, dot(own, layout.SPIN, *vector(own, layout.SPIN)))
@@ -430,7 +492,9 @@ def start_mass_matrix(t, y, dydt, out, handle):
 @njit
 def state_rates(y, dydt, tables):
     """Write the rates of all states of joints to `dydt`, with accelerations from `scratch`, unless it is empty."""
-    bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
+    bodies = tables.bodies
+    work = tables.scratch
+    n = tables.freedoms.size
     if dydt.size == 0:
         return
     for i in range(bodies.size):

@@ -50,7 +50,8 @@ LINE = record(  # line of action of a force element on points of bodies
     push=i8,
     from_point=i8,  # -1 for none
     to_point=i8,
-    acts=i8,  # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
+    # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
+    acts=i8,
     direction="(3,)f8",
     length=f8,  # length at the start [m]
 )
@@ -73,11 +74,13 @@ BUSHING = record(
     damping=f8,
     turn_stiffness=f8,
     turn_damping=f8,
-    attitude="(9,)f8",  # rotation matrix of the body of `to` in the axes of that of `from` at the start
+    # rotation matrix of the body of `to` in the axes of that of `from` at the start
+    attitude="(9,)f8",
     energy=f8,  # energy stored at the start [J]
 )
 
-MOVING_SEGMENT = record(  # moving stretch of a pipe or column, or content of a node, on a body and in its axes
+# moving stretch of a pipe or column, or content of a node, on a body and in its axes
+MOVING_SEGMENT = record(
     body=i8,
     start="(3,)f8",  # its start [m]; position of a node
     end="(3,)f8",  # its end [m]; the level of a tank rises along z
@@ -94,7 +97,8 @@ MASS = record(
     force=f8,  # sum of all forces at the start, rounding set to zero [N]
 )
 
-BRACE = record(  # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
+# spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
+BRACE = record(
     from_mass=i8,
     to_mass=i8,
     schedule=i8,  # -1 for none
@@ -140,7 +144,8 @@ MOTION_SETTINGS = record(
     mark=i8,  # offset in `marks` of those of pistons
     flag=i8,  # offset in `armed` of the flags of stops
 )
-MOVED_BY_FORCES, JOINT_LOAD_READ = 1, 2  # load of a stretch: forces move its body; or the joint load is an output
+# load of a stretch: forces move its body; or the joint load is an output
+MOVED_BY_FORCES, JOINT_LOAD_READ = 1, 2
 
 RECORDS = {
     "bodies": BODY,

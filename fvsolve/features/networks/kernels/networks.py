@@ -28,8 +28,13 @@ CLOSED = 0.5  # value of `closed` above which a switch is closed
 @njit(forceinline=True)
 def row_change(y, out, tables, r):
     """Change of row r since the start."""
-    places, factors, inputs = tables.network_places, tables.network_factors, tables.network_settings[0]["inputs"]
-    first, middle, last, rows = places[3 * r], places[3 * r + 1], places[3 * r + 2], places[0] // 3
+    places = tables.network_places
+    factors = tables.network_factors
+    inputs = tables.network_settings[0]["inputs"]
+    first = places[3 * r]
+    middle = places[3 * r + 1]
+    last = places[3 * r + 2]
+    rows = places[0] // 3
     # Entries follow three offsets for each row in `places`, and one value for each row in `factors`.
     change, shift = 0.0, rows - places[0]
     for k in range(first, middle):
@@ -49,7 +54,10 @@ def row_value(y, out, tables, r):
 def known_potential(t, y, tables, r):
     """Value of row r that depends on stores and schedules alone, before sources are written to `out`."""
     places, factors = tables.network_places, tables.network_factors
-    first, middle, last, shift = places[3 * r], places[3 * r + 1], places[3 * r + 2], places[0] // 3 - places[0]
+    first = places[3 * r]
+    middle = places[3 * r + 1]
+    last = places[3 * r + 2]
+    shift = places[0] // 3 - places[0]
     value = factors[r]
     for k in range(first, middle):
         value += factors[k + shift] * y[places[k]]
@@ -114,7 +122,9 @@ def write_sources(t, y, out, core, tables):
             value = schedule_value(tables, i, t)
         elif kind == codes.DEVICE_INPUT:
             device = core.devices[i]
-            value = calls.call_value(core.hooks[device["hooks"], VALUE], t, y, out, core, device, source["side"])
+            value = calls.call_value(
+                core.hooks[device["hooks"], VALUE], t, y, out, core, device, source["side"]
+            )
         elif kind == codes.FORCE_INPUT:
             value = out[tables.layout[0]["net_force"] + i]
         elif kind == codes.FLUID_HEAT:

@@ -45,10 +45,17 @@ NETWORK_SETTINGS = record(inputs=i8)  # offset in `out` of the sources: change s
 NetworkTables = namedtuple(
     "NetworkTables",
     (
-        "network_inputs", "network_rates", "network_elements", "network_switches", "network_settings", "turned",
-        "turned_devices", "network_places", "network_factors",
+        "network_inputs",
+        "network_rates",
+        "network_elements",
+        "network_switches",
+        "network_settings",
+        "turned",
+        "turned_devices",
+        "network_places",
+        "network_factors",
     ),
-)  # fmt: skip
+)
 
 
 @functools.cache

@@ -8,7 +8,12 @@ its device dissipates beside. Friction heats the cells of its pipe. The rows `he
 from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.devices import HEAT, POWER
 from fvsolve.core.kernels.network_energy import total_head, total_pressure
-from fvsolve.core.kernels.pipe_energy import GAUSS_WEIGHTS, at_point, mass_at_point, polynomial_width
+from fvsolve.core.kernels.pipe_energy import (
+    GAUSS_WEIGHTS,
+    at_point,
+    mass_at_point,
+    polynomial_width,
+)
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.viscosity import cell_reynolds
@@ -21,8 +26,11 @@ POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates
 def _heat_of_restrictions(t, y, dydt, out, handle):
     """Write the heat of restrictions over the specific heat [kg K/s] to `out`."""
     tables = open_tables(handle)
-    st, layout, sources = tables.settings[0], tables.layout[0], tables.heat_sources
-    specific_heat, per = tables.scalars[heated_scalar(tables)]["specific_heat"], 1.0 if BAROTROPIC else 1.0 / st["rho"]
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    sources = tables.heat_sources
+    specific_heat = tables.scalars[heated_scalar(tables)]["specific_heat"]
+    per = 1.0 if BAROTROPIC else 1.0 / st["rho"]
     for j in range(sources.size):
         k = sources[j]["valve"]
         drop = POTENTIAL(tables, out, tables.valves[k]["from_node"])
@@ -46,23 +54,35 @@ def _heat_of_pipes(t, y, dydt, out, handle):
     its relaxation variables dissipate.
     """
     tables = open_tables(handle)
-    st, layout, scalar = tables.settings[0], tables.layout[0], tables.scalars[heated_scalar(tables)]
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    scalar = tables.scalars[heated_scalar(tables)]
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         pipe = tables.pipes[p]
         if pipe["heat"] < 0:
             continue
-        n, o, at, row = pipe["cells"], pipe["y"], scalar["y"] + pipe["cell"], layout["heat"] + pipe["heat"]
-        r, l, width, total = y[o : o + n], y[o + n : o + 2 * n], polynomial_width(st, n), 0.0
+        n = pipe["cells"]
+        o = pipe["y"]
+        at = scalar["y"] + pipe["cell"]
+        row = layout["heat"] + pipe["heat"]
+        r = y[o : o + n]
+        l = y[o + n : o + 2 * n]
+        width = polynomial_width(st, n)
+        total = 0.0
         full = st["rho"] * pipe["area"]
         for i in range(n):
             power, reynolds = 0.0, cell_reynolds(y, tables, p, i)
             for g in range(3):
                 a, b = at_point(r, width, i, g), at_point(l, width, i, g)
                 flow = pipe["flow"] + (a - b)
-                force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow)
+                force = drag(
+                    pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], reynolds, flow
+                )
                 if BAROTROPIC:
                     # Velocity and wall force per length both go with 1 / m.
-                    ratio = full / mass_at_point(st, tables.profile, pipe, i, g, (a + b) / pipe["speed"])
+                    ratio = full / mass_at_point(
+                        st, tables.profile, pipe, i, g, (a + b) / pipe["speed"]
+                    )
                     power += GAUSS_WEIGHTS[g] * flow * force * ratio * ratio
                 else:
                     power += GAUSS_WEIGHTS[g] * flow * force
@@ -89,7 +109,9 @@ def _heat_for_events(t, y, out, handle, g):
 LINEAR = {"POTENTIAL": total_pressure, "BAROTROPIC": False}
 OTHERS = {"POTENTIAL": total_head, "BAROTROPIC": True}
 heat_of_restrictions = specialise(_heat_of_restrictions, "heat_of_restrictions", **LINEAR)
-heat_of_restrictions_barotropic = specialise(_heat_of_restrictions, "heat_of_restrictions_barotropic", **OTHERS)
+heat_of_restrictions_barotropic = specialise(
+    _heat_of_restrictions, "heat_of_restrictions_barotropic", **OTHERS
+)
 heat_of_pipes = specialise(_heat_of_pipes, "heat_of_pipes", **LINEAR)
 heat_of_pipes_barotropic = specialise(_heat_of_pipes, "heat_of_pipes_barotropic", **OTHERS)
 heat_for_events = specialise(_heat_for_events, "heat_for_events", RESTRICTIONS=heat_of_restrictions)

@@ -21,7 +21,7 @@ from fvsolve.core.kernels.dtypes import (
     RATE_UNWANTED,
     REACTION_VALUE,
     REVERSE_ORDER,
-)  # fmt: skip
+)
 from fvsolve.core.kernels.formula_programs import run_program
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.scalars.kernels.scalar_transport import (
@@ -51,7 +51,9 @@ def read_amounts(tables, y, first, stride, mass, p):
     p : number of the pipe at whose wall the place is, pipes.size elsewhere
     """
     for q in range(tables.scalars.size):
-        tables.stack[q] = y[first + q * stride] / (mass + wall_mass(tables, q, p)) * tables.scalars[q]["molar"]
+        tables.stack[q] = (
+            y[first + q * stride] / (mass + wall_mass(tables, q, p)) * tables.scalars[q]["molar"]
+        )
 
 
 @njit(forceinline=True)
@@ -70,7 +72,9 @@ def rates_both_ways(tables, k):
     reaction, floats = tables.reactions[k], tables.floats
     if reaction["program"] >= 0:
         none, count = tables.armed[:0], tables.scalars.size
-        return run_program(tables.pieces, reaction["program"], 0.0, inf, count, tables.stack, none, none), 0.0
+        return run_program(
+            tables.pieces, reaction["program"], 0.0, inf, count, tables.stack, none, none
+        ), 0.0
     ahead, back = reaction["forward"], reaction["reverse"]
     for e in range(reaction["count"]):
         c, at = tables.stack[tables.integers[reaction["scalars"] + e]], reaction["data"] + 3 * e
@@ -85,7 +89,9 @@ def move_along(tables, k, extent):
     reaction = tables.reactions[k]
     for e in range(reaction["count"]):
         q = tables.integers[reaction["scalars"] + e]
-        tables.stack[q] += extent * tables.floats[reaction["data"] + 3 * e + CHANGE] * tables.scalars[q]["molar"]
+        tables.stack[q] += (
+            extent * tables.floats[reaction["data"] + 3 * e + CHANGE] * tables.scalars[q]["molar"]
+        )
 
 
 @njit
@@ -152,7 +158,9 @@ def stored_mass(y, node):
 def limit_rates(t, y, dydt, out, handle):
     """Write the greatest rate of change by reactions in pipes and nodes to `out`, if it limits steps [1/s]."""
     tables = open_tables(handle)
-    at, scalar, stride = tables.layout[0]["quickest"], tables.scalars[0], scalar_stride(tables)
+    at = tables.layout[0]["quickest"]
+    scalar = tables.scalars[0]
+    stride = scalar_stride(tables)
     if out[RATE] == RATE_UNWANTED:
         return
     out[at] = 0.0
@@ -166,7 +174,9 @@ def limit_rates(t, y, dydt, out, handle):
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
-            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size)
+            read_amounts(
+                tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size
+            )
             out[at] = max(out[at], greatest_rate(tables))
 
 
@@ -174,7 +184,9 @@ def limit_rates(t, y, dydt, out, handle):
 def reaction_rates(t, y, dydt, out, handle):
     """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the ledger."""
     tables = open_tables(handle)
-    layout, scalar, stride = tables.layout[0], tables.scalars[0], scalar_stride(tables)
+    layout = tables.layout[0]
+    scalar = tables.scalars[0]
+    stride = scalar_stride(tables)
     # A single sum is added up place by place, so it starts from zero in each evaluation.
     for k in range(tables.reactions.size):
         for m in range(tables.reactions[k]["extents"]):
@@ -183,12 +195,26 @@ def reaction_rates(t, y, dydt, out, handle):
         pipe = tables.pipes[p]
         for i in range(pipe["cells"]):
             mass, entry = cell_mass(y, tables, p, i), pipe["cell"] + i
-            react(y, dydt, out, tables, scalar["y"] + entry, stride, mass, p, mass, pipe["dx"], entry)
+            react(
+                y, dydt, out, tables, scalar["y"] + entry, stride, mass, p, mass, pipe["dx"], entry
+            )
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
             first = tables.integers[scalar["places"] + i]
-            react(y, dydt, out, tables, first, stride, mass, tables.pipes.size, mass, 1.0, first - scalar["y"])
+            react(
+                y,
+                dydt,
+                out,
+                tables,
+                first,
+                stride,
+                mass,
+                tables.pipes.size,
+                mass,
+                1.0,
+                first - scalar["y"],
+            )
 
 
 @njit(forceinline=True)
@@ -217,7 +243,9 @@ def add_observed(tables, k, volume, sums):
 @njit
 def sums_of_network(y, tables, k, sums):
     """Write the sums of `add_observed` over all pipe cells, tanks and chambers."""
-    rho, stride, scalar = tables.settings[0]["rho"], scalar_stride(tables), tables.scalars[0]
+    rho = tables.settings[0]["rho"]
+    stride = scalar_stride(tables)
+    scalar = tables.scalars[0]
     for e in range(4):
         sums[e] = 0.0
     for p in range(tables.pipes.size):
@@ -229,7 +257,9 @@ def sums_of_network(y, tables, k, sums):
     for i in range(tables.nodes.size):
         mass = stored_mass(y, tables.nodes[i])
         if mass > 0.0:
-            read_amounts(tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size)
+            read_amounts(
+                tables, y, tables.integers[scalar["places"] + i], stride, mass, tables.pipes.size
+            )
             add_observed(tables, k, mass / rho, sums)
 
 

@@ -96,7 +96,9 @@ def outlet_values(y, out, tables, q):
 
     It follows from a limited slope, within the bounds of the scalar.
     """
-    st, scalar, at = tables.settings[0], tables.scalars[q], tables.layout[0]["edge"]
+    st = tables.settings[0]
+    scalar = tables.scalars[q]
+    at = tables.layout[0]["edge"]
     pipes, limiter = tables.pipes, st["limiter"]
     for p in range(pipes.size):
         for right in range(2):
@@ -122,7 +124,12 @@ def end_conductance(y, tables, q, p, right):
     scalar, pipe = tables.scalars[q], tables.pipes[p]
     if scalar["diffusivity"] == 0.0:
         return 0.0
-    return 2.0 * scalar["diffusivity"] * cell_mass(y, tables, p, end_cell(tables, p, right, 0)) / pipe["dx"]
+    return (
+        2.0
+        * scalar["diffusivity"]
+        * cell_mass(y, tables, p, end_cell(tables, p, right, 0))
+        / pipe["dx"]
+    )
 
 
 @njit
@@ -156,7 +163,11 @@ def given_value(t, tables, q, i):
     """Value of scalar q in the inflow from outside at node i."""
     scalar, kind = tables.scalars[q], tables.nodes[i]["kind"]
     place = tables.integers[scalar["places"] + i]
-    return schedule_value(tables, place, t) if place >= 0 and not has_storage(kind) else scalar["initial"]
+    return (
+        schedule_value(tables, place, t)
+        if place >= 0 and not has_storage(kind)
+        else scalar["initial"]
+    )
 
 
 @njit(forceinline=True)
@@ -203,7 +214,9 @@ def heated_node(out, tables, j):
 @njit
 def mass_inflow(out, tables, i):
     """Sum of the mass flows from links and from outside into node i [kg/s]."""
-    layout, pipes, valves = tables.layout[0], tables.pipes, tables.valves
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    valves = tables.valves
     total = max(out[layout["supply"] + i], 0.0)
     for p in range(pipes.size):
         if pipes[p]["to_node"] == i:
@@ -265,7 +278,9 @@ def write_exchange(y, out, tables, q, total, share):
     total, share : inflow of scalar q and of mass into each node, of which the quotient is the mean of its inflows
     Raises out[RATE] to the rates of stored mass and of the thermal node.
     """
-    layout, exchangers, nodes = tables.layout[0], tables.exchangers, tables.nodes
+    layout = tables.layout[0]
+    exchangers = tables.exchangers
+    nodes = tables.nodes
     at, specific_heat = layout["exchange"], tables.scalars[q]["specific_heat"]
     first = layout["net"] - exchangers.size
     for k in range(exchangers.size):
@@ -286,7 +301,10 @@ def write_exchange(y, out, tables, q, total, share):
         conductance = exchanger["conductance"] + capacity
         out[RATE] = max(out[RATE], conductance * exchanger["slowness"])
         if has_storage(nodes[i]["kind"]):
-            mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
+            mass = max(
+                nodes[i]["mass"] + y[nodes[i]["y"]],
+                RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"],
+            )
             out[RATE] = max(out[RATE], (share[i] + capacity / specific_heat) / mass)
 
 
@@ -297,7 +315,9 @@ def start_values(t, y, out, tables, q, amount, weight, cells, count):
     A junction or a dry tank, whose value is that of its inflow, gets the mean of the pipe cells beside it at first.
     amount, weight, cells, count : sums of `pipe_inflows`; a supply from outside is added to the first two
     """
-    nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
+    nodes = tables.nodes
+    layout = tables.layout[0]
+    scalar = tables.scalars[q]
     at = layout["value"] + q * nodes.size
     for i in range(nodes.size):
         kind = nodes[i]["kind"]
@@ -320,9 +340,15 @@ def mix_nodes(t, y, out, tables, q):
 
     Raises out[RATE] to the rate at which inflow replaces stored mass [1/s].
     """
-    nodes, valves, layout, scratch = tables.nodes, tables.valves, tables.layout[0], tables.scratch
+    nodes = tables.nodes
+    valves = tables.valves
+    layout = tables.layout[0]
+    scratch = tables.scratch
     n, at = nodes.size, layout["value"] + q * nodes.size
-    amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
+    amount = scratch[:n]
+    weight = scratch[n : 2 * n]
+    total = scratch[2 * n : 3 * n]
+    share = scratch[3 * n : 4 * n]
     pipe_inflows(y, out, tables, q, amount, weight, total, share)
     start_values(t, y, out, tables, q, amount, weight, total, share)
     specific_heat = tables.scalars[q]["specific_heat"]
@@ -350,7 +376,10 @@ def mix_nodes(t, y, out, tables, q):
             break
     for i in range(n):
         if has_storage(nodes[i]["kind"]):
-            mass = max(nodes[i]["mass"] + y[nodes[i]["y"]], RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"])
+            mass = max(
+                nodes[i]["mass"] + y[nodes[i]["y"]],
+                RATE_DEPTH * nodes[i]["density"] * nodes[i]["area"],
+            )
             out[RATE] = max(out[RATE], share[i] / mass + 0.5 * change_rate(out, tables, q))
     if specific_heat > 0.0:
         check_heated_junctions(out, tables, share)
@@ -373,9 +402,14 @@ def record_loss(out, tables, q, k, lost):
 @njit
 def exchange_amounts(t, y, dydt, out, tables, q):
     """Write flows of scalar q through pipe ends and into nodes, rates of storage in nodes, gains and losses [kg/s]."""
-    nodes, pipes, valves, layout = tables.nodes, tables.pipes, tables.valves, tables.layout[0]
+    nodes = tables.nodes
+    pipes = tables.pipes
+    valves = tables.valves
+    layout = tables.layout[0]
     scalar, n = tables.scalars[q], nodes.size
-    value, inflow, gain = layout["value"] + q * n, layout["scalar_inflow"] + q * n, layout["gain"] + q * n
+    value = layout["value"] + q * n
+    inflow = layout["scalar_inflow"] + q * n
+    gain = layout["gain"] + q * n
     for i in range(n):
         out[inflow + i] = 0.0
     for p in range(pipes.size):
@@ -390,7 +424,9 @@ def exchange_amounts(t, y, dydt, out, tables, q):
             out[layout["carried"] + at] = through
             out[inflow + node] += sign * through
     for k in range(valves.size):
-        i, j, flow = valves[k]["from_node"], valves[k]["to_node"], out[layout["valve"] + k]
+        i = valves[k]["from_node"]
+        j = valves[k]["to_node"]
+        flow = out[layout["valve"] + k]
         # Upwind: a valve carries the value of the node from which the fluid comes.
         amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
         out[inflow + i] -= amount
@@ -399,7 +435,9 @@ def exchange_amounts(t, y, dydt, out, tables, q):
         for j in range(tables.heat_sources.size):
             out[inflow + heated_node(out, tables, j)] += out[layout["heat"] + j]
         for k in range(tables.exchangers.size):
-            out[inflow + tables.exchangers[k]["node"]] += out[layout["net"] - tables.exchangers.size + k]
+            out[inflow + tables.exchangers[k]["node"]] += out[
+                layout["net"] - tables.exchangers.size + k
+            ]
     for i in range(n):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
         # Outside a reservoir everything that flows in is taken away, and everything that leaves is supplied.
@@ -412,7 +450,9 @@ def exchange_amounts(t, y, dydt, out, tables, q):
         if has_storage(kind) and dydt.size > 0:
             at = tables.integers[scalar["places"] + i]
             # Decay at the rate k to the ambient value: k (amount - ambient value times mass).
-            fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
+            fades = scalar["decay"] * (
+                y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]])
+            )
             dydt[at] = out[inflow + i] + out[gain + i] - fades
             record_loss(out, tables, q, at - scalar["y"], fades)
 
@@ -455,7 +495,11 @@ def inner_fluxes(conductance, c, d, m, flow, f):
     c, d : values of the scalar in cells and their limited slopes; m : mass per length of cells [kg/m]
     flow : mass flow at faces [kg/s]
     """
-    next, bend, mass, through, f = c[1:], d[1:], m[1:], flow[1:], f[1:]
+    next = c[1:]
+    bend = d[1:]
+    mass = m[1:]
+    through = flow[1:]
+    f = f[1:]
     for i in range(c.size - 1):
         high, low = c[i] + 0.5 * d[i], next[i] - 0.5 * bend[i]
         carried = through[i] * (high if through[i] > 0.0 else low)
@@ -501,9 +545,16 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
 
     On entry `dydt` holds d/dt of the waves. The decay is also subtracted from the record of gains and losses.
     """
-    st, layout, pipe, scratch = tables.settings[0], tables.layout[0], tables.pipes[p], tables.scratch
-    n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
-    base, r, l = tables.profile[pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
+    st = tables.settings[0]
+    layout = tables.layout[0]
+    pipe = tables.pipes[p]
+    scratch = tables.scratch
+    n = pipe["cells"]
+    o = pipe["y"]
+    dx = pipe["dx"]
+    base = tables.profile[pipe["center"] :]
+    r = y[o : o + n]
+    l = y[o + n : o + 2 * n]
     m, flow, c, d, f = (
         scratch[:n], scratch[n : 2 * n + 1], scratch[2 * n + 1 : 3 * n + 1], scratch[3 * n + 1 : 4 * n + 1],
         scratch[4 * n + 1 : 5 * n + 2],
@@ -517,7 +568,9 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
     for q in range(tables.scalars.size):
         scalar = tables.scalars[q]
         at, ends = scalar["y"] + pipe["cell"], 2 * (q * tables.pipes.size + p)
-        s, ds, wall = y[at : at + n], dydt[at : at + n], wall_mass(tables, q, p)
+        s = y[at : at + n]
+        ds = dydt[at : at + n]
+        wall = wall_mass(tables, q, p)
         concentrations(s, m, wall, c)
         for i in range(n):
             d[i] = 0.0
@@ -526,7 +579,8 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
             for right in range(2):
                 near, inner = (n - 1, n - 2) if right == 1 else (0, 1)
                 sign = 1.0 if right == 1 else -1.0
-                if sign * (last if right == 1 else first) > 0.0:  # outflow: the slope follows from the value at the end
+                # outflow: the slope follows from the value at the end
+                if sign * (last if right == 1 else first) > 0.0:
                     # The face is half a cell away, so the slope over a cell is twice the difference.
                     d[near] = 2.0 * sign * (out[layout["edge"] + ends + right] - c[near])
                 elif n > 1:
@@ -538,14 +592,22 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
         # The flows that the nodes have booked: what leaves a pipe enters its node.
         f[0], f[n] = out[layout["carried"] + ends], out[layout["carried"] + ends + 1]
         amount_rates(1.0 / dx, f, ds)
-        lost = subtract_decay(scalar["decay"], scalar["ambient"], s, m, wall, c, ds) if scalar["losses"] > 0 else 0.0
+        lost = (
+            subtract_decay(scalar["decay"], scalar["ambient"], s, m, wall, c, ds)
+            if scalar["losses"] > 0
+            else 0.0
+        )
         if scalar["losses"] > 1:
             for i in range(n):
                 fades = dx * scalar["decay"] * ((s[i] - wall * c[i]) - scalar["ambient"] * m[i])
                 record_loss(out, tables, q, pipe["cell"] + i, fades)
         else:
             record_loss(out, tables, q, 0, dx * lost)
-        rate = most / (least + wall) / dx + 2.0 * scalar["diffusivity"] / (dx * dx) + 0.5 * change_rate(out, tables, q)
+        rate = (
+            most / (least + wall) / dx
+            + 2.0 * scalar["diffusivity"] / (dx * dx)
+            + 0.5 * change_rate(out, tables, q)
+        )
         out[RATE] = max(out[RATE], rate)
 
 
@@ -601,7 +663,9 @@ def value_at_probe(y, out, tables, probe, kind, i, q):
 
     kind : NODE_SCALAR or PIPE_SCALAR; i : number of the node or pipe
     """
-    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
+    layout = tables.layout[0]
+    pipes = tables.pipes
+    nodes = tables.nodes.size
     if kind == NODE_SCALAR:
         return out[layout["value"] + q * nodes + i]
     if probe["side"] != 0:
@@ -628,4 +692,6 @@ def observe_scalars(t, y, out, handle, values):
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == NODE_SCALAR or probe["kind"] == PIPE_SCALAR:
-            values[k] = value_at_probe(y, out, tables, probe, probe["kind"], probe["index"], probe["scalar"])
+            values[k] = value_at_probe(
+                y, out, tables, probe, probe["kind"], probe["index"], probe["scalar"]
+            )

@@ -4,11 +4,15 @@ from fvsolve.core.kernels.rhs_assembly import RhsTerms
 
 PACKAGE = "fvsolve.features.scalars.kernels"
 AMOUNTS = RhsTerms(
-    package=PACKAGE, outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars"
+    package=PACKAGE,
+    outlet_values="scalar_transport: clear_losses",
+    observe="scalar_transport: observe_scalars",
 )
 MIXED = RhsTerms(package=PACKAGE, mix="scalar_transport: mix_scalars")
 CARRIED = RhsTerms(
-    package=PACKAGE, outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
+    package=PACKAGE,
+    outlet_values="scalar_transport: pipe_outlet_values",
+    scalar_rates="scalar_transport: scalar_rates",
 )
 REACTIONS = RhsTerms(
     package=PACKAGE,
@@ -18,7 +22,9 @@ REACTIONS = RhsTerms(
 )
 HEAT = {
     True: RhsTerms(
-        package=PACKAGE, outlet_values="fluid_heat: heat_of_restrictions", scalar_rates="fluid_heat: heat_of_pipes"
+        package=PACKAGE,
+        outlet_values="fluid_heat: heat_of_restrictions",
+        scalar_rates="fluid_heat: heat_of_pipes",
     ),
     False: RhsTerms(
         package=PACKAGE,
