@@ -77,7 +77,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (25599, 52),
     "tests/reference": (7469, 66),
     "tests/report": (1158, 4),
-    "tests/repository": (7046, 32),
+    "tests/repository": (7056, 32),
     "tests/schemes": (669, 2),
     "tests/solve": (3748, 14),
     "tests/step_limits": (1314, 4),
