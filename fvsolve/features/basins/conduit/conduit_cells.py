@@ -10,6 +10,7 @@ rest stays at rest to the bit.
 from math import inf, pi, sqrt
 
 from fvsolve.core.kernels.reconstruction import by_limiter, half_slopes, slope
+from fvsolve.features.basins.hll_flux import TINY, hll_flux
 from fvsolve.jit import inline, njit
 from fvsolve.parts.conduit.law_section import (
     celerity,
@@ -35,7 +36,6 @@ THIN = 1e-7  # share of the full section below which velocities fade
 STEEPEST = 1.0  # greatest change of depth within a cell, over its depth
 # relative change of depth within a cell below which its mean area is that at the mean depth
 EVEN = 1e-6
-TINY = 1e-300
 
 
 @njit(forceinline=True)
@@ -169,14 +169,7 @@ def numerical_flux(section, ul, ur, left, right):
     high = max(ur + cr if ar > 0.0 else ul + 3.0 * cl, mean + c if al > 0.0 and ar > 0.0 else -inf)
     low, high = min(low, 0.0), max(high, 0.0)
     ql, qr = al * ul, ar * ur
-    d_flow, per = qr - ql, 1.0 / (high - low + TINY)
-    jump = (qr * ur - ql * ul) + d_thrust
-    flow = ql + low * per * (high * d_area - d_flow)
-    return (
-        flow,
-        ql * ul + low * per * (high * d_flow - jump),
-        qr * ur + high * per * (low * d_flow - jump),
-    )
+    return hll_flux(low, high, al, ar, ql, qr, ql * ul, qr * ur, d_thrust)
 
 
 @inline

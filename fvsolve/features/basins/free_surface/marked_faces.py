@@ -27,9 +27,9 @@ from fvsolve.features.basins.free_surface.surface_rows import (
     PUSH,
     STRIDE,
     SURFACE,
-    TINY,
     WAVE,
 )
+from fvsolve.features.basins.hll_flux import hll_flux
 from fvsolve.jit import njit
 
 WEIR_ENDS, FLUX_BEGINS = 0.9, 0.95  # lesser over greater depth above the crest
@@ -106,22 +106,6 @@ def share_without(crest, height, e, beyond):
 
 
 @njit
-def flux_over_bed(g, a, b, u, v, low, high):
-    """(flow, momentum minus own pressure on the side before, on the side after) of the HLL flux, as in `put_fluxes`.
-
-    a, b : depths over the bed of the face before and after it; u, v : normal velocities; low, high : wave speeds
-    """
-    per = 1.0 / (high - low + TINY)
-    wa = high * per
-    wb = -(low * per)
-    mix = high * low * per
-    qa = a * u
-    qb = b * v
-    flow, rise = (wa * (qa * u) + wb * (qb * v)) + mix * (qb - qa), 0.5 * g * ((b - a) * (b + a))
-    return (wa * qa + wb * qb) + mix * (b - a), flow + wb * rise, flow - wa * rise
-
-
-@njit
 def blend(share, first, second):
     """(1 - share) times each of five values `first`, plus share times each of `second`."""
     a, b, c, d, e = first
@@ -140,7 +124,12 @@ def flux_without_law(g, bed, before, after, low, high):
     """Flux as `flux_over_wall` returns it, without the speed: HLLC flux over a bed; arguments as there."""
     (h, e, u, s, _), (k, f, v, t, _) = before, after
     bed = max(max(e - h, f - k), bed)
-    mass, first, second = flux_over_bed(g, max(0.0, e - bed), max(0.0, f - bed), u, v, low, high)
+    a = max(0.0, e - bed)
+    b = max(0.0, f - bed)
+    qa = a * u
+    qb = b * v
+    push = 0.5 * g * ((b - a) * (b + a))
+    mass, first, second = hll_flux(low, high, a, b, qa, qb, qa * u, qb * v, push)
     along = mass * (s if mass > 0.0 else t)
     return mass, first, second, along, along
 

@@ -32,7 +32,8 @@ from fvsolve.core.kernels.schedule_pieces import schedule_value
 from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.cell_sides import deviations_of
-from fvsolve.features.basins.free_surface.surface_rows import THIN, TINY
+from fvsolve.features.basins.free_surface.surface_rows import THIN
+from fvsolve.features.basins.hll_flux import TINY
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)

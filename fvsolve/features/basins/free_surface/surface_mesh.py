@@ -43,6 +43,7 @@ from fvsolve.features.basins.free_surface.patch_closures import (
 )
 from fvsolve.features.basins.free_surface.patch_closures import SURFACE as DRIVEN_SURFACE
 from fvsolve.features.basins.free_surface.surface_rows import THIN
+from fvsolve.features.basins.hll_flux import hll_flux
 from fvsolve.features.basins.mesh_blocks import own_sides
 from fvsolve.jit import inline, njit
 
@@ -300,12 +301,9 @@ def add_side_fluxes(g, damping, cells, inside, geo, w, speeds):
         if speeds is not None:
             na, nb = na - speeds[i], nb - speeds[i]
         low, high = min(min(na, nb) - c, 0.0), max(max(na, nb) + c, 0.0)
-        per_width = 1.0 / (high - low + TINY)
         qa, qb = a * na, b * nb
-        mass = per_width * (high * qa - low * qb + high * low * (b - a))
-        flow = per_width * (
-            high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa)
-        )
+        push = half * ((b - a) * (b + a))
+        mass, flow, _ = hll_flux(low, high, a, b, qa, qb, qa * na, qb * nb, push)
         flow += half * (hl[i] + h0[i]) * (el[i] - e0[i])
         if speeds is not None:
             flow += speeds[i] * mass
@@ -317,7 +315,7 @@ def add_side_fluxes(g, damping, cells, inside, geo, w, speeds):
         w[_RX + i] -= reach * (flow * nx - along * ny)
         w[_RY + i] -= reach * (flow * ny + along * nx)
         w[_FAST + i] += reach * max(high, -low)
-        w[_OUTFLOW + i] += reach * (high * (na - low) * per_width)
+        w[_OUTFLOW + i] += reach * (high * (na - low) * (1.0 / (high - low + TINY)))
         w[MASS + i] = mass
 
 

@@ -16,10 +16,11 @@ from math import sqrt
 
 from fvsolve.core.kernels.dtypes import UPWIND, WENO5
 from fvsolve.core.kernels.reconstruction import by_limiter, half_slopes, slope, value_weno5
+from fvsolve.features.basins.hll_flux import hll_flux
 from fvsolve.jit import inline, njit
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
-TINY, HUGE = 1e-300, 1e300
+HUGE = 1e300
 MAX_COLUMNS = 1024  # greatest number of cells of a row in one pass
 GHOSTS = 8  # three are needed; with eight the cells of a row begin at a cache line
 STRIDE = 1048  # an odd number of cache lines, so that rows do not evict each other from the cache
@@ -423,17 +424,14 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
             ua = ua - moves[i]
             ub = ub - moves[i]
         low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
-        per_width = 1.0 / (high - low + TINY)
-        wa = high * per_width
-        wb = -(low * per_width)
-        mix = high * low * per_width
         qa, qb = a * nl, b * nr
-        mass = (wa * qa + wb * qb) + mix * (b - a)
-        flow = (wa * (qa * nl) + wb * (qb * nr)) + mix * (qb - qa)
+        push = half * ((b - a) * (b + a))
+        mass, before, after = hll_flux(low, high, a, b, qa, qb, qa * nl, qb * nr, push)
         if moves is not None:
-            flow += moves[i] * mass
-        rise = half * ((b - a) * (b + a))
-        f[i], f[i + BEFORE], f[i + AFTER] = mass, flow + wb * rise, flow - wa * rise
+            # the water carries the momentum of the moving face too
+            before += moves[i] * mass
+            after += moves[i] * mass
+        f[i], f[i + BEFORE], f[i + AFTER] = mass, before, after
         f[i + ALONG] = mass * (tl if mass > 0.0 else tr)
 
 
