@@ -602,3 +602,8 @@ def _without_negative_powers(spelling: str) -> str:
         if power is not None
     ]
     return "/".join([above or "1", *below])
+
+
+def celsius(temperature: float) -> str:
+    """Text of a temperature in degC, such as "20 degC"; temperature : [K]"""
+    return f"{temperature - 273.15:.6g} degC"

@@ -626,7 +626,7 @@ def find_faults(
         key = ("nodes", name)
         own = basin.physics_type
         if fluid is not None and not own.accepts_law(fluid.law):
-            laws = law_names(lambda law, own=own: own.accepts_law(law.name))
+            laws = law_names(own.accepts_law)
             yield (
                 ("fluid", "law"),
                 f"{show(fluid.law)} does not apply to {own.description}; expected {laws}",

@@ -23,7 +23,7 @@ from fvsolve.case.sections import (
     Numerics,
     Output,
 )
-from fvsolve.core.fluid import LAWS, Fluid
+from fvsolve.core.fluid import Fluid, law_named
 from fvsolve.core.fluid.laws import Law
 from fvsolve.core.schemes import SCHEMES
 from fvsolve.display import Displayable
@@ -170,7 +170,7 @@ class Case(Displayable):
     @cached_property
     def law(self) -> Law:
         """Density law with the properties of the fluid."""
-        return LAWS[self.fluid.law](self.properties, self.ambient_pressure, self.gravity)
+        return law_named(self.fluid.law)(self.properties, self.ambient_pressure, self.gravity)
 
     @cached_property
     def places(self) -> dict[str, Node]:

@@ -10,8 +10,7 @@ from pydantic import Field
 
 from fvsolve import units
 from fvsolve.core.fluid import LAWS
-from fvsolve.core.fluid.coolprop import OIL_WORDS
-from fvsolve.core.fluid.oils import ASTM_D341
+from fvsolve.core.fluid.oils import ASTM_D341, OIL_WORDS
 from fvsolve.core.schemes import LIMITERS, SCHEMES
 from fvsolve.core.steppers.structure import KINDS
 from fvsolve.core.steppers.tableau import AUTO, BUILT_IN, METHODS, method_of_file
@@ -158,7 +157,7 @@ class FluidSpec(Table):
         str,
         Choice(
             "density law",
-            tuple(LAWS),
+            LAWS,
             "density law of the whole case; linear (mixture with cavitation) if left out",
         ),
     ] = "linear"

@@ -13,7 +13,7 @@ from fvsolve.case import Case, load
 from fvsolve.case.load import find_source
 from fvsolve.case.reading import read_raw
 from fvsolve.case.text import inline
-from fvsolve.core.fluid.coolprop import coolprop_version
+from fvsolve.core.fluid.property_cache import coolprop_version
 from fvsolve.core.output.restart import program_versions
 from fvsolve.core.output.result_table import Column, ResultTable
 from fvsolve.declarations import declared

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fvsolve.core.fluid.coolprop import FluidTable, cached_properties, cached_specific_heat, celsius
-from fvsolve.core.fluid.laws import LAWS, Air, check_cavities
+from fvsolve.core.fluid.fluid_table import FluidTable
+from fvsolve.core.fluid.laws import LAWS, Air, check_cavities, law_named
 from fvsolve.core.fluid.oils import (
     OILS,
     oil_name,
@@ -15,10 +15,19 @@ from fvsolve.core.fluid.oils import (
     walther_points,
     walther_viscosity,
 )
+from fvsolve.core.fluid.property_cache import cached_properties, cached_specific_heat
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.units import Kinematic
+from fvsolve.units import Kinematic, celsius
 
-__all__ = ["LAWS", "Fluid", "FluidTable", "follow_temperature", "properties", "specific_heat"]
+__all__ = [
+    "LAWS",
+    "law_named",
+    "Fluid",
+    "FluidTable",
+    "follow_temperature",
+    "properties",
+    "specific_heat",
+]
 
 USER = dict(
     density=None, bulk_modulus=None, viscosity=None, vapor_pressure=0.0, table=None, source="user"
@@ -33,7 +42,8 @@ class Fluid:
     bulk_modulus : rho a^2 at constant entropy [Pa], with the density rho and the speed of sound a
     viscosity : dynamic viscosity [Pa s], None if unknown
     vapor_pressure : absolute [Pa], 0 for a fluid without vapour pressure
-    table : density over pressure for the density law `table`, otherwise None; source : where the properties come from
+    table : density over pressure for density laws that are tabulated, otherwise None
+    source : where the properties come from
     air : free gas for the density law `mixture`, otherwise None
     walther : numbers of the viscosity over the temperature, see `oils.walther_numbers`; otherwise None
     """
@@ -103,7 +113,7 @@ def properties(
     state = dict(temperature=float(temperature), pressure=float(pressure))
     _check_numbers(given | state, law)
     name = oil_name(name) or name
-    LAWS[law].check(name, given)
+    law_named(law).check(name, given)
     values = _look_up(name, law, **state)
     boiling = max(values["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
@@ -115,7 +125,7 @@ def properties(
         )
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
-    air = LAWS[law].air({key: value for key, value in mixed.items() if value is not None})
+    air = law_named(law).air({key: value for key, value in mixed.items() if value is not None})
     if given and name != "user":
         values = values | {"source": f"{values['source']}; {', '.join(given)} given"}
     fluid = Fluid(name=name, law=law, air=air, **(values | state | given))
@@ -127,6 +137,8 @@ def properties(
             text = f'a "user" fluid needs the keys `density` [kg/m3] and `bulk_modulus` [Pa]; `{key}` is missing'
         raise FluidError(key, text)
     check_cavities(fluid)
+    if (table := law_named(law).table(fluid)) is not None:
+        fluid = replace(fluid, table=table)
     return fluid
 
 

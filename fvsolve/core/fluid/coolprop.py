@@ -1,113 +1,27 @@
-"""Properties from CoolProp, with its errors as FluidError; tables of density along an isentrope; their disk cache.
+"""Properties from CoolProp, with its errors as FluidError, and tables of density along an isentrope.
 
-CoolProp is imported on first use. The cache has one file per fluid, state, law and CoolProp version.
+The file is imported only for properties that are not stored, see `property_cache`.
 """
 
-import functools
-import hashlib
-import json
 import math
-import os
 import re
-import tempfile
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fvsolve.compile.file_access import read as read_closed
-from fvsolve.core.fluid.laws import LAWS
-from fvsolve.core.fluid.oils import OILS
+from fvsolve.core.fluid.fluid_table import MAX_ERROR, FluidTable, is_monotone, refined_table
+from fvsolve.core.fluid.laws import law_named
+from fvsolve.core.fluid.oils import OIL_WORDS, OILS
 from fvsolve.errors import FluidError, did_you_mean
-from fvsolve.jit import cache_folder, reading_folders
+from fvsolve.units import celsius
 
 TABLE_PRESSURE = 1e8  # upper end of a table [Pa], or twice the reference pressure if that is higher
-TARGET_ERROR = 1e-9  # relative density error at which refinement stops
-MAX_ERROR = 1e-6  # relative density error above which a table is refused
-INTERVALS = (32, 2048)  # least and greatest number of intervals
-
-
-@dataclass(frozen=True, eq=False)
-class FluidTable:
-    """Density along the isentrope through the reference state, for cubic Hermite interpolation of ln rho.
-
-    pressure        : float64[n]  absolute pressure [Pa], a uniform grid from the vapour pressure up
-    log_density     : float64[n]  ln(rho / (1 kg/m3)) [-]
-    compressibility : float64[n]  d ln rho / dp = 1 / (rho a^2) at constant entropy [1/Pa], a the speed of sound
-    error           : greatest relative error of the density at the midpoints of the grid, against CoolProp [-]
-
-    Outside the grid the compressibility keeps its end value, so that ln rho is extrapolated linearly. Below the vapour
-    pressure CoolProp has no stable liquid.
-    """
-
-    pressure: np.ndarray
-    log_density: np.ndarray
-    compressibility: np.ndarray
-    error: float
-
-    def __post_init__(self) -> None:
-        for name in ("pressure", "log_density", "compressibility"):
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, FluidTable):
-            return NotImplemented
-        return all(
-            np.array_equal(a, b)
-            for a, b in zip(vars(self).values(), vars(other).values(), strict=True)
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.error, self.pressure.size))
-
-    def numbers(self, density: float, pressure: float) -> list[float]:
-        """Values and slopes at the grid for kernels, in one list: ln(rho / density), its slope, enthalpy, its slope.
-
-        Each has one number per grid pressure. Slopes are derivatives by pressure [1/Pa], [J/kg/Pa].
-        The enthalpy [J/kg] is the integral of dp / rho from `pressure`.
-        density : density [kg/m3] at the reference pressure `pressure` [Pa]
-        """
-        p, k = self.pressure, self.compressibility
-        step = (p[-1] - p[0]) / (len(p) - 1)
-        log_density = self.log_density - hermite_at(p, self.log_density, k, pressure)
-        nodes, weights = np.polynomial.legendre.leggauss(6)
-        h = np.zeros(len(p))
-        for x, w in zip(nodes, weights, strict=True):
-            at = p[:-1] + 0.5 * (1.0 + x) * step
-            h[1:] += 0.5 * w * step / (density * np.exp(hermite_at(p, log_density, k, at)))
-        h = np.cumsum(h)
-        slope = 1.0 / (density * np.exp(log_density))
-        h -= hermite_at(p, h, slope, pressure)
-        return [*log_density, *k, *h, *slope]
-
-
-def hermite_at(grid, values, slopes, at):
-    """Cubic Hermite interpolant at the abscissas `at`, from values and slopes (derivatives) on a uniform grid."""
-    step = grid[1] - grid[0]
-    k = np.clip(
-        ((at - grid[0]) / step).astype(int)
-        if hasattr(at, "astype")
-        else int((at - grid[0]) / step),
-        0,
-        len(grid) - 2,
-    )
-    s = (at - grid[k]) / step
-    r = 1.0 - s
-    rise = values[k + 1] - values[k]
-    return (
-        values[k] + s * s * (3 - 2 * s) * rise + s * r * step * (r * slopes[k] - s * slopes[k + 1])
-    )
 
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     """Table of the isentrope through the present state of CoolProp's `state`, from the vapour pressure [Pa] up.
 
-    The number of intervals starts at INTERVALS[0]. It is doubled until the error at midpoints is at most
-    `TARGET_ERROR`, or until it is INTERVALS[1].
     name : name of the fluid for messages
     Raises FluidError if the state is not liquid, or if the table is not accurate enough.
     """
@@ -118,18 +32,14 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
         text = f'"table" needs a liquid, and {name} is not liquid at this temperature and pressure'
         raise FluidError("law", f'{text}; use "linear" or "log"')
     span = (vapor_pressure, _reach(state, temperature, pressure))
-    intervals, max_intervals = INTERVALS
     try:
-        table = _tabulate(state, span, intervals, temperature, entropy)
-        while table.error > TARGET_ERROR and intervals < max_intervals:
-            intervals *= 2
-            table = _tabulate(state, span, intervals, temperature, entropy)
+        table = refined_table(lambda grid: _march(state, grid, temperature, entropy), span)
     except ValueError as error:
         raise FluidError(
             "law",
             f'"table" cannot be computed for {name} at these `temperature` and `pressure` ({error}); use "log"',
         ) from None
-    if table.error > MAX_ERROR or not _monotone(table):
+    if table.error > MAX_ERROR or not is_monotone(table):
         text = f'"table" of {name} has a relative error of {table.error:.1g}, near its critical point; use "log"'
         raise FluidError("law", text)
     return table
@@ -148,17 +58,6 @@ def _reach(state: Any, temperature: float, pressure: float) -> float:
     if melting is not None and melting > pressure:
         limits.append(melting)
     return min(limits)
-
-
-def _tabulate(
-    state: Any, span: tuple[float, float], intervals: int, temperature: float, entropy: float
-) -> FluidTable:
-    grid = np.linspace(*span, 2 * intervals + 1)
-    log_density, compressibility = _march(state, grid, temperature, entropy)
-    f, d = log_density[::2], compressibility[::2]
-    middle = 0.5 * (f[:-1] + f[1:]) + (grid[2] - grid[0]) / 8.0 * (d[:-1] - d[1:])
-    error = float(np.max(np.abs(np.expm1(middle - log_density[1::2]))))
-    return FluidTable(np.linspace(*span, intervals + 1), f, d, error)
 
 
 def _march(
@@ -187,13 +86,6 @@ def _march(
     return log_density, compressibility
 
 
-def _monotone(table: FluidTable) -> bool:
-    """True if all slopes are 0 to 3 times those of adjacent chords, so that the cubics rise (Fritsch, Carlson 1980)."""
-    chord = np.diff(table.log_density) / np.diff(table.pressure)
-    slopes = np.concatenate([table.compressibility[:-1] / chord, table.compressibility[1:] / chord])
-    return bool(np.all(chord > 0.0) and np.all(slopes >= 0.0) and np.all(slopes <= 3.0))
-
-
 def value_or_none(read: Callable[[], float]) -> float | None:
     """Value that `read`, a call of CoolProp, returns; None if CoolProp has no model for it, or if it is not finite."""
     try:
@@ -201,96 +93,6 @@ def value_or_none(read: Callable[[], float]) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
-
-
-FORMAT = 1  # version of format and contents of the cache; increase it when either changes
-OIL_WORDS = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "iso vg", "vg")
-
-
-def cached_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """Fields of `Fluid` from CoolProp, read from a file if they are cached there; CoolProp is then not imported.
-
-    Arguments as for `coolprop_properties`.
-    """
-
-    def compute() -> dict[str, Any]:
-        source = f"CoolProp {coolprop_version()}"
-        return coolprop_properties(name, temperature, pressure, law) | {"source": source}
-
-    return _cached(name, [temperature, pressure, law], compute)
-
-
-def cached_specific_heat(name: str, temperature: float, pressure: float) -> float:
-    """Specific heat at constant pressure from CoolProp [J/kg/K], cached as by `cached_properties`.
-
-    Raises FluidError if CoolProp has none.
-    """
-
-    def compute() -> dict[str, Any]:
-        from CoolProp.CoolProp import PropsSI
-
-        value = value_or_none(lambda: PropsSI("C", "T", temperature, "P", pressure, name))
-        return {"specific_heat": value, "table": None}
-
-    value = _cached(name, [temperature, pressure, "specific heat"], compute)["specific_heat"]
-    if value is None:
-        raise FluidError("specific_heat", f"CoolProp has no specific heat of {name}")
-    return value
-
-
-def _cached(name: str, about: list, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Result of `compute`, read from a file if it is cached there; name, about : fluid, and further text of the key."""
-    key = json.dumps([FORMAT, coolprop_version(), name, *about])
-    stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
-    file = f"fluids/{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
-    found = (_read(folder / file, key) for folder in reading_folders())
-    properties = next((item for item in found if item is not None), None)
-    if properties is None:
-        properties = compute()
-        _write(cache_folder() / file, key, properties)
-    return properties
-
-
-@functools.cache
-def coolprop_version() -> str:
-    """Version of CoolProp, without importing it."""
-    from importlib.metadata import version
-
-    return version("CoolProp")
-
-
-def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """Properties in a cache file; None if it is missing, damaged, of another key, or open to other users.
-
-    key : text of name, state, law and versions
-    """
-    try:
-        digest, body = (read_closed(path) or b"").decode().split("\n", 1)
-        if digest != hashlib.sha256(body.encode()).hexdigest():
-            return None
-        stored_key, properties = json.loads(body)
-        properties["table"] = properties["table"] and FluidTable(**properties["table"])
-        return properties if stored_key == key else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-
-
-def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
-    """Write properties to a cache file atomically; do nothing if the folder cannot be written. key : as for `_read`"""
-    body = json.dumps(
-        [key, properties],
-        default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item),
-    )
-    text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(part, 0o644)  # users of a shared folder read it
-        os.replace(part, path)
-    except OSError:
-        return
 
 
 def coolprop_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
@@ -329,7 +131,7 @@ def _pure_properties(name: str, temperature: float, pressure: float, law: str) -
         raise FluidError("pressure", f"{text}; try another temperature or pressure") from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     values["viscosity"] = value_or_none(state.viscosity)
-    if LAWS[law].tabulated:
+    if law_named(law).from_coolprop:
         values["table"] = isentrope(state, name, vapor_pressure)
     return values
 
@@ -436,8 +238,3 @@ def _incompressible_properties(name: str, temperature: float, pressure: float) -
     )
     # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
     return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
-
-
-def celsius(temperature: float) -> str:
-    """Text of a temperature in degC, such as "20 degC"; temperature : [K]"""
-    return f"{temperature - 273.15:.6g} degC"

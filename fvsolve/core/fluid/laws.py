@@ -1,12 +1,14 @@
 """Density laws: density, head and mass of a fluid as functions of pressure; free gas in a liquid, vapour in cavities.
 
 A density law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their
-own functions (`basins.liquid.lower`). Other modules use the attributes and methods of `Law`, never the name of a law.
+own functions (`basins.liquid.lower`). A law of another package is a `SampledLaw`. Other modules use the attributes and
+methods of `Law`, never the name of a law.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,9 +16,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fvsolve.core.fluid.fluid_table import MAX_ERROR, FluidTable, is_monotone, refined_table
 from fvsolve.core.fluid.oils import OILS
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.errors import FluidError
+from fvsolve.declarations import Declarations, unreadable
+from fvsolve.errors import FluidError, FvsolveError
 
 ATMOSPHERE = 101325.0  # pressure to which air_fraction refers [Pa]
 AIR_KEYS = ("air_fraction", "gas_exponent", "saturation_pressure", "cavitation")
@@ -95,12 +99,24 @@ def check_cavities(fluid) -> None:
         raise FluidError("cavitation", f"{text}; leave out the key `cavitation`")
 
 
-LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most general
+HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(\w+, name="(?P<name>[\w-]+)"\):')
+# from the simplest to the most general
+LAWS = Declarations("density law", "density laws", ("core/fluid/laws.py",), HEADER)
 
 
-def law_names(fits: Callable[[type[Law]], bool]) -> str:
-    """Names of the density laws for which `fits` is true, as text for a message."""
-    *others, last = (f'"{name}"' for name, law in LAWS.items() if fits(law))
+def law_named(name: str) -> type[Law]:
+    """Class of a density law. Raises FvsolveError if the name is unknown, or if its declaration is no density law."""
+    law = LAWS.load(name)
+    if not (isinstance(law, type) and issubclass(law, Law)):
+        found = LAWS[name]
+        fault = "it is not a density law; expected a subclass of fvsolve.core.fluid.laws.SampledLaw"
+        raise FvsolveError(unreadable(found.source, found.place, fault))
+    return law
+
+
+def law_names(fits: Callable[[str], bool]) -> str:
+    """Names of the density laws for which `fits`, a function of the name, is true, as text for a message."""
+    *others, last = (f'"{name}"' for name in LAWS if fits(name))
     return f"{', '.join(others)} or {last}" if others else last
 
 
@@ -114,7 +130,8 @@ class Law:
 
     name, code : name in case files, code in compiled functions
     linear : True if waves superpose: wave speed and impedance are constant, and pressure is linear in mass and in head
-    tabulated : True if the density is a table from CoolProp; keys : keys of [fluid] that only this law has
+    tabulated : True if the density is a table; from_coolprop : True if this table comes from CoolProp
+    keys : keys of [fluid] that only this law has
     ambient : ambient pressure [Pa]; gravity : [m/s2]. The argument z of methods is an elevation [m].
     """
 
@@ -122,12 +139,13 @@ class Law:
     code: ClassVar[int]
     linear: ClassVar[bool] = False
     tabulated: ClassVar[bool] = False
+    from_coolprop: ClassVar[bool] = False
     keys: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, name: str = "", **facts: Any) -> None:
         super().__init_subclass__(**facts)
         if name:
-            cls.name, LAWS[name] = name, cls
+            cls.name = name
 
     def __init__(self, fluid, ambient: float, gravity: float) -> None:
         self.fluid, self.rho, self.ambient, self.gravity = fluid, fluid.density, ambient, gravity
@@ -148,6 +166,11 @@ class Law:
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
         """Raise FluidError if the law does not allow the fluid `name`, or one of its given properties."""
+
+    @classmethod
+    def table(cls, fluid) -> FluidTable | None:
+        """Table of the density that the law computes; None for a law without one. May raise FluidError."""
+        return None
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air | None:
@@ -360,10 +383,24 @@ class LogLaw(DenseLaw, name="log"):
     code = rec.LAW_LOG
 
 
-class TableLaw(DenseLaw, name="table"):
-    """Density law `table`: density from CoolProp along the isentrope through the reference state."""
+class TabulatedLaw(DenseLaw):
+    """Base of the density laws whose density is a table over pressure, `fluid.table`."""
 
     code, tabulated = rec.LAW_TABLE, True
+
+    @classmethod
+    def lower(cls, fluid, s, floats: list[float]) -> None:
+        super().lower(fluid, s, floats)
+        p = fluid.table.pressure
+        s["table"], s["table_size"], s["table_start"] = len(floats), len(p), p[0]
+        s["table_step"] = (p[-1] - p[0]) / (len(p) - 1)
+        floats += fluid.table.numbers(fluid.density, fluid.pressure)
+
+
+class TableLaw(TabulatedLaw, name="table"):
+    """Density law `table`: density from CoolProp along the isentrope through the reference state."""
+
+    from_coolprop = True
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
@@ -375,13 +412,61 @@ class TableLaw(DenseLaw, name="table"):
                 text = f'law = "table" reads {key} from CoolProp; leave out the key `{key}`, or use law = "log"'
                 raise FluidError(key, text)
 
+
+class SampledLaw(TabulatedLaw):
+    """Base of a density law of another package: a formula of the density over pressure, which becomes a table.
+
+    lowest, highest : pressures between which the formula is sampled [Pa]; from the vapour pressure and up to twice the
+    reference pressure at least. Beyond both ends ln rho is linear in pressure.
+    """
+
+    lowest: ClassVar[float] = 100.0
+    highest: ClassVar[float] = 1e8
+
     @classmethod
-    def lower(cls, fluid, s, floats: list[float]) -> None:
-        super().lower(fluid, s, floats)
-        p = fluid.table.pressure
-        s["table"], s["table_size"], s["table_start"] = len(floats), len(p), p[0]
-        s["table_step"] = (p[-1] - p[0]) / (len(p) - 1)
-        floats += fluid.table.numbers(fluid.density, fluid.pressure)
+    def log_density(cls, fluid, pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(ln(rho / rho_ref), its slope d ln rho / dp [1/Pa]) : two float64[n].
+
+        fluid : reference state, with `density` rho_ref [kg/m3] and `bulk_modulus` [Pa] at the pressure `pressure` [Pa]
+        pressure : absolute pressures [Pa] : float64[n]
+        """
+        raise FluidError("law", f'"{cls.name}" has no method `log_density`; expected its formula')
+
+    @classmethod
+    def table(cls, fluid) -> FluidTable:
+        """Table of the formula; FluidError if it contradicts the fluid, is not smooth, or falls with pressure."""
+
+        def sample(pressures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            value, slope = cls.log_density(fluid, pressures)
+            return math.log(fluid.density) + np.asarray(value), np.asarray(slope)
+
+        value, slope = (float(x[0]) for x in cls.log_density(fluid, np.array([fluid.pressure])))
+        ratio = slope * fluid.bulk_modulus
+        if not abs(value) <= MAX_ERROR:
+            text = f"ln(rho / rho_ref) is {value:g} at the reference pressure; expected 0"
+            raise FluidError("law", f'"{cls.name}": {text}')
+        if not abs(ratio - 1.0) <= MAX_ERROR:
+            text = f"its bulk modulus is {1.0 / slope:g} Pa at the reference pressure"
+            wanted = f"expected that of the fluid, {fluid.bulk_modulus:g} Pa"
+            raise FluidError("law", f'"{cls.name}": {text}; {wanted}')
+        span = max(cls.lowest, fluid.vapor_pressure), max(cls.highest, 2.0 * fluid.pressure)
+        values, slopes = sample(grid := np.linspace(*span, 1025))
+        # Simpson's rule over pairs of intervals
+        rise = (slopes[:-2:2] + 4.0 * slopes[1::2] + slopes[2::2]) * (grid[1] - grid[0]) / 3.0
+        if (
+            not np.abs(rise - (values[2::2] - values[:-2:2])).max()
+            <= MAX_ERROR * np.abs(rise).max()
+        ):
+            text = "its slope is not that of its values, or not smooth"
+            raise FluidError("law", f'"{cls.name}": {text}; expected d ln rho / dp')
+        table = refined_table(sample, span)
+        if not table.error <= MAX_ERROR:
+            text = f"a table of its density has a relative error of {table.error:.1g}"
+            wanted = "expected a smooth formula, with the slope that belongs to it"
+            raise FluidError("law", f'"{cls.name}": {text}; {wanted}')
+        if not is_monotone(table):
+            raise FluidError("law", f'"{cls.name}": its density does not rise with pressure')
+        return table
 
 
 class MixtureLaw(DenseLaw, name="mixture"):

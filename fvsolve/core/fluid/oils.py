@@ -12,6 +12,8 @@ from typing import Any
 
 from fvsolve.errors import FluidError
 
+# words for oils that name none of them
+OIL_WORDS = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "iso vg", "vg")
 ASTM_D341 = "astm-d341"  # name of Walther's equation in case files
 ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
 # range of the sources [K], [Pa]

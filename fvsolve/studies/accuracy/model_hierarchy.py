@@ -18,7 +18,7 @@ from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.reading import raw_link
 from fvsolve.case.sloshing import slowest
 from fvsolve.core.assembly.schedule_tables import value_at
-from fvsolve.core.fluid import LAWS
+from fvsolve.core.fluid import LAWS, law_named
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.model.model_facts import velocities
@@ -570,15 +570,15 @@ def possible_laws(case) -> list[str]:
     if not case.places:
         return [case.fluid.law]
     names = [case.fluid.law]
-    for law in LAWS:
-        if LAWS[law].keys:  # a law with keys is possible only as the case's own
+    for law in LAWS.own():
+        if law_named(law).keys:  # a law with keys is possible only as the case's own
             continue
         try:
             load(case, {"fluid.law": law})
         except CaseError:
             continue
         names.append(law)
-    return [law for law in LAWS if law in names]
+    return sorted(names, key=[*LAWS].index)
 
 
 def _run_level(case, name: str, law: str) -> Outcome:
