@@ -35,7 +35,8 @@ def declared(noun: str, name: str = "", **options: Any) -> Callable[[Declared], 
 
 def header_of(noun: str) -> re.Pattern[str]:
     """Regular expression of a header `@declared("NOUN", "NAME")`, further decorators, and the class or function."""
-    head = rf'\n@declared\("{noun}"(?:, "(?P<name>[\w-]+)")?[^\n]*\)\n'
+    # in one line or in several, as a formatter leaves it
+    head = rf'\n@declared\(\s*"{noun}"(?:,\s*"(?P<name>[\w-]+)")?[^()]*\)\n'
     return re.compile(head + r"(?:[@ )].*\n)*(?:class|def) (?P<attribute>\w+)")
 
 

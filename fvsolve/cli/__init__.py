@@ -17,7 +17,8 @@ __all__ = ["main"]
 
 # A command is a function with the header `@command("NAME", order=N)`; its help text is its docstring.
 HEADER = re.compile(
-    r'\n@(?:cli\.)?command\("(?P<name>[\w-]+)"(?:, order=(?P<order>\d+))?\)\ndef (?P<attribute>\w+)\('
+    r'\n@(?:cli\.)?command\(\s*"(?P<name>[\w-]+)"(?:,\s*order=(?P<order>\d+))?,?\s*\)'
+    r"\ndef (?P<attribute>\w+)\("
     r'(?:.*\n(?:(?:    |\)).*\n)*?    """(?P<help>[\s\S]*?)""")?'
 )
 COMMANDS = Declarations("command", "commands", ("cli/*.py",), HEADER)

@@ -17,7 +17,8 @@ PATTERNS = (
 )  # modules that declare types
 # Header of a class that declares a type: `kind` of a part, `name` of a physics, `pipe_model` of a pipe. A search for
 # "\nclass" takes a seventh of the time of "^class" in lines.
-DECLARATION = re.compile(r'\nclass \w+\(.*\b(kind|name|pipe_model)=(?:"([^"]+)"|\w+)\)')
+# in one line or in several, as a formatter leaves it
+DECLARATION = re.compile(r'\nclass \w+\([^()]*\b(kind|name|pipe_model)=(?:"([^"]+)"|\w+),?\s*\)')
 # a basin or a pipe needs the modules of all physics or pipe models
 SHARED = {"name": "basin", "pipe_model": "pipe"}
 

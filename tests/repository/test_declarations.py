@@ -1,6 +1,7 @@
 """Declarations in the package, in installed packages and in files of a user are found without imports."""
 
 import os
+import subprocess
 import sys
 import warnings
 import zipfile
@@ -237,3 +238,33 @@ def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path
         "entry points fvsolve.limiters: steep = mill:steep cannot be read: register_limiter: steep(-1e+15) fails: div",
     ):
         assert done.stderr.count(text) == 1
+
+
+HEADERS = {
+    "features": 'class Cranes(Feature, slot=9, wakes="kind crane, kind winch"):',
+    "kinds": 'class Crane(Link, kind="crane"):',
+    "commands": '@command("lift", order=9)\ndef lift(case: str) -> None:',
+    "studies": '@declared("study", "lifts")\ndef lifts(case):',
+}
+
+
+@pytest.mark.parametrize("width", [88, 20])
+def test_a_header_may_be_broken_into_lines_by_a_formatter(width):
+    from fvsolve.cli import COMMANDS
+    from fvsolve.core.assembly.features import FEATURES
+    from fvsolve.parts.kinds import DECLARATION
+    from fvsolve.studies import STUDIES
+
+    patterns = {
+        "features": FEATURES.header,
+        "kinds": DECLARATION,
+        "commands": COMMANDS.header,
+        "studies": STUDIES.header,
+    }
+    for name, header in HEADERS.items():
+        text = header + ("\n    pass\n" if header.startswith("class") else '\n    """Lift."""\n')
+        command = [sys.executable, "-m", "ruff", "format", f"--line-length={width}", "-"]
+        done = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+        assert ("\n    " in done.stdout.partition(":\n")[0]) == (width == 20)
+        whole, broken = (patterns[name].search(f"\n{text}") for text in (text, done.stdout))
+        assert whole and broken and broken.groupdict() == whole.groupdict(), name

@@ -359,7 +359,7 @@ def test_every_loop_with_a_limiter_is_in_the_table():
         name
         for text in sources
         for name in listed
-        if f"by_limiter({name}," in text or f"by_scheme({name}," in text
+        if re.search(rf"by_(limiter|scheme)\(\s*{name},", text)
     }
     assert called == listed and LOOPS.keys() < listed
 

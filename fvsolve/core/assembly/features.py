@@ -18,8 +18,9 @@ import numpy as np
 from fvsolve.declarations import Declaration, Declarations
 from fvsolve.errors import FvsolveError
 
+# in one line or in several, as a formatter leaves it
 HEADER = re.compile(
-    r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)'
+    r'\nclass (?P<attribute>\w+)\(\s*Feature,\s*slot=(?P<slot>\d+),\s*wakes="(?P<wakes>[^"]+)",?\s*\)'
 )
 FEATURES = Declarations("feature", "features", ("features/*/feature.py",), HEADER)
 
