@@ -272,7 +272,7 @@ def test_a_damaged_cache_file_is_computed_again(empty_cache, damage):
 
 def test_a_new_version_of_coolprop_is_evaluated_again(empty_cache, monkeypatch):
     properties("Water", ROOM, ATM)
-    monkeypatch.setattr("fvsolve.core.fluid.coolprop.coolprop_version", lambda: "99.0")
+    monkeypatch.setattr("fvsolve.core.fluid.property_cache.coolprop_version", lambda: "99.0")
     assert properties("Water", ROOM, ATM).source == "CoolProp 99.0"
     assert len(list(empty_cache.iterdir())) == 2
 

@@ -21,9 +21,12 @@ calls = []
 class JsonLines:
     """Writes a line of JSON for each row."""
 
-    def open(self, model, folder):
+    def open(self, model, folder, kept):
         self.names = [probe.text for probe in model.probes]
-        self.file = open(folder / "history.jsonl", "a")
+        path = folder / "history.jsonl"
+        lines = path.read_text().splitlines(keepends=True) if kept else []
+        self.file = path.open("w")
+        self.file.writelines(lines[:kept])
 
     def rows(self, t, values):
         for time, row in zip(t, values):
@@ -36,8 +39,8 @@ class JsonLines:
 class Recorder:
     """Records all calls."""
 
-    def open(self, model, folder):
-        calls.append(("open", folder, model.case.name))
+    def open(self, model, folder, kept):
+        calls.append(("open", folder, model.case.name, kept))
 
     def rows(self, t, values):
         calls.append(("rows", t.copy(), values.copy()))
@@ -54,7 +57,7 @@ class Recorder:
 
 
 class Full:
-    def open(self, model, folder):
+    def open(self, model, folder, kept):
         if folder is not None and folder.name == "locked":
             raise OSError("no connection")
 
@@ -72,7 +75,7 @@ class Leaky(Full):
 
 
 class Half:
-    def open(self, model, folder):
+    def open(self, model, folder, kept):
         pass
 '''
 TANK = {
@@ -144,7 +147,7 @@ def test_a_sink_receives_all_output_of_a_run_directory(home):
         and names[-2:] == ["end", "close"]
         and {*names[1:-2]} == {"rows", "field"}
     )
-    assert calls()[0][1:] == (Path("run"), result.case.name) and calls()[-2] == (
+    assert calls()[0][1:] == (Path("run"), result.case.name, 0) and calls()[-2] == (
         "end",
         result.reason,
     )
@@ -184,7 +187,22 @@ def test_a_run_continues_with_other_sinks_than_it_began_with(home):
     fvsolve.run(tank(), out="run", pictures=False)
     fvsolve.run(tank("recorder", end=12.0), out="run", resume=True, pictures=False)
     assert str(calls()[0][1]) == "run"
+    times = [t for name, *rest in calls() if name == "rows" for t in rest[0]]
+    assert len(times) == 13 - calls()[0][3]
     assert [t for name, *rest in calls() if name == "rows" for t in rest[0]][-2:] == [11.0, 12.0]
+
+
+def test_a_continued_run_repeats_no_row_in_its_sink(home, monkeypatch):
+    """The rows after the last checkpoint come again, and the sink has removed them."""
+    fvsolve.run(tank("json-lines"), out="whole", pictures=False)
+    fvsolve.run(tank("json-lines", end=6.0), out="run", pictures=False)
+    with (home / "run" / "history.jsonl").open("a") as file:
+        file.write("[6.5, 0.0]\n")
+    fvsolve.run(tank("json-lines"), out="run", resume=True, pictures=False)
+    texts = [(home / name / "history.jsonl").read_text() for name in ("whole", "run")]
+    assert texts[0] == texts[1] and len(texts[0].splitlines()) == 11
+    fvsolve.run(tank("json-lines", end=3.0), out="run", force=True, pictures=False)
+    assert len((home / "run" / "history.jsonl").read_text().splitlines()) == 4
 
 
 def test_a_sink_that_fails_ends_the_run_and_all_sinks_are_closed(home):

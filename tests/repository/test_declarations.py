@@ -242,6 +242,7 @@ def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path
 
 HEADERS = {
     "features": 'class Cranes(Feature, slot=9, wakes="kind crane, kind winch"):',
+    "laws": 'class Gas(SampledLaw, name="gas"):',
     "kinds": 'class Crane(Link, kind="crane"):',
     "commands": '@command("lift", order=9)\ndef lift(case: str) -> None:',
     "studies": '@declared("study", "lifts")\ndef lifts(case):',
@@ -252,11 +253,13 @@ HEADERS = {
 def test_a_header_may_be_broken_into_lines_by_a_formatter(width):
     from fvsolve.cli import COMMANDS
     from fvsolve.core.assembly.features import FEATURES
+    from fvsolve.core.fluid import LAWS
     from fvsolve.parts.kinds import DECLARATION
     from fvsolve.studies import STUDIES
 
     patterns = {
         "features": FEATURES.header,
+        "laws": LAWS.header,
         "kinds": DECLARATION,
         "commands": COMMANDS.header,
         "studies": STUDIES.header,

@@ -12,6 +12,7 @@ from reference.outside_packages import install, python
 from fvsolve import exact, studies
 from fvsolve.case.sections import SINKS
 from fvsolve.cli import COMMANDS
+from fvsolve.core.fluid import LAWS
 
 TEXT = page("extending")
 FILES = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL))
@@ -70,6 +71,10 @@ FREE_MASS = Exact("free-mass", (), (), None, None)
 @command("areas")
 def print_areas(case: str) -> None:
     """Print areas."""
+
+
+class Tait(SampledLaw, name="tait"):
+    pass
 '''
 
 
@@ -80,6 +85,7 @@ def test_headers_in_a_file_of_a_user_are_those_of_the_page(tmp_path, monkeypatch
         "SINKS": SINKS,
         "EXACT_SOLUTIONS": exact.NAMES,
         "COMMANDS": COMMANDS,
+        "DENSITY_LAWS": LAWS,
     }
     for variable, index in indices.items():
         monkeypatch.setenv(f"FVSOLVE_{variable}", str(tmp_path))
@@ -94,7 +100,9 @@ def test_headers_in_a_file_of_a_user_are_those_of_the_page(tmp_path, monkeypatch
         ("json-lines", "JsonLines"),
         ("free-mass", "FREE_MASS"),
         ("areas", "print_areas"),
+        ("tait", "Tait"),
     ]
     for header in re.findall(r"header is\s`([^`]+)`", TEXT):
-        assert header.replace("NAME", "FREE_MASS").replace('"name", ...)', '"free-mass"') in HEADERS
-    assert len(re.findall(r"header is\s", TEXT)) == 4
+        known = header.replace("NAME =", "FREE_MASS =").replace('"name", ...)', '"free-mass"')
+        assert known.replace("NAME(", "Tait(").replace('"..."', '"tait"') in HEADERS
+    assert len(re.findall(r"header is\s", TEXT)) == 5

@@ -99,7 +99,8 @@ def check_cavities(fluid) -> None:
         raise FluidError("cavitation", f"{text}; leave out the key `cavitation`")
 
 
-HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(\w+, name="(?P<name>[\w-]+)"\):')
+# in one line or in several, as a formatter leaves it
+HEADER = re.compile(r'\nclass (?P<attribute>\w+)\(\s*\w+,\s*name="(?P<name>[\w-]+)",?\s*\):')
 # from the simplest to the most general
 LAWS = Declarations("density law", "density laws", ("core/fluid/laws.py",), HEADER)
 
@@ -447,8 +448,8 @@ class SampledLaw(TabulatedLaw):
             raise FluidError("law", f'"{cls.name}": {text}')
         if not abs(ratio - 1.0) <= MAX_ERROR:
             text = f"its bulk modulus is {1.0 / slope:g} Pa at the reference pressure"
-            wanted = f"expected that of the fluid, {fluid.bulk_modulus:g} Pa"
-            raise FluidError("law", f'"{cls.name}": {text}; {wanted}')
+            expected = f"expected that of the fluid, {fluid.bulk_modulus:g} Pa"
+            raise FluidError("law", f'"{cls.name}": {text}; {expected}')
         span = max(cls.lowest, fluid.vapor_pressure), max(cls.highest, 2.0 * fluid.pressure)
         values, slopes = sample(grid := np.linspace(*span, 1025))
         # Simpson's rule over pairs of intervals
@@ -462,8 +463,8 @@ class SampledLaw(TabulatedLaw):
         table = refined_table(sample, span)
         if not table.error <= MAX_ERROR:
             text = f"a table of its density has a relative error of {table.error:.1g}"
-            wanted = "expected a smooth formula, with the slope that belongs to it"
-            raise FluidError("law", f'"{cls.name}": {text}; {wanted}')
+            expected = "expected a smooth formula, with the slope that belongs to it"
+            raise FluidError("law", f'"{cls.name}": {text}; {expected}')
         if not is_monotone(table):
             raise FluidError("law", f'"{cls.name}": its density does not rise with pressure')
         return table

@@ -2,11 +2,12 @@
 
 A sink is a class without arguments. Its object is made for one run, and has these methods:
 
-open(model, folder) : before the run, or before its continuation; folder : path of the run directory
+open(model, folder, kept) : before the run, or before its continuation; folder : path of the run directory
+                      kept : number of rows of an earlier part of the run that stay: further rows come again
 rows(t, values)     : rows of the history. t : float64[k] [s]; values : float64[k, probes] in SI, in the order of
                       `model.probes`
 field(t, frame)     : fields of pipes, basins and bodies at time t [s], optional; frame : part -> quantity -> values
-end(summary)        : end of the run, optional; summary : its reason, extremes and notices
+end(summary)        : end of the run, optional; summary : object with `reason`, `extremes` and `warnings`
 close()             : after the run, also after a failed run, if `open` succeeded
 """
 
@@ -73,8 +74,10 @@ class SeveralSinks:
 
     def begin(self, model: Any, state: Any) -> None:
         """Open the sinks, then the files: a sink that fails leaves an earlier run as it is."""
+        restart = self.directory.restart
+        kept = 0 if restart is None else restart.rows
         for sink in self.sinks:
-            sink.call("open", model, self.directory.folder)
+            sink.call("open", model, self.directory.folder, kept)
             sink.opened = True
         self.directory.begin(model, state)
 
