@@ -60,14 +60,14 @@ LIMITS = {
     "comment lines per 100 code lines of kernels and steppers": Limit(
         limit=5.8, goal=4, slack=0.2, more_is_better=True
     ),
-    "circles of imports": Limit(limit=1, goal=0, slack=0),
+    "circles of imports": Limit(limit=0, goal=0, slack=0),
 }
 
 # Files of the core that each stage of a run needs. A hub that moved or was divided is stated by its new paths.
 HUBS = """
-core/model/build.py core/model/model.py core/model/jacobian_pattern.py core/model/run_data.py
-core/model/energy_accounts.py core/model/energy_norm.py core/model/probe_tables.py core/model/model_facts.py
-core/model/start_notices.py core/model/state_bounds.py core/assembly/model_draft.py core/solve/run_loop.py
+core/model/build.py core/model/model.py core/model/compiled_case.py core/model/jacobian_pattern.py
+core/model/run_data.py core/model/energy_accounts.py core/model/energy_norm.py core/model/probe_tables.py
+core/model/model_facts.py core/model/start_notices.py core/model/state_bounds.py core/assembly/model_draft.py core/solve/run_loop.py
 core/solve/run_summary.py core/solve/run_checks.py core/solve/solve.py core/solve/partition.py case/case.py
 case/load.py case/checks.py case/connections.py case/part_reading.py case/probe.py core/output/fields.py
 core/kernels/rhs_assembly.py core/kernels/dtypes.py core/kernels/energy_rows.py core/kernels/observation.py

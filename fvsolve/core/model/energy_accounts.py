@@ -8,7 +8,8 @@ import numpy as np
 from fvsolve.core.assembly.lowering import lowering_of, rows_in
 from fvsolve.core.assembly.pipe_terms import elements, memory_shares
 from fvsolve.core.kernels import dtypes as rec
-from fvsolve.core.model.model import Model, once_per_model
+from fvsolve.core.model.compiled_case import once_per_model
+from fvsolve.core.model.model import Model
 from fvsolve.core.model.run_data import RunData
 from fvsolve.errors import FvsolveError
 

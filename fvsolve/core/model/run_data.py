@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fvsolve.case.probe import OF_PRESSURE
 from fvsolve.core.assembly.model_draft import aligned_zeros
 from fvsolve.core.kernels import dtypes as rec
-
-if TYPE_CHECKING:
-    from fvsolve.core.model.model import Model
+from fvsolve.core.model.compiled_case import CompiledCase
 
 
 def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
@@ -46,7 +44,7 @@ class RunData:
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: CompiledCase) -> None:
         self.model, self.written, self.tables = model, zeros_for_run(model.shapes), model.tables
         self.clock = self.written.clock[0]
         self.armed, self.marks = self.written.armed, self.written.marks

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve import units
-from fvsolve.core.model.model import once_per_model
+from fvsolve.core.model.compiled_case import once_per_model
 
 
 class UnitColumn(NamedTuple):

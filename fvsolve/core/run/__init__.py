@@ -15,7 +15,6 @@ from fvsolve.core.output.directory import (
     existing_pictures,
     read_directory,
 )
-from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.core.output.restart import identity
 from fvsolve.core.output.summary_file import summary_data, write_summary
 from fvsolve.core.run import mpi_run
@@ -127,6 +126,8 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
             )
         if resume:
             raise RunError("resume needs the run directory; give it as the argument `out`")
+        from fvsolve.core.output.memory_sink import MemorySink  # most runs have a run directory
+
         return MemorySink(model)
 
 

@@ -30,8 +30,9 @@ from fvsolve.core.kernels.energy_supply import (
 )
 from fvsolve.core.kernels.table_handle import boxed
 from fvsolve.core.model import RunData
+from fvsolve.core.model.compiled_case import once_per_model
 from fvsolve.core.model.energy_accounts import Accounts, available_energy, terms_of
-from fvsolve.core.model.model import Model, once_per_model
+from fvsolve.core.model.model import Model
 from fvsolve.core.steppers.run_handle import WATCH
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.jit import COMPILING, compile_once

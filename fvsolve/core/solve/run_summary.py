@@ -1,14 +1,18 @@
 """Summary of a run: reason of its end, first times outside validity, balances, extremes, envelopes, counts."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model import Model, RunData
-from fvsolve.core.solve.run_up import RunUpTable, run_up_table
 from fvsolve.errors import Notice, listing
+
+if TYPE_CHECKING:
+    from fvsolve.core.solve.run_up import RunUpTable
 
 INTEGRATION_TIMES = 10001  # times at which a scheduled flow is integrated, beside its own
 UNRECORDED = np.array([[np.inf], [np.nan], [-np.inf], [np.nan]])  # extremes before the first record
@@ -345,6 +349,10 @@ def find_maxima(run_data: RunData, t: float) -> dict[str, dict[str, np.ndarray]]
 
 def find_run_ups(model: Model, maxima: dict[str, dict[str, np.ndarray]]) -> dict[str, RunUpTable]:
     """Tables of the run-ups of a case by name; maxima : result of `find_maxima`"""
+    if not model.case.output.run_up:
+        return {}
+    from fvsolve.core.solve.run_up import run_up_table
+
     meshed = {part.name: part for part in model.meshed}
     return {
         name: run_up_table(spec, meshed[spec.basin], maxima[spec.basin]["max_surface"])

@@ -23,7 +23,7 @@ import numpy as np
 
 from fvsolve.core.assembly.pipe_terms import elements
 from fvsolve.core.kernels.steady_friction import drag_slope
-from fvsolve.core.model.model import once_per_model
+from fvsolve.core.model.compiled_case import once_per_model
 from fvsolve.core.schemes import SCHEMES
 from fvsolve.core.step_limits.greatest_step import (
     excess_growth,
