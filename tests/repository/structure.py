@@ -67,12 +67,12 @@ LIMITS = {
 HUBS = """
 core/model/build.py core/model/model.py core/model/compiled_case.py core/model/jacobian_pattern.py
 core/model/run_data.py core/model/energy_accounts.py core/model/energy_norm.py core/model/probe_tables.py
-core/model/model_facts.py core/model/start_notices.py core/model/state_bounds.py core/assembly/model_draft.py core/solve/run_loop.py
-core/solve/run_summary.py core/solve/run_checks.py core/solve/solve.py core/solve/partition.py case/case.py
-case/load.py case/checks.py case/connections.py case/part_reading.py case/probe.py core/output/fields.py
-core/kernels/rhs_assembly.py core/kernels/dtypes.py core/kernels/energy_rows.py core/kernels/observation.py
-core/step_limits/growing_modes.py studies/resolution.py studies/linearise.py studies/operating_point.py
-report/draw/scene.py core/run/plot_scene.py cli/printing.py
+core/model/model_facts.py core/model/start_notices.py core/model/state_bounds.py core/assembly/model_draft.py
+core/solve/run_loop.py core/solve/run_summary.py core/solve/run_checks.py core/solve/solve.py
+core/solve/partition.py case/case.py case/load.py case/checks.py case/connections.py case/part_reading.py
+case/probe.py core/output/fields.py core/kernels/rhs_assembly.py core/kernels/dtypes.py core/kernels/energy_rows.py
+core/kernels/observation.py core/step_limits/growing_modes.py studies/resolution.py studies/linearise.py
+studies/operating_point.py report/draw/scene.py core/run/plot_scene.py cli/printing.py
 """.split()
 # Feature -> regular expression for the names of its tables
 FEATURES = {
