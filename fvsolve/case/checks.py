@@ -20,7 +20,7 @@ from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.nodes_and_links import is_in_network, is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import is_formula
-from fvsolve.parts.table_model import CaseContext
+from fvsolve.parts.table_model import CaseContext, RunTimes
 from fvsolve.parts.tolerances import is_shorter_than_rise
 from fvsolve.parts.value import ROOT
 from fvsolve.units import show
@@ -31,22 +31,23 @@ RESERVED = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressu
 
 
 def part_faults(
-    nodes: dict[str, Any],
-    links: dict[str, Any],
+    groups: dict[str, dict[str, Any]],
     ambient: float,
     gravity: float | None,
     fluid: Any,
     raw: Raw | None,
-    start: float,
+    times: RunTimes,
     meshes: dict[str, Any],
     lumped: dict[str, Any],
 ) -> Faults:
     """Faults (key path, message) of elevations, of bodies, and of each part in the context of the other parts.
 
+    groups : section -> name -> part, with the sections "links", "nodes" and others whose parts have faults of their own
     ambient : ambient pressure [Pa]; gravity [m/s2]; fluid : properties of the fluid, or None if it is faulty
-    raw : case before its values were read, for messages; it may be None if `fluid` is None; start : start time [s]
+    raw : case before its values were read, for messages; it may be None if `fluid` is None; times : times of the run
     meshes, lumped : basin -> mesh, of basins with cells and of basins whose water is lumped masses
     """
+    nodes, links = groups["nodes"], groups["links"]
     has_bodies = any(node.kind == "body" or getattr(node, "on", None) for node in nodes.values())
     poses = {}
     named, raw_links = (
@@ -56,7 +57,7 @@ def part_faults(
     if has_bodies:
         from fvsolve.case import bodies  # only cases with bodies need it
 
-        poses = bodies.poses(nodes, start)
+        poses = bodies.poses(nodes, times.start)
         high = {name: node for name, node in nodes.items() if bodies.has_elevation(node, poses)}
     lends = any(
         _may_lend(link, named)
@@ -90,8 +91,8 @@ def part_faults(
 
         return bodies.separation(nodes, poses, *ends)
 
-    around = CaseContext(nodes, links, ambient, gravity, fluid, vacuum, separation)
-    for group, members in (("links", links), ("nodes", nodes)):
+    around = CaseContext(nodes, links, ambient, gravity, fluid, times, vacuum, separation)
+    for group, members in groups.items():
         for name, part in members.items():
             for keys, text in part.faults(name, around):
                 yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text

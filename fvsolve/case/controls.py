@@ -23,7 +23,6 @@ from fvsolve.units import DIMENSIONS, show
 if TYPE_CHECKING:
     from fvsolve.parts.control import Control
 
-MOST_SAMPLES = 1e9  # of a block in a run
 # dimension of an error
 DIFFERENCES = {"pressure": "pressure_drop", "gauge_pressure": "pressure_drop"}
 
@@ -224,9 +223,7 @@ class Blocks:
         return None
 
     def faults(self, name: str) -> Iterator[tuple[tuple, str]]:
-        """Yield faults (keys in the block, text) of unlike driven keys, limits, the initial output and samples."""
-        yield from self.sample_faults(name)
-        yield from self.delay_faults(name)
+        """Yield faults (keys in the block, text) of unlike driven keys, limits and the initial output."""
         if pair := unlike(self.known_dimensions(name)):
             first, other = (DIMENSIONS[item].words for item in pair)
             yield (), f"drives {first} and {other}; expected keys of one unit, or a block for each"
@@ -276,38 +273,6 @@ class Blocks:
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
             yield ("initial",), f"{text}; expected a value within them"
-
-    def delay_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
-        """Yield a fault (keys in the block, text) of a `delay` that is too short for the steps of the run."""
-        given = self.given[name].get("delay")
-        delay = self.valid_key(name, "delay")
-        step = self.setting.step
-        if delay is not None and step is not None and delay < step:
-            text = f"{show(given)} is shorter than numerics.step, so a step would read an input that is not known yet"
-            yield ("delay",), f"{text}; expected at least {step:g} s, or a shorter step"
-        elif delay is not None and self.setting.span is not None:
-            start, end = self.setting.span
-            if (end - start) / delay > MOST_SAMPLES:
-                text = f"{show(given)} gives {(end - start) / delay:.3g} steps, since no step may exceed the delay"
-                yield ("delay",), f"{text}; expected at most {MOST_SAMPLES:.0e} in the run"
-
-    def sample_faults(self, name: str) -> Iterator[tuple[tuple, str]]:
-        """Yield faults (keys in the block, text) of `period` and `offset`."""
-        given = self.given[name]
-        period = self.valid_key(name, "period")
-        offset = self.valid_key(name, "offset")
-        if offset and "period" not in given:
-            yield ("offset",), "has no effect without `period`; give both keys, or remove this key"
-        if offset is not None and period is not None and offset >= period:
-            yield (
-                ("offset",),
-                f"{show(given['offset'])} is not below the period; expected less than {period:g} s",
-            )
-        if period is not None and self.setting.span is not None:
-            start, end = self.setting.span
-            if (end - start) / period > MOST_SAMPLES:
-                text = f"{show(given['period'])} gives {(end - start) / period:.3g} samples"
-                yield ("period",), f"{text}; expected at most {MOST_SAMPLES:.0e} in the run"
 
 
 def unlike(dimensions: list[str]) -> tuple[str, str] | None:

@@ -42,7 +42,7 @@ from fvsolve.parts.carried_scalar import ZEROS
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
-from fvsolve.parts.table_model import read_keys
+from fvsolve.parts.table_model import RunTimes, read_keys
 from fvsolve.units import Kinematic, show
 
 if TYPE_CHECKING:
@@ -163,7 +163,6 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     numerics = reading.table("numerics", Numerics)
     if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
         reading.setting.span = times.start, times.end
-    reading.setting.step = numerics.step if numerics is not None else None
     check_names(reading)
     cut = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
@@ -192,7 +191,8 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     compare = claims.read_comparisons(reading, kinds)
     validation = read_validation_table(reading, kinds, routes)
     limits = claims.read_limits(reading, kinds, routes, parts.links, state, general["gravity"])
-    check_parts(reading, cut, parts, state, numerics, general["gravity"])
+    others = {"controls": {name: block.control for name, block in blocks.items() if block}}
+    check_parts(reading, cut, parts, others, state, numerics, general["gravity"])
     cells = has_cells(cut.table)
     check_times(reading, cut, parts, fluid, state, numerics or valid_times(reading), cells, expect)
     numerics = fill_numerics(reading, parts, fluid, scalars, numerics, cells)
@@ -499,17 +499,28 @@ def check_parts(
     reading: Reading,
     cut: chainage.CutTable,
     parts: Parts,
+    others: dict[str, dict[str, Any]],
     state: Any,
     numerics: Numerics | None,
     gravity: float,
 ) -> None:
-    """Check connections, and each part in the context of the others. state : properties of the fluid, None if faulty"""
+    """Check connections, and each part in the context of the others.
+
+    others : parts of other sections, section -> name -> part; state : properties of the fluid, None if faulty
+    """
     if cut.connections_known:
         reading.add(connections.connection_faults(part_reading.network_table(cut, parts)))
-    start = numerics.start if numerics is not None else 0.0
-    raw, links = replace(reading.raw, table=cut.table), parts.links | cut.uncut
-    about = reading.setting.ambient, gravity, state, raw, start
-    reading.add(checks.part_faults(parts.nodes, links, *about, parts.meshes, parts.lumped))
+    groups = {"links": parts.links | cut.uncut, "nodes": parts.nodes, **others}
+    raw, times = replace(reading.raw, table=cut.table), run_times(reading, numerics)
+    about = reading.setting.ambient, gravity, state, raw, times
+    reading.add(checks.part_faults(groups, *about, parts.meshes, parts.lumped))
+
+
+def run_times(reading: Reading, numerics: Numerics | None) -> RunTimes:
+    """Times of the run, as far as they are known."""
+    if numerics is not None:
+        return numerics.times
+    return RunTimes(*(reading.setting.span or (0.0,)))
 
 
 def check_times(
@@ -624,7 +635,8 @@ def update_values(reading: Reading, previous: Case) -> Case | None:
     links = parts["links"]
     numerics = previous.numerics
     about = previous.ambient_pressure, previous.gravity, previous.properties, raw
-    reading.add(checks.part_faults(nodes, links, *about, numerics.start, {}, {}))
+    groups = {"links": links, "nodes": nodes}
+    reading.add(checks.part_faults(groups, *about, numerics.times, {}, {}))
     links = part_reading.fill_cells(reading, links, previous.properties, numerics)
     if setting.lookups or reading.faults:
         return None

@@ -19,7 +19,7 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
 from fvsolve.parts import value as val
 from fvsolve.parts.pipe.part import LINES
-from fvsolve.parts.table_model import NamedTables, Table, check_table, read_keys
+from fvsolve.parts.table_model import NamedTables, RunTimes, Table, check_table, read_keys
 from fvsolve.parts.value import (
     BY_CELLS,
     SHAPE,
@@ -402,6 +402,11 @@ class Numerics(Table):
             )
             changes["method"] = DEFAULT_METHOD_RTOL if adaptive else by_step
         return self.model_copy(update=changes)
+
+    @property
+    def times(self) -> RunTimes:
+        """Times of the run."""
+        return RunTimes(self.start, self.end, math.nan if self.step is None else self.step)
 
 
 def uses_error_control(method: str | None) -> bool:

@@ -228,13 +228,8 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
             for name, part in facts["pipes"].items()
             if name not in lines
         ]
-    notes += [
-        f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the "
-        "start"
-        for name, item in facts["reactions"].items()
-    ]
     notes += [f"{name}: {text}" for name, part in basins.items() for text in part["chains"]]
-    yield from _first([*notes, *_network_lines(facts["network"])], every)
+    yield from _first([*notes, *facts["texts"]], every)
     yield from _first([f"moves from the start: {text}" for text in facts["moving"]], every)
     yield from _notices(facts["warnings"], every)
     if basins:
@@ -271,20 +266,6 @@ def _parts_table(
             "or greatest value of a column or with a notice, --all prints all"
         )
     yield ""
-
-
-def _network_lines(network: dict | None) -> list[str]:
-    """Lines on a network of rotation, electricity and heat: its states, tied stores and passivity."""
-    if network is None:
-        return []
-    states = listing(network["states"], 8) if network["states"] else "none"
-    text = (
-        f"network: states {states}; {network['eliminated']} further potentials and flows eliminated"
-    )
-    if network["greatest"] is not None:
-        verdict = "passive" if network["passive"] else "not passive"
-        text += f"; {verdict}, greatest eigenvalue of Q A + A' Q {network['greatest']:.6g}"
-    return [text, *(f"tied: {name} = {terms}" for name, terms in network["tied"].items())]
 
 
 def _wall_text(case, pipe: dict) -> str:

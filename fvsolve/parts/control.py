@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from fvsolve import units
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.schedule import UNKNOWN, Schedule, Scheduled, constant
-from fvsolve.parts.table_model import Table
+from fvsolve.parts.table_model import CaseContext, Faults, Table
 from fvsolve.parts.value import (
     PROFILE,
     VALUE,
@@ -19,6 +19,8 @@ from fvsolve.parts.value import (
     nonnegative,
     positive,
 )
+
+MOST_SAMPLES = 1e9  # of a block in a run
 
 
 def read_in(
@@ -195,6 +197,20 @@ class Control(Table):
         given : keys of the block as in the file
         """
         return None
+
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        """Faults of its samples; those of further keys are added in the class of its type."""
+        yield from super().faults(name, around)
+        if self.period is None and self.offset:
+            yield ("offset",), "has no effect without `period`; give both keys, or remove this key"
+        if self.period is None:
+            return
+        if self.offset >= self.period:
+            text = f"{self.offset:g} s is not below the period"
+            yield ("offset",), f"{text}; expected less than {self.period:g} s"
+        if (most := around.times.most(self.period)) > MOST_SAMPLES:
+            text = f"{self.period:g} s gives {most:.3g} samples"
+            yield ("period",), f"{text}; expected at most {MOST_SAMPLES:.0e} in the run"
 
     @property
     def setpoint_schedule(self) -> Schedule | None:

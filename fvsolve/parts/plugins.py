@@ -1,6 +1,7 @@
 """Plugins: parts in a folder or an installed package, and limiters of installed packages."""
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ from fvsolve.units import show
 GROUP, LIMITERS = "fvsolve.parts", "fvsolve.limiters"  # entry points
 # environment variable with the folders of registered parts, for other processes
 VARIABLE = "FVSOLVE_PARTS"
+FEATURE = re.compile(r"^\s*(?:from|import) fvsolve\.features\.(\w+)", re.MULTILINE)
 PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 
@@ -59,8 +61,16 @@ def registered_folders() -> list[str]:
 def declare(package: str) -> None:
     """Import the declaration of the part in a package, and add its sources to the compilation cache."""
     (path, *_) = import_module(package).__path__
-    add_sources(Path(path))
+    folder = Path(path)
+    add_sources(folder, called=called_features(folder))
     import_module(f"{package}.part")
+
+
+def called_features(folder: Path) -> list[Path]:
+    """Folders of the features that the modules of a folder import, whose compiled functions they may call."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted(folder.rglob("*.py"))]
+    names = sorted({name for text in texts for name in FEATURE.findall(text)})
+    return [Path(import_module(f"fvsolve.features.{name}").__path__[0]) for name in names]
 
 
 def installed_limiters() -> Iterator[tuple[str, Callable[[Any], None], Any]]:

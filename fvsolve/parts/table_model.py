@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from math import nan
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -25,11 +26,24 @@ from fvsolve.units import show
 Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of the fault)
 
 
+class RunTimes(NamedTuple):
+    """Start and end of a run, and its given step [s]; nan for a faulty value and for steps by error control."""
+
+    start: float
+    end: float = nan
+    step: float = nan
+
+    def most(self, interval: float) -> float:
+        """Greatest number of intervals of this length [s] in the run; nan if the run is unknown."""
+        return (self.end - self.start) / interval
+
+
 class CaseContext(NamedTuple):
     """Parts and properties of a case, for checks after its parts are read.
 
     nodes, links : parts by name; ambient : ambient pressure [Pa]
     gravity : acceleration of gravity [m/s2], None if faulty; fluid : properties of the fluid, None if faulty
+    times : times of the run
     boiling_faults : function of (group, name, key, pressures [Pa]) of a part, which yields a fault if the fluid boils
     at one of the pressures
     place_distance : function of two places: distance [m] from the first to the second at the start, None if unknown
@@ -40,6 +54,7 @@ class CaseContext(NamedTuple):
     ambient: float
     gravity: float | None
     fluid: Any
+    times: RunTimes
     boiling_faults: Callable[[str, str, str, list[float]], Faults]
     place_distance: Callable[[str, str], float | None]
 

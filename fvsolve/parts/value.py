@@ -122,7 +122,6 @@ class ReadContext:
     driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
     block_units: tuple[str, str] = ("number", "number")
     span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
-    step: float | None = None  # given step of the run [s]; None without one
     # easting and northing [m] of the basin, and its CRS
     frame: tuple[tuple[float, float], str] = ((0.0, 0.0), "")
 

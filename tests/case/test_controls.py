@@ -319,6 +319,52 @@ def test_a_schedule_names_a_control_that_exists(value, place, message):
     assert matches(only_fault({"links.inlet.opening": value}), f"links.inlet.{place}: {message}")
 
 
+@pytest.mark.parametrize(
+    "block, message",
+    [
+        ({"offset": "1 s"}, "offset: has no effect without `period`; give both keys, or remove this key"),
+        ({"period": "2 s", "offset": "2 s"}, "offset: 2 s is not below the period; expected less than 2 s"),
+        ({"period": "100 ns"}, "period: 1e-07 s gives 6e+09 samples; expected at most 1e+09 in the run"),
+    ],
+)  # fmt: skip
+def test_a_fault_of_samples_has_the_key_of_the_block(block, message):
+    assert only_fault(with_block(**block)) == f"controls.level.{message}"
+
+
+@pytest.mark.parametrize(
+    "delay, numerics, message",
+    [
+        ("0.5 s", {"step": "1 s", "method": "rk4"}, "0.5 s is shorter than numerics.step, *; expected at least 1 s, *"),
+        ("100 ns", {}, "1e-07 s gives 6e+09 steps, since no step may exceed the delay; expected at most 1e+09 *"),
+    ],
+)  # fmt: skip
+def test_a_delay_fits_the_steps_of_the_run(delay, numerics, message):
+    lag = {"type": "delay", "input": "controls.level", "delay": delay}
+    changes = {f"numerics.{key}": value for key, value in numerics.items()}
+    assert matches(only_fault(changes | {"controls.late": lag}), f"controls.late.delay: {message}")
+
+
+LINES = {
+    "tank-level-pi": "level: pi of tower.level, setpoint 4.5 m, at least 0, at most 1; output 0.1596",
+    "digital-pressure": "radio: delay of town.head; output 50 m",
+    "tank-relay": "starter: relay of tower.level, at least 0; output 1",
+}
+
+
+@pytest.mark.parametrize("case", LINES)
+def test_check_prints_a_line_for_each_block(case, fvs):
+    code, said, _ = fvs("check", case)
+    assert code == 0 and f"control {LINES[case]} at the start" in said.splitlines()
+
+
+def test_a_line_of_a_block_has_its_filter_and_samples():
+    keys = {"controls.level.filter": "3 s", "controls.level.period": "2 s"}
+    model = fvsolve.build(fvsolve.load("tank-level-pi", keys | {"controls.level.offset": 1}))
+    assert model.checks["controls"]["level"]["filter"] == 3.0
+    (text,) = model.checks["texts"]
+    assert "pi of tower.level, filter 3 s, samples every 2 s from 1 s on, setpoint" in text
+
+
 def test_without_controls_the_message_names_their_absence():
     text = 'links.inlet.opening.control: no control named "level"; [controls] has none'
     assert only_fault({"controls": GONE}) == text

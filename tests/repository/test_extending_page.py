@@ -1,13 +1,12 @@
 """Package, cases and commands of docs/extending.md, installed and run as they stand."""
 
 import re
-import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
 from reference.folders import page
-from reference.outside_packages import install, python
+from reference.outside_packages import files_of, install_page, lines_not_printed, runs_of
 
 from fvsolve import exact, studies
 from fvsolve.case.sections import SINKS
@@ -15,31 +14,20 @@ from fvsolve.cli import COMMANDS
 from fvsolve.core.fluid import LAWS
 
 TEXT = page("extending")
-FILES = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL))
-RUNS = re.findall(r"```sh\n(.*?)```(?:\n\n```text\n(.*?)```)?", TEXT, re.DOTALL)
+FILES, RUNS = files_of(TEXT), runs_of(TEXT)
 
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory) -> Path:
     """Folder with the cases of the page and its installed package."""
-    project = tomllib.loads(FILES["pyproject.toml"])["project"]
-    files = {name: text for name, text in FILES.items() if name != "pyproject.toml"} | {
-        "fieldkit/__init__.py": ""
-    }
-    return install(tmp_path_factory.mktemp("home"), project["name"], files, project["entry-points"])
+    return install_page(tmp_path_factory.mktemp("home"), FILES, "fieldkit")
 
 
 @pytest.mark.parametrize(
     "commands, output", RUNS, ids=[commands.splitlines()[0] for commands, _ in RUNS]
 )
 def test_the_commands_of_the_page_print_its_text(commands, output, home):
-    done = ""
-    for line in commands.splitlines():
-        program, *words = shlex.split(line)
-        done += (home / words[0]).read_text("utf-8") if program == "cat" else ""
-        done += python(home, "-m", "fvsolve", *words).stdout if program == "fvsolve" else ""
-    shown = [line for line in output.splitlines() if line != "..."]
-    assert shown and [line for line in shown if line not in done.splitlines()] == []
+    assert lines_not_printed(home, commands, output) == []
 
 
 def test_each_entry_point_of_the_page_is_used_by_it():

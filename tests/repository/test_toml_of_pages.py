@@ -24,6 +24,8 @@ REST_IS_MISSING = re.compile(
 # A part of the reader, pyproject.toml, a case for another package, and forms that
 # tests/repository/test_doc_pages.py reads.
 OTHER = {
+    ("a-block-of-your-own", 0),
+    ("a-block-of-your-own", 1),
     ("a-part-from-nothing", 0),
     ("a-part-from-nothing", 1),
     ("attitudes", 0),

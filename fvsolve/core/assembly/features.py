@@ -372,6 +372,10 @@ class Feature:
         """Facts for `fvsolve check`."""
         return {}
 
+    def check_texts(self, model, facts: dict[str, Any]) -> list[str]:
+        """Lines that `fvsolve check` prints; facts : result of `facts`"""
+        return []
+
     def stored_states(self, model) -> np.ndarray:
         """Numbers of the states that are stored amounts, whose sums are compensated."""
         return np.zeros(0, dtype=np.int64)

@@ -106,8 +106,11 @@ def checks(model) -> dict[str, Any]:
     timed = steps is not None and method.explicit
     expected = steps * (SECONDS_PER_STEP + method.stages * rhs_seconds(model)) if timed else None
     facts: dict[str, Any] = {}
+    texts: list[str] = []
     for feature in model.features:
-        facts |= feature.facts(model)
+        own = feature.facts(model)
+        facts |= own
+        texts += feature.check_texts(model, own)
     return {
         "fluid": model.case.properties.plain(),
         "nodes": nodes,
@@ -123,6 +126,7 @@ def checks(model) -> dict[str, Any]:
         "network": None,
         "reactions": {},
         **facts,
+        "texts": texts,
         "expected_seconds": expected,
         "moving": model.steady["moving"],
         "warnings": [

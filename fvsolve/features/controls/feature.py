@@ -174,6 +174,16 @@ class Controls(Feature, slot=1, wakes="section controls"):
         text = f"{function}(t, y) is not defined for a case with a control of type delay: y has no earlier inputs"
         return f"{text}; expected a case without it, or rhs(State) instead of rhs(t, y)"
 
+    def facts(self, model) -> dict:
+        from fvsolve.features.controls.facts import block_facts
+
+        return {"controls": block_facts(self, model)}
+
+    def check_texts(self, model, facts: dict) -> list[str]:
+        from fvsolve.features.controls.facts import block_text
+
+        return [block_text(model.case, name, item) for name, item in facts["controls"].items()]
+
     def run(self, run_data) -> ControlRun:
         return ControlRun(self, run_data)
 

@@ -39,6 +39,7 @@ from fvsolve.features.motion.static_forces import (
 )
 from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
+from fvsolve.parts.table_model import RunTimes
 
 DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
 CHAMBERS, PUSHES = f"{FOLDER}.mass_dynamics: piston_chambers", f"{FOLDER}.mass_dynamics: mass_rates"
@@ -491,10 +492,9 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
     draft.check()
     case = replace(case, equilibrium_nodes=moved_nodes(at, result.y))
     nodes = case.nodes | case.equilibrium_nodes
-    surroundings = (case.ambient_pressure, case.gravity, None, None)
-    for keys, text in checks.part_faults(
-        nodes, case.links, *surroundings, at.t, case.meshes, case.lumped
-    ):
+    groups = {"links": case.links, "nodes": nodes}
+    surroundings = (case.ambient_pressure, case.gravity, None, None, RunTimes(at.t))
+    for keys, text in checks.part_faults(groups, *surroundings, case.meshes, case.lumped):
         draft.fault(".".join(map(str, keys)), f"where forces balance {text}")
     draft.check()
     return case, [*position_notices(case), *instability_notices(at, result)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
+from fvsolve.errors import listing
 from fvsolve.features.networks import lower, start
 from fvsolve.features.networks.elimination import NetworkError
 from fvsolve.features.networks.kernels import tables
@@ -173,6 +174,9 @@ class Networks(
     def facts(self, model) -> dict:
         return {} if self.network is None else {"network": self.network.facts()}
 
+    def check_texts(self, model, facts: dict) -> list[str]:
+        return [] if self.network is None else network_texts(facts["network"])
+
     def remedy(self, event: str) -> str:
         switches = (
             []
@@ -180,6 +184,18 @@ class Networks(
             else [item.part.partition(".")[2] for item in self.network.switches]
         )
         return "give it more resistance or inertia" if event in switches else ""
+
+
+def network_texts(facts: dict) -> list[str]:
+    """Lines of `fvsolve check`: states, tied stores and passivity; facts : of `Network.facts`"""
+    states = listing(facts["states"], 8) if facts["states"] else "none"
+    text = (
+        f"network: states {states}; {facts['eliminated']} further potentials and flows eliminated"
+    )
+    if facts["greatest"] is not None:
+        verdict = "passive" if facts["passive"] else "not passive"
+        text += f"; {verdict}, greatest eigenvalue of Q A + A' Q {facts['greatest']:.6g}"
+    return [text, *(f"tied: {name} = {terms}" for name, terms in facts["tied"].items())]
 
 
 class NetworkRun(FeatureRun):

@@ -135,6 +135,12 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     def facts(self, model) -> dict:
         return {"reactions": reactions.reaction_facts(model)}
 
+    def check_texts(self, model, facts: dict) -> list[str]:
+        return [
+            f"reaction {name}: {item['equation']}, rate {item['law']} [mol/m3/s]; {item['rate']:.4g} mol/s at the start"
+            for name, item in facts["reactions"].items()
+        ]
+
     def stored_states(self, model) -> np.ndarray:
         from fvsolve.features.scalars.balances import amount_indices
 
