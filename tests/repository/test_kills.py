@@ -192,7 +192,7 @@ def test_no_module_writes_a_result_in_place():
         "compile/store.py",
         "compile/numba_internals.py",
         "compile/cache_folders.py",
-        "core/fluid/coolprop.py",
+        "core/fluid/property_cache.py",
         # temporary folders
         "studies/validation/library.py",
         "studies/validation/epanet_networks.py",
