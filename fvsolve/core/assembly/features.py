@@ -19,7 +19,8 @@ from fvsolve.declarations import Declaration, Declarations
 from fvsolve.errors import FvsolveError
 
 HEADER = re.compile(
-    r'\nclass (?P<attribute>\w+)\(Feature, slot=(?P<slot>\d+), wakes="(?P<wakes>[^"]+)"\)'
+    r"\nclass (?P<attribute>\w+)\("
+    r'\s*Feature,\s*slot=(?P<slot>\d+),\s*wakes="(?P<wakes>[^"]+)",?\s*\)'
 )
 FEATURES = Declarations("feature", "features", ("features/*/feature.py",), HEADER)
 
