@@ -128,8 +128,10 @@ class Feature:
 
     slot : number of the feature, by which its compiled functions find its tables
     packages : names of further modules with compiled functions, such as laws of parts
+    device_hooks : names of functions of laws of devices that its functions call, keys of `kernels.calls.HOOKS`
     sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
     reads_nodes : True if its functions need pressures or flows of nodes, also in a model that has only basins
+    reads_masses : True if its functions read the initial masses per length at centres of pipe cells, in `profile`
     reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
     shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
     step_histories : names of arrays in the memory of a state that contain values at past steps
@@ -149,7 +151,8 @@ class Feature:
     slot = 0
     wakes: frozenset[str] = frozenset()
     packages: Sequence[str] = ()
-    sets_arrivals = reads_nodes = reads_solved = False
+    device_hooks: Sequence[str] = ()
+    sets_arrivals = reads_nodes = reads_solved = reads_masses = False
     shortest_delay = np.inf
     step_histories: Sequence[str] = ()
     single_thread_reason = ""
@@ -399,12 +402,18 @@ class Feature:
         """Numbers of schedules whose rates are speeds; -1 for none."""
         return set()
 
-    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
-        """Tables of the model, as copies by name, with values that vary by themselves held at those at t [s]."""
-        return {}
+    def held(self, tables, t: float, smooth: bool) -> tuple[Feature, dict[str, np.ndarray]]:
+        """Feature with values that vary by themselves held at those at t [s], and tables of the model replaced for it.
+
+        smooth : True if bounds of values are removed too, because they are kinks of the right-hand side
+        """
+        return self, {}
 
     def to_hold(self) -> tuple[Feature, np.ndarray]:
-        """Copy of the feature, and the array in which values of its inputs are set."""
+        """Copy of the feature, and the array in which values of its inputs are set.
+
+        The array may also be a table whose columns `least` and `greatest` are the bounds of values of inputs.
+        """
         return self, np.zeros(0)
 
     def remedy(self, event: str) -> str:

@@ -239,7 +239,6 @@ class ModelDraft:
 
     # names, in the order of rows; nodes that links own
     node_index: dict[str, int] = field(default_factory=dict)
-    scalar_index: dict[str, int] = field(default_factory=dict)
     owned: set[str] = field(default_factory=set)
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
@@ -266,12 +265,7 @@ class ModelDraft:
     device_table: np.ndarray = no_rows(rec.DEVICE)
     basin_table: np.ndarray = no_rows(rec.BASIN)
     patch_table: np.ndarray = no_rows(rec.PATCHES)
-    scalar_table: np.ndarray = no_rows(rec.SCALAR)
-    reaction_table: np.ndarray = no_rows(rec.REACTION)
-    heat_source_table: np.ndarray = no_rows(rec.HEAT_SOURCE)
-    exchanger_table: np.ndarray = no_rows(rec.EXCHANGER)
     sources: int = 0  # number of rows in the ledger of rain and infiltration
-    heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
     wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
@@ -294,7 +288,6 @@ class ModelDraft:
         self.schedules.events = self.events
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
-        self.scalar_index = {name: i for i, name in enumerate(case.scalars)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
     def copy_for(self, case: Any) -> ModelDraft:

@@ -58,10 +58,6 @@ SETTINGS = record(
     leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
-    # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
-    walther_a=f8,
-    walther_b=f8,
-    temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
     # 1 if a feature reads values that only the solved nodes determine, before rates are computed
@@ -133,6 +129,9 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
     temperature=f8,
     # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
     heat=i8,
+    # offset in `work` of the Reynolds number per mass flow in each cell, which a feature writes before the powers of
+    # pipes are computed; -1: it is `reynolds`
+    present=i8,
 )
 
 COUPLING = record(  # flow at once between two nodes, in addition to that of restrictions
@@ -374,7 +373,6 @@ SCHEDULE_VALUE = 28  # of schedule `index`
 # scalar probe has the kind in `head` and the index in `scalar`
 REACTION_VALUE, LOCAL_AFFINITY = 29, 30
 FEATURE_VALUE = 100  # plus the slot of a feature: its probes
-MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 # between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
 # this place lies below the line between the nodes [Pa]
 PRESSURE_BETWEEN = 31
@@ -539,57 +537,6 @@ WALL = record(
     rest=f8,  # force of the profile on it [N]
 )
 
-SCALAR = record(
-    # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
-    y=i8,
-    places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
-    # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
-    wall_masses=i8,
-    diffusivity=f8,
-    decay=f8,  # [1/s]
-    ambient=f8,  # value to which it decays
-    loss=i8,  # first of its rows in the ledger of decay
-    # Number of these rows: 0 without decay, 1, or a row for each state if steps are implicit, because rows of the
-    # Jacobian must depend on few states.
-    losses=i8,
-    initial=f8,  # inflow value if no other is given
-    least=f8,  # bounds of all possible values
-    greatest=f8,
-    molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
-    specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
-    zero=f8,  # absolute temperature at which its value is 0 [K]
-    # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
-    by_cell=i8,
-)
-
-HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
-    valve=i8,
-    device=i8,  # device whose further dissipation is included; -1 for none
-)
-
-EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node
-    node=i8,
-    place=i8,  # row of the temperature of the thermal node, see `features.networks`
-    conductance=f8,  # [W/K]
-    effectiveness=f8,
-    slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
-)
-
-REACTION = record(
-    program=i8,  # header row of the formula of its rate in `pieces`; -1 for mass action
-    scalars=i8,  # offset of the numbers of its scalars in `integers`
-    count=i8,  # number of these
-    # offset in `floats` of three numbers of each scalar: both orders, and its change in its own unit
-    data=i8,
-    extent=i8,  # first of its rows in the ledger of reactions
-    extents=i8,  # number of these rows: 1, or a row for each place, see SCALAR
-    limits=i8,  # 1 if its rate limits steps
-    forward=f8,  # constants of mass action [(mol/m3)^(1 - order)/s]
-    reverse=f8,
-    thermal=f8,  # R T [J/mol]
-)
-FORWARD_ORDER, REVERSE_ORDER, CHANGE = 0, 1, 2
-
 CLOCK = record(
     limit=f8,  # end of the segment: schedules take their left limit from here on [s]
     step=f8,  # fixed step; 0 for adaptive steps [s]
@@ -608,12 +555,8 @@ RECORDS = {
     "devices": DEVICE,
     "basins": BASIN,
     "patches": PATCHES,
-    "scalars": SCALAR,
-    "heat_sources": HEAT_SOURCE,
-    "exchangers": EXCHANGER,
     "walls": WALL,
     "couplings": COUPLING,
-    "reactions": REACTION,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.

@@ -323,11 +323,11 @@ class Model(Displayable):
             alone,
             forces=bool(self.layout["forces"] >= 0),
             formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-            device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
         )
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
         packages = tuple(name for feature in self.features for name in feature.packages)
-        cast = cast._replace(features=terms, further_packages=packages)
+        hooks = tuple(name for feature in self.features for name in feature.device_hooks)
+        cast = cast._replace(features=terms, further_packages=packages, device_hooks=hooks)
         return functions(cast)
 
     @property
@@ -595,9 +595,13 @@ def inputs_of(model: Model) -> dict[str, Input]:
     parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
     parts |= {name: link for name, link in case.links.items() if name not in parts}
     inputs: dict[str, Input] = {}
+    of_features = {
+        name: value for feature in model.features for name, value in feature.inputs(model).items()
+    }
     for name, part in parts.items():
         own = lowering_of(type(part)).of(part).inputs(model, name, part)
         inputs |= {f"{name}.{key}": value for key, value in own.items()}
-    for feature in model.features:
-        inputs |= feature.inputs(model)
-    return inputs
+        inputs |= {
+            key: value for key, value in of_features.items() if key.rpartition(".")[0] == name
+        }
+    return inputs | of_features

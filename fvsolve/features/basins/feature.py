@@ -12,6 +12,8 @@ from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.model_draft import aligned_zeros
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import lower
+from fvsolve.features.basins.tables import BasinTables
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 
 # functions of the loads on bodies of water at rest, and of water at rest on moving walls
 LOADS_AT_REST = ("basin_frames: set_frames", "frame_forces: add_frame_forces")
@@ -126,10 +128,10 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
     def driven(self) -> set[int]:
         return {int(k) for k in self.walls["schedule"]}
 
-    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
+    def held(self, tables, t: float, smooth: bool) -> tuple[Basins, dict[str, np.ndarray]]:
         """Tables in which given velocities that reverse periodically are held."""
         if not any(row["period"] > 0.0 for row in tables.basins):
-            return {}
+            return self, {}
         basins, plane = tables.basins.copy(), tables.plane.copy()
         for basin, row in zip(self.meshed, basins, strict=True):
             if row["period"] > 0.0:
@@ -142,7 +144,7 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
                 factor = np.cos(np.pi * t / row["period"])
                 plane[row["flows"] : row["flows"] + faces] *= factor
                 row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
-        return {"basins": basins, "plane": plane}
+        return self, {"basins": basins, "plane": plane}
 
     def energy_refusal(self) -> str:
         from fvsolve.features.basins.accounts import energy_refusal
@@ -170,6 +172,10 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
 
 class BasinRun(FeatureRun):
     """Tables of basins whose geometry changes with time, in a run."""
+
+    def tables(self, view: str = "") -> BasinTables:
+        carried = scalar_tables(self.run_data.model)
+        return BasinTables(carried.scalars, carried.reactions)
 
     def written_tables(self) -> dict[str, np.ndarray]:
         tables = self.run_data.model.tables

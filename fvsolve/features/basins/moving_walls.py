@@ -23,6 +23,7 @@ from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import cell_sides as stretching
 from fvsolve.features.basins.basin_output import basin_first_row
 from fvsolve.features.basins.cell_sides import BLOCK, MEASURES, blocks, row_across, stretch_of_cell
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 # quantities of probes, in the order of `parts.basin.MovingWall`
@@ -51,7 +52,7 @@ def update_geometry(t, y, seen, out, handle):
     If the argument `seen` is empty, kernels of rates follow. Then, if the kernel of a basin reads the states
     themselves, only deviations next to patches and walls are computed, unless scalars or friction need all.
     """
-    tables, done = open_tables(handle), 0
+    tables, done = open_basins(handle), 0
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["walls"] > 0:
@@ -386,7 +387,7 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
 
     A, A0 : present and undeformed area of a cell. The rates of other states are computed in that form directly.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         if basin["walls"] == 0 or basin["carried"] < 0:

@@ -9,6 +9,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.jacobian_pattern import Pairs
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.features.basins import lower_pattern as pattern
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 
 
 class BasinPattern(FeaturePattern):
@@ -21,7 +22,8 @@ class BasinPattern(FeaturePattern):
         super().__init__(feature)
         tables = couplings.model.tables
         self.of, self.basins = couplings, feature.meshed
-        self.tables, self.integers, self.walls = tables, tables.integers, tables.walls
+        self.integers, self.walls = tables.integers, tables.walls
+        self.scalars = scalar_tables(couplings.model).scalars
         self.patches = {int(row["node"]): row for row in tables.patches}
 
     def pairs(self) -> Iterator[Pairs]:
@@ -31,9 +33,9 @@ class BasinPattern(FeaturePattern):
                 yield pattern.source_pattern(basin)
         yield from self.boundary_pairs()
         yield from self.wall_pairs()
-        if len(self.tables.scalars):
+        if len(self.scalars):
             yield from map(pattern.scalar_pattern, self.basins)
-        for q, scalar in enumerate(self.tables.scalars):
+        for q, scalar in enumerate(self.scalars):
             yield from self.carried_through_boundaries(q)
             if scalar["losses"] > 0:
                 yield from self.decay_pairs(q, scalar)
@@ -132,7 +134,7 @@ class BasinPattern(FeaturePattern):
 
     def decay_pairs(self, q: int, scalar) -> Iterator[Pairs]:
         """Yield couplings of the decay of scalar q in the ledger with the amounts and depths that decay."""
-        first = self.of.size + len(self.of.nodes) * (1 + len(self.tables.scalars)) + scalar["loss"]
+        first = self.of.size + len(self.of.nodes) * (1 + len(self.scalars)) + scalar["loss"]
         rows = first + np.arange(scalar["losses"])  # a single row for all states, or one for each
         for basin in self.basins:
             cells = np.arange(basin.n)

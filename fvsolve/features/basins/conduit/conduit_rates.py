@@ -12,6 +12,7 @@ from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.conduit import conduit_cells as cells
 from fvsolve.features.basins.conduit.conduit_cells import cell_state, fastest
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 from fvsolve.parts.conduit.law import INSIDE, end_flow, end_state, read_state, section_at
 from fvsolve.parts.conduit.law_section import celerity, section_at_depth
@@ -215,7 +216,7 @@ def conduit_rates(t, y, dydt, out, handle):
 @njit
 def add_end_scalars(t, y, dydt, out, handle):
     """Add the scalars in the flows through the ends of conduits to the rates of the amounts in the cells there."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     layout, nodes = tables.layout[0], tables.nodes.size
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
