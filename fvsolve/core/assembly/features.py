@@ -139,6 +139,8 @@ class Feature:
     frames : names of frames that move, whose data it writes to `out`, see `kernels.moving_frames`
     leaks : rows of links that leak between nodes a and b and change their volumes: `leakage` [m3/s/Pa], `speed`,
     `sweep_a`, `sweep_b`; leak_names : names of these links
+    pushes_at_rest : rows of forces at rest on what moves along a line: `mass`, its place among the net forces or -1;
+    `outward`, 1 or -1; `rest`, the force [N]
     fast_parts : names of parts that can limit the step
     marks : kind and place of each entry of `marks` that the feature has reserved
     link_schedules : link -> number of its schedule; -1 for none
@@ -159,6 +161,7 @@ class Feature:
     frames: Sequence[str] = ()
     leaks: Any = ()
     leak_names: Sequence[str] = ()
+    pushes_at_rest: Any = ()
     fast_parts: Sequence[str] = ()
     marks: Sequence[tuple[str, str]] = ()
     link_schedules: dict[str, int] = {}
@@ -282,6 +285,10 @@ class Feature:
         attitudes : function that returns the rotation matrix of each body; None for attitudes at the start
         """
         return []
+
+    def tables(self) -> tuple | None:
+        """Tables of the feature as its compiled functions read them, before there is a run, see `level`."""
+        return None
 
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""
@@ -500,7 +507,7 @@ class FeatureRun:
 
     def tables(self, view: str = "") -> tuple | None:
         """Tables of the feature as its compiled functions read them; view : name of another view of the model."""
-        return None
+        return self.feature.tables()
 
     def written_tables(self) -> dict[str, np.ndarray]:
         """Tables of the model that the run writes, as copies by name."""

@@ -243,7 +243,6 @@ class ModelDraft:
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
     valve_names: list[str] = field(default_factory=list)
-    wall_names: list[str] = field(default_factory=list)
     devices: list[tuple] = field(default_factory=list)  # (name, part, lowering)
     # modules of compiled laws, in the order of the rows of `hooks`
     laws: list[str] = field(default_factory=list)
@@ -263,10 +262,6 @@ class ModelDraft:
     valve_table: np.ndarray = no_rows(rec.VALVE)
     cluster_table: np.ndarray = no_rows(rec.CLUSTER_RECORD)
     device_table: np.ndarray = no_rows(rec.DEVICE)
-    basin_table: np.ndarray = no_rows(rec.BASIN)
-    patch_table: np.ndarray = no_rows(rec.PATCHES)
-    sources: int = 0  # number of rows in the ledger of rain and infiltration
-    wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
     # event flags at the start that no state tells

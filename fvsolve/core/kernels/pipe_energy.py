@@ -88,12 +88,6 @@ def steady_potential(st, node):
     return (node["pressure"] - st["ambient"]) + height_pressure(st, node)
 
 
-@njit(forceinline=True)
-def present_reynolds(tables, pipe, present, i):
-    """Reynolds number per mass flow in cell i of a pipe [s/kg]; present : its column of the same name"""
-    return pipe["reynolds"] if present < 0 else tables.work[present + i]
-
-
 @njit
 def pipe_power(t, y, dydt, out, tables, k, rows):
     """Write the powers of pipe k except the inflow [W] to its entries in `power`, under the density law `linear`."""
@@ -112,7 +106,8 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
     present = pipe["present"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = present_reynolds(tables, pipe, present, i)
+        # A feature may have written the number of each cell.
+        reynolds = pipe["reynolds"] if present < 0 else tables.work[present + i]
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
@@ -200,7 +195,8 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
     present = pipe["present"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = present_reynolds(tables, pipe, present, i)
+        # A feature may have written the number of each cell.
+        reynolds = pipe["reynolds"] if present < 0 else tables.work[present + i]
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)

@@ -37,7 +37,7 @@ class RhsTerms(NamedTuple):
     move: str = ""  # rates of columns, devices, and what moves
     rates: str = ""  # rates of cells
     boundary_exchange: str = ""  # exchange between bands of flows through boundaries
-    boundary_inflow: str = ""  # flows into cells through patches
+    boundary_inflow: str = ""  # flows into cells through the boundary
     accelerate: str = ""  # accelerations of frames that move, from all forces
     fluid_response: str = ""  # terms that depend on the accelerations of frames
     outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells

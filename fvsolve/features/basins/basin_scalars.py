@@ -8,17 +8,8 @@ amounts per area.
 from math import cos, pi
 
 from fvsolve.core.kernels import stage_sums
-from fvsolve.core.kernels.dtypes import (
-    CELL_SCALAR,
-    GIVEN_FLOW,
-    INTERIOR,
-    MUSCL,
-    NO_CLOSURE,
-    RATE,
-    UPWIND,
-)
+from fvsolve.core.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, MUSCL, RATE, UPWIND
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import advection, fifth_order
 from fvsolve.features.basins.advection import DRY, AdvectionGrid, GridFlows
 from fvsolve.features.basins.advection_faces import MeshFlows, advection_rates
@@ -31,7 +22,7 @@ from fvsolve.features.basins.boundary_cells import (
     weighted_volume,
 )
 from fvsolve.features.basins.cell_sides import deviations_of
-from fvsolve.features.basins.tables import open_basins
+from fvsolve.features.basins.tables import INTERIOR, NO_CLOSURE, open_basins
 from fvsolve.features.scalars.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.jit import njit
 
@@ -78,7 +69,7 @@ def patch_values(t, y, dydt, out, handle):
 @njit
 def observe_values(t, y, out, handle, values):
     """Write the values of the probes of scalars at points of basins to `values`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == CELL_SCALAR:
@@ -96,7 +87,7 @@ def observe_given_flows(t, y, out, handle, values):
 
     It is 0 at patches without flow.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:
             patch = tables.patches[tables.probes[k]["index"]]

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.jacobian_pattern import Pairs
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.features.basins import lower_pattern as pattern
+from fvsolve.features.basins import tables as records
 from fvsolve.features.scalars.kernels.tables import scalar_tables
 
 
@@ -20,11 +20,10 @@ class BasinPattern(FeaturePattern):
 
     def __init__(self, feature, couplings) -> None:
         super().__init__(feature)
-        tables = couplings.model.tables
         self.of, self.basins = couplings, feature.meshed
-        self.integers, self.walls = tables.integers, tables.walls
+        self.integers, self.walls = couplings.model.tables.integers, feature.walls
         self.scalars = scalar_tables(couplings.model).scalars
-        self.patches = {int(row["node"]): row for row in tables.patches}
+        self.patches = {int(row["node"]): row for row in feature.patches}
 
     def pairs(self) -> Iterator[Pairs]:
         for basin in self.basins:
@@ -49,8 +48,14 @@ class BasinPattern(FeaturePattern):
                     pattern.neighbours(basin), self.integers[behind : behind + row["faces"]]
                 )
                 yield pairs_of(unique_states(self.of.size + i), pattern.cell_states(basin, cells))
-            joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
-            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
+            joint = (
+                records.DISCHARGE,
+                records.RATING,
+                *pattern.THROUGH_FACES,
+            )  # one level for all faces
+            if row["closure"] in joint or (
+                row["closure"] == records.STAGE and row["neighbours"] >= 0
+            ):
                 read = unique_states(
                     self.behind(i),
                     pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row)),

@@ -37,10 +37,6 @@ class NetworkCouplings(FeaturePattern):
         """States on which a row of a network depends."""
         return self.states_of(self.network.columns_of_rows[row])
 
-    def thermal_states(self, k: int) -> np.ndarray:
-        """States on which the temperature of the thermal node of heat exchanger k depends."""
-        return self.row_states(self.feature.thermal_rows[k])
-
     def read_by(self, part, lowering) -> np.ndarray:
         shaft = lowering.turns_with(part)
         return unique_states() if shaft is None else self.row_states(self.network.node_row(shaft))

@@ -18,7 +18,7 @@ from fvsolve.features.scalars.kernels import terms
 from fvsolve.features.scalars.kernels.tables import EMPTY, ScalarTables
 from fvsolve.parts.nodes_and_links import is_in_network
 
-REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
+REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.tables`
 SENSED = (rec.NODE_SCALAR, rec.PIPE_SCALAR)
 
 
@@ -31,7 +31,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     def __init__(self, case, given_up=()) -> None:
         super().__init__(case, given_up)
         self.scalars, self.heat_sources, self.exchangers, self.reactions = EMPTY
-        self.heat_rows = 0
+        self.heat_rows, self.reads_masses = 0, bool(case.scalars)
 
     def tables(self) -> ScalarTables:
         """Tables as compiled functions read them."""
@@ -42,7 +42,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
         reactions.lower_reactions(draft, self)
 
     def lower_last(self, draft) -> None:
-        lower.lower_thermal_nodes(draft, self)
+        lower.lower_exchangers(draft, self)
 
     def reserve_ledger(self, draft) -> None:
         lower.reserve_scalars(draft, self)
@@ -138,15 +138,6 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
         if len(self.reactions):  # those in basins are added later
             yield "carried", terms.REACTIONS
 
-    @property
-    def reads_masses(self) -> bool:
-        return bool(self.case.scalars)
-
-    @property
-    def device_hooks(self) -> tuple[str, ...]:
-        # the dissipation of devices heats the fluid
-        return ("power", "heat") if (self.heat_sources["device"] >= 0).any() else ()
-
     def run(self, run_data) -> FeatureRun:
         return ScalarRun(self, run_data)
 
@@ -221,10 +212,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
 
 
 class ScalarRun(FeatureRun):
-    """Tables in a run, and its explanations."""
-
-    def tables(self, view: str = "") -> ScalarTables:
-        return self.feature.tables()
+    """Heat in a run."""
 
     def explanation(self, status: int, index: int, out: np.ndarray) -> dict:
         """Names of the source of heat that finds no coolant, and of the node at its outlet."""

@@ -34,7 +34,6 @@ def lower_scalars(draft, own) -> None:
     meshed = draft.meshed
     mesh_cells = sum(part.n for part in meshed)
     own.scalars = np.zeros(len(case.scalars), records.SCALAR)
-    own.exchangers = exchanger_rows(draft)
     for row, (name, scalar) in zip(own.scalars, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
             row[key] = getattr(scalar, key)
@@ -77,26 +76,18 @@ def lower_scalars(draft, own) -> None:
         pipes["center"] = draft.cells + pipes["cell"]
 
 
-def exchanger_rows(draft) -> np.ndarray:
-    """Table of heat exchangers, without what their network knows, see `lower_thermal_nodes`."""
+def lower_exchangers(draft, own) -> None:
+    """Fill the table of heat exchangers, also from the heat capacities of their thermal nodes in the network."""
     names = exchanger_names(draft.case)
-    table = np.zeros(len(names), records.EXCHANGER)
-    for name, row in zip(names, table, strict=True):
+    stores = network_of(draft).stores.values() if names else ()
+    capacity = {item.ends[0]: item.value for item in stores if item.thermal}
+    own.exchangers = np.zeros(len(names), records.EXCHANGER)
+    for name, row in zip(names, own.exchangers, strict=True):
         link = draft.case.links[name]
         row["node"] = draft.node_index[draft.inside(link.from_)]
         row["conductance"] = link.conductance or 0.0
         row["effectiveness"] = link.effectiveness or 0.0
-    return table
-
-
-def lower_thermal_nodes(draft, own) -> None:
-    """Fill in how slowly the thermal nodes of heat exchangers change, from their heat capacities in the network."""
-    names = exchanger_names(draft.case)
-    stores = network_of(draft).stores.values() if names else ()
-    capacity = {item.ends[0]: item.value for item in stores if item.thermal}
-    for name, row in zip(names, own.exchangers, strict=True):
-        node = draft.case.links[name].to
-        row["slowness"] = 1.0 / capacity[node] if node in capacity else 0.0
+        row["slowness"] = 1.0 / capacity[link.to] if link.to in capacity else 0.0
 
 
 def reserve_scalars(draft, own) -> None:
@@ -156,6 +147,8 @@ def lower_heat(draft, own, scalar: str, heat_from: Any, by_cell: bool) -> None:
         if dissipates and (heats(owners.get(link, link)) or heats(link)):
             rows.append((k, device))
     own.heat_sources = np.array(rows, records.HEAT_SOURCE)
+    if (own.heat_sources["device"] >= 0).any():
+        own.device_hooks = "power", "heat"
     count = len(rows)
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
         if heats(name):

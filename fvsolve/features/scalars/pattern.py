@@ -75,7 +75,8 @@ class ScalarCouplings:
         # rows of the ledger up to that of heat
         self.heat_end = int(model.layout["extent"] - model.layout["supply"])
         for k, exchanger in enumerate(self.tables.exchangers if self.heated else ()):
-            thermal = with_slot(of.features, codes.SLOT).thermal_states(k)
+            network = with_slot(of.features, codes.SLOT)
+            thermal = network.row_states(network.feature.thermal_rows[k])
             self.through[exchanger["node"]].append(thermal)
         for source in self.tables.heat_sources if self.heated else ():
             for i in ends_of(of.valves[source["valve"]]):

@@ -6,13 +6,12 @@ interior patch leave in proportion to their volumes. The network reads the amoun
 so the schemes of advection take these faces for walls, and their flows are added here.
 """
 
-from fvsolve.core.kernels.dtypes import INTERIOR, LINKED
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.basin_scalars import cell_value
 from fvsolve.features.basins.boundary_cells import LEAST_DEPTH, depth_at_patch, patch_area
 from fvsolve.features.basins.cell_sides import deviations_of
 from fvsolve.features.basins.free_surface.patch_closures import FLOW, faces_inside
-from fvsolve.features.basins.tables import open_basins
+from fvsolve.features.basins.tables import INTERIOR, LINKED, open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
