@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from fvsolve.core.assembly.lowering import FLOW, STAGE, Input, Lowering
+from fvsolve.core.assembly.lowering import Lowering
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import FvsolveError, listing
 from fvsolve.parts.attitude_keys import Attitude
@@ -776,46 +776,6 @@ class PatchRows(Lowering, kind="patch"):
     def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"basin {name}: {amount(flow, 'flow')} flow in"
 
-    def inputs(self, model, name, part):
-        patches = model.tables.patches
-        schedules = {rec.STAGE: ("stage", STAGE), rec.DISCHARGE: ("discharge", FLOW)}
-        row = patches[patches["node"] == model.node_names.index(name)][0]
-        key, sort = schedules.get(int(row["closure"]), ("", None))
-        return {key: Input(sort, int(row["drive"]))} if key else {}
-
-    def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity in ("force", "power", "travel"):
-            row["kind"], row["index"] = rec.WALL_VALUE, draft.wall_names.index(name)
-            row["side"] = ("force", "power", "travel").index(probe.quantity)
-        elif probe.quantity == "froude":
-            row["kind"] = rec.PATCH_FROUDE
-            row["index"] = k = draft.patch_table["node"].tolist().index(draft.node_index[name])
-            if draft.patch_table["closure"][k] in (rec.NO_CLOSURE, rec.INTERIOR):
-                reason = "a rigid column joins it, or no part at all"
-                reason = (
-                    reason
-                    if draft.patch_table["closure"][k] == rec.NO_CLOSURE
-                    else "it lies inside the basin"
-                )
-                expected = "a patch of the boundary with a closure or another link"
-                draft.fault(
-                    "output.probes", f"{name} has no Froude number: {reason}; expected {expected}"
-                )
-        elif probe.quantity != "flow":
-            super().probe(draft, name, probe, row)
-        else:
-            node = draft.node_index[name]
-            row["index"], row["kind"], row["scale"] = (
-                node,
-                rec.PATCH_FLOW,
-                1.0 / draft.fluid.density,
-            )
-            if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
-                row["index"], row["kind"] = (
-                    draft.patch_table["node"].tolist().index(node),
-                    rec.GIVEN_FLOW,
-                )
-
 
 class PatchJunctionRows(Lowering, kind="patch-junction"):
     """Conversion to table rows of the places of links at patches: junctions."""
@@ -825,9 +785,3 @@ class PatchJunctionRows(Lowering, kind="patch-junction"):
             rec.JUNCTION,
             draft.schedules.add(node.flow, -draft.fluid.density),
         )
-
-    def probe(self, draft, name, probe, row) -> None:
-        if probe.quantity in ("flow", "froude"):
-            Lowering.kinds["patch"].probe(draft, f"{name}.inside", probe, row)
-        else:
-            super().probe(draft, name, probe, row)

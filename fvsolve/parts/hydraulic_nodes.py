@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.core.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering, scalar_inputs
+from fvsolve.core.assembly.lowering import FLOW, HEAD, PRESSURE, Input, Lowering
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.parts.nodes_and_links import PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
@@ -144,10 +144,7 @@ class InflowRows(Lowering, kind="inflow"):
 
     def inputs(self, model, name, part):
         schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
-        return {
-            "flow": Input(FLOW, schedule, -model.case.properties.density),
-            **scalar_inputs(model, name),
-        }
+        return {"flow": Input(FLOW, schedule, -model.case.properties.density)}
 
 
 class Reservoir(PlaceOnBody, kind="reservoir"):
@@ -220,11 +217,10 @@ class ReservoirRows(Lowering, kind="reservoir"):
         row = model.tables.nodes[i]
         index = int(row["schedule"])
         ground = model.case.ambient_pressure - weight * float(row["elevation"])
-        inputs = {
+        return {
             "pressure": Input(PRESSURE, index, node=i),
             "head": Input(HEAD, index, weight, ground, node=i),
         }
-        return inputs | scalar_inputs(model, name)
 
 
 class Chamber(PlaceOnBody, kind="chamber"):

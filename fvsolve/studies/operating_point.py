@@ -161,7 +161,7 @@ def with_held_schedules(model, t: float, before: bool = False):
 
     before : True for the values just before a kink or jump at t, otherwise just after it
     Schedules that drive motions continue with their rate of change at this time. Kinks and jumps are removed.
-    In a model without a limited scheme, slopes of scalars in pipe cells and bounds of scalars are removed too.
+    In a model without a limited scheme, limited slopes and bounds of values that the flow carries are removed too.
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
@@ -175,15 +175,18 @@ def with_held_schedules(model, t: float, before: bool = False):
     # the first ones contain formulas of blocks
     pieces = np.vstack([tables.pieces, np.array(rows).reshape(-1, 7)])
     tables = tables._replace(schedules=schedules, pieces=pieces)
-    for feature in model.features:
-        tables = tables._replace(**feature.held_tables(tables, t))
-    if not has_limiter(model):
-        # limited slopes and bounds of scalars are kinks of the right-hand side, which has no derivative there
-        settings, scalars = tables.settings.copy(), tables.scalars.copy()
+    # limited slopes and bounds of values are kinks of the right-hand side, which has no derivative there
+    smooth = not has_limiter(model)
+    if smooth:
+        settings = tables.settings.copy()
         settings["limiter"] = rec.FLAT
-        scalars["least"], scalars["greatest"] = -np.inf, np.inf
-        tables = tables._replace(settings=settings, scalars=scalars)
-    return replace(model, tables=tables, breaks=[])
+        tables = tables._replace(settings=settings)
+    features = []
+    for feature in model.features:
+        own, replaced = feature.held(tables, t, smooth)
+        features.append(own)
+        tables = tables._replace(**replaced)
+    return replace(model, tables=tables, features=features, breaks=[])
 
 
 def with_weights(at: OperatingPoint, weights: tuple[float, ...], degree: int) -> OperatingPoint:

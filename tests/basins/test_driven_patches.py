@@ -519,7 +519,7 @@ def test_the_flow_through_a_side_of_triangles_is_continuous_where_it_turns(tmp_p
     patches = {"west": {"side": "west", "stage": 1.1}, "east": {"side": "east", "stage": 1.0}}
     case = reach(patches, (8.0, 4.0), (16, 8), 5.0, {"scheme": "upwind"})
     model = model_of(on_mesh(case, (8.0, 4.0), 0.5, ["west", "east"], tmp_path))
-    basin, patch, rates = model.meshed[0], model.tables.patches[0], []
+    basin, patch, rates = model.meshed[0], model.meshed[0].all_patches[0], []
     velocities = int(basin.row["y"]) + basin.n
     behind = model.tables.integers[int(patch["ring"]) + int(patch["faces"]) :][
         : int(patch["faces"])

@@ -11,10 +11,12 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from fvsolve import load, run
+from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.mesh import rectangle
 from fvsolve.core.mesh.mesh import assemble, edges_of
 from fvsolve.errors import CaseError
 from fvsolve.features.basins.lower_motion import lower_mesh
+from fvsolve.features.basins.tables import SLOT
 from fvsolve.studies.energy_balance import energy
 
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}
@@ -85,7 +87,7 @@ def test_geometry_of_sides_is_that_of_the_mesh_with_moved_corners(tmp_path, kind
     )
     model = model_of(case)
     basin, y = model.meshed[0], model.start.copy()
-    y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
+    y[[int(row["y"]) for row in with_slot(model.features, SLOT).walls]] = 0.2, -0.3
     with model.run_data() as slate:
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
     now = as_it_is(
@@ -590,7 +592,7 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
             )
         )
         basin, y = model.meshed[0], model.start.copy()
-        y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05
+        y[[int(row["y"]) for row in with_slot(model.features, SLOT).walls]] = 0.1, -0.05
         x, z = basin.mesh.centre.T
         deviation = np.array(
             [0.4 * np.cos(5 * x) * np.cos(4 * z), 2e3 * np.sin(3 * x + z), 1e3 * np.cos(4 * x * z)]

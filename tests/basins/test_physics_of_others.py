@@ -46,7 +46,7 @@ class Belt(Physics, name="belt"):
 """Rates of the cells of a belt, and what probes read there."""
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.jit import njit
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.core.kernels.dtypes import CELL_FIELD, RATE
 
 OWN_CODE = physics_code(__package__)
@@ -54,7 +54,7 @@ OWN_CODE = physics_code(__package__)
 @njit
 def carry(t, y, dydt, out, handle):
     """By upwind, cold where the belt begins."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE:
@@ -67,7 +67,7 @@ def carry(t, y, dydt, out, handle):
 @njit
 def read(t, y, out, handle, values):
     """values[k] of its probes."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:

@@ -9,9 +9,7 @@ from scipy.optimize import brentq
 
 from fvsolve.core.kernels.cube_root import cube_root_reciprocal, estimate
 from fvsolve.core.kernels.dtypes import (
-    DARCY,
     LINEAR,
-    MANNING,
     MINMOD,
     MONOTONIZED_CENTRAL,
     MUSCL,
@@ -29,6 +27,7 @@ from fvsolve.features.basins.free_surface.surface_grid import (
     kerbs_of,
 )
 from fvsolve.features.basins.free_surface.surface_rows import SURFACE, put_push
+from fvsolve.features.basins.tables import DARCY, MANNING
 from fvsolve.jit import njit
 
 G = 9.80665

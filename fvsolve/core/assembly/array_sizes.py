@@ -24,6 +24,7 @@ class ArraySizes:
         self.first_mark = 0  # of those of features
         self.event_flags = 0
         self.feature_power = self.feature_stored = 0
+        self.last_power = self.last_stored = 0
         # True if `out` depends on rates, also where they are not requested
         self.reads_rates = False
         self.scratch: list[Callable[[int], int]] = []
@@ -79,6 +80,7 @@ class ArraySizes:
         layout["forces"] = layout["rates"] = -1
         layout["device_mark"] = self.first_mark + self.feature_marks
         layout["feature_power"], layout["feature_stored"] = self.feature_power, self.feature_stored
+        layout["last_power"], layout["last_stored"] = self.last_power, self.last_stored
         return layout
 
     def shapes(self) -> rec.RunArrays:

@@ -128,8 +128,10 @@ class Feature:
 
     slot : number of the feature, by which its compiled functions find its tables
     packages : names of further modules with compiled functions, such as laws of parts
+    device_hooks : names of functions of laws of devices that its functions call, keys of `kernels.calls.HOOKS`
     sets_arrivals : True if its `record` writes out[ARRIVES], the next time at which a step must end, for waves
     reads_nodes : True if its functions need pressures or flows of nodes, also in a model that has only basins
+    reads_masses : True if its functions read the initial masses per length at centres of pipe cells, in `profile`
     reads_solved : True if it reads values that only the solved nodes determine, before rates are computed
     shortest_delay : no stage of a step may be later than this after the beginning of the step [s]
     step_histories : names of arrays in the memory of a state that contain values at past steps
@@ -137,6 +139,8 @@ class Feature:
     frames : names of frames that move, whose data it writes to `out`, see `kernels.moving_frames`
     leaks : rows of links that leak between nodes a and b and change their volumes: `leakage` [m3/s/Pa], `speed`,
     `sweep_a`, `sweep_b`; leak_names : names of these links
+    pushes_at_rest : rows of forces at rest on what moves along a line: `mass`, its place among the net forces or -1;
+    `outward`, 1 or -1; `rest`, the force [N]
     fast_parts : names of parts that can limit the step
     marks : kind and place of each entry of `marks` that the feature has reserved
     link_schedules : link -> number of its schedule; -1 for none
@@ -149,13 +153,15 @@ class Feature:
     slot = 0
     wakes: frozenset[str] = frozenset()
     packages: Sequence[str] = ()
-    sets_arrivals = reads_nodes = reads_solved = False
+    device_hooks: Sequence[str] = ()
+    sets_arrivals = reads_nodes = reads_solved = reads_masses = False
     shortest_delay = np.inf
     step_histories: Sequence[str] = ()
     single_thread_reason = ""
     frames: Sequence[str] = ()
     leaks: Any = ()
     leak_names: Sequence[str] = ()
+    pushes_at_rest: Any = ()
     fast_parts: Sequence[str] = ()
     marks: Sequence[tuple[str, str]] = ()
     link_schedules: dict[str, int] = {}
@@ -280,6 +286,10 @@ class Feature:
         """
         return []
 
+    def tables(self) -> tuple | None:
+        """Tables of the feature as its compiled functions read them, before there is a run, see `level`."""
+        return None
+
     def close(self, draft) -> None:
         """Complete the tables of the feature; from here on they are constant."""
 
@@ -403,12 +413,18 @@ class Feature:
         """Numbers of schedules whose rates are speeds; -1 for none."""
         return set()
 
-    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
-        """Tables of the model, as copies by name, with values that vary by themselves held at those at t [s]."""
-        return {}
+    def held(self, tables, t: float, smooth: bool) -> tuple[Feature, dict[str, np.ndarray]]:
+        """Feature with values that vary by themselves held at those at t [s], and tables of the model replaced for it.
+
+        smooth : True if bounds of values are removed too, because they are kinks of the right-hand side
+        """
+        return self, {}
 
     def to_hold(self) -> tuple[Feature, np.ndarray]:
-        """Copy of the feature, and the array in which values of its inputs are set."""
+        """Copy of the feature, and the array in which values of its inputs are set.
+
+        The array may also be a table whose columns `least` and `greatest` are the bounds of values of inputs.
+        """
         return self, np.zeros(0)
 
     def remedy(self, event: str) -> str:
@@ -495,7 +511,7 @@ class FeatureRun:
 
     def tables(self, view: str = "") -> tuple | None:
         """Tables of the feature as its compiled functions read them; view : name of another view of the model."""
-        return None
+        return self.feature.tables()
 
     def written_tables(self) -> dict[str, np.ndarray]:
         """Tables of the model that the run writes, as copies by name."""

@@ -67,7 +67,8 @@ class Input(NamedTuple):
     node: int = -1  # node, for a pressure or head
     # schedules with the values max(0, a * value + b), and a, b
     parts: tuple[tuple[int, float, float], ...] = ()
-    scalar: int = -1  # scalar whose value flows in
+    # slot of a feature that keeps the value within bounds, and number of these, see `Feature.to_hold`
+    bounds: tuple[int, int] | None = None
     # in place of a schedule: slot of a feature, and number of its value
     held: tuple[int, int] | None = None
 
@@ -79,16 +80,6 @@ def opening_input(model, name: str) -> dict[str, Input]:
             OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"])
         )
     }
-
-
-def scalar_inputs(model, name: str) -> dict[str, Input]:
-    """Inputs for the values of scalars that flow in from a node : name of the scalar -> input."""
-    i, inputs = model.node_names.index(name), {}
-    for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
-        place = int(model.tables.integers[row["places"] + i])
-        if place >= 0:
-            inputs[scalar] = Input(VALUE, place, scalar=q)
-    return inputs
 
 
 TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]

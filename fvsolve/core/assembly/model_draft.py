@@ -239,12 +239,10 @@ class ModelDraft:
 
     # names, in the order of rows; nodes that links own
     node_index: dict[str, int] = field(default_factory=dict)
-    scalar_index: dict[str, int] = field(default_factory=dict)
     owned: set[str] = field(default_factory=set)
     pipe_names: list[str] = field(default_factory=list)
     column_names: list[str] = field(default_factory=list)
     valve_names: list[str] = field(default_factory=list)
-    wall_names: list[str] = field(default_factory=list)
     devices: list[tuple] = field(default_factory=list)  # (name, part, lowering)
     # modules of compiled laws, in the order of the rows of `hooks`
     laws: list[str] = field(default_factory=list)
@@ -264,15 +262,6 @@ class ModelDraft:
     valve_table: np.ndarray = no_rows(rec.VALVE)
     cluster_table: np.ndarray = no_rows(rec.CLUSTER_RECORD)
     device_table: np.ndarray = no_rows(rec.DEVICE)
-    basin_table: np.ndarray = no_rows(rec.BASIN)
-    patch_table: np.ndarray = no_rows(rec.PATCHES)
-    scalar_table: np.ndarray = no_rows(rec.SCALAR)
-    reaction_table: np.ndarray = no_rows(rec.REACTION)
-    heat_source_table: np.ndarray = no_rows(rec.HEAT_SOURCE)
-    exchanger_table: np.ndarray = no_rows(rec.EXCHANGER)
-    sources: int = 0  # number of rows in the ledger of rain and infiltration
-    heat_rows: int = 0  # rows in the ledger of the heat of restrictions and pipes
-    wall_table: np.ndarray = no_rows(rec.WALL)
     coupling_table: np.ndarray = no_rows(rec.COUPLING)
     probe_table: np.ndarray = no_rows(rec.PROBE)
     # event flags at the start that no state tells
@@ -294,7 +283,6 @@ class ModelDraft:
         self.schedules.events = self.events
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
-        self.scalar_index = {name: i for i, name in enumerate(case.scalars)}
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
     def copy_for(self, case: Any) -> ModelDraft:

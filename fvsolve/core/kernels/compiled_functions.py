@@ -44,9 +44,7 @@ class Functions:
         # A second process compiles the readers and the time loop at the same time.
         with compile_in_parallel(code, "run_steps"):
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
-            self.store_hooks(
-                *RHS_HOOKS, *["lead"] * cast.columns, *["power", "heat"] * cast.device_heat
-            )
+            self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns, *cast.device_hooks)
         self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))
         self.store_addresses(calls.DERIVE, cast.functions("derive_state"))
         self.store_addresses(calls.DAMP, cast.functions("damp"))

@@ -58,10 +58,6 @@ SETTINGS = record(
     leave="(2, 5)f8",  # of five cells, for the two cells at the end where it leaves
     rho=f8,  # reference density [kg/m3]
     viscosity=f8,  # dynamic [Pa s]
-    # numbers a and b of Walther's equation of the viscosity, see `kernels.viscosity`; b is 0 without it
-    walther_a=f8,
-    walther_b=f8,
-    temperature=i8,  # number of the scalar that is the temperature of the fluid
     ambient=f8,  # ambient pressure [Pa]
     start=f8,  # start of the run [s]
     # 1 if a feature reads values that only the solved nodes determine, before rates are computed
@@ -133,6 +129,9 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
     temperature=f8,
     # first row in the ledger of the heat of its friction; -1 if this does not heat the fluid
     heat=i8,
+    # offset in `work` of the Reynolds number per mass flow in each cell, which a feature writes before the powers of
+    # pipes are computed; -1: it is `reynolds`
+    present=i8,
 )
 
 COUPLING = record(  # flow at once between two nodes, in addition to that of restrictions
@@ -278,7 +277,8 @@ CLUSTER_RECORD = record(
 )
 
 LAYOUT = record(
-    pressure=i8,  # offsets in `out`
+    # offsets in `out`: values of nodes, links and devices
+    pressure=i8,
     supply=i8,
     net=i8,
     ends=i8,
@@ -287,19 +287,21 @@ LAYOUT = record(
     # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
     valve_controlled=i8,
     stiffness=i8,  # of moving chambers: pressure per mass [Pa/kg]
-    outflow_fraction=i8,  # of patches: fraction of the requested outflow for which there is water
+    outflow_fraction=i8,  # of nodes that cells fill: fraction of the requested outflow for which there is water
     swept=i8,  # mass flow out of moving chambers by piston and leak [kg/s]
     net_force=i8,  # on what moves along a line [N]
     push=i8,  # forces of the elements between [N]
     conductance=i8,  # present conductances of valves, 0 if closed [kg2/s2/Pa]
     drive=i8,  # present relative speeds of pumps, an entry for each valve
+    # rows of the ledger behind `supply`
     gain=i8,  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
     loss=i8,  # then the negative decay of each scalar [kg/s]
     # then heat over specific heat: of restrictions, of friction in pipes, of heat exchangers [kg K/s]
     heat=i8,
     extent=i8,  # then the rates of reactions, times the mass that reacts [kg mol/m3/s]
-    source=i8,  # then rain on basins, and negative infiltration [kg/s]
+    source=i8,  # then mass flows that do not pass nodes, see `Feature.sources` [kg/s]
     quickest=i8,  # greatest rate of change by reactions [1/s], an entry if there are reactions
+    # what flows carry, at nodes and ends of pipes
     value=i8,  # of each scalar at all nodes
     edge=i8,  # values of scalars in pipes at both ends
     carried=i8,  # flow of scalars along pipes through both ends [kg/s]
@@ -310,22 +312,26 @@ LAYOUT = record(
     forcing=i8,
     rates=i8,  # in `work`: rates, if `out` depends on them and they are not requested; else -1
     forces=i8,  # in `work`: rates from which forces on pipes are computed; else -1
-    tank=i8,  # inertia of basins on frames, see `kernels.moving_frames`
-    wall=i8,  # outward force of the water on moving walls, minus that of the profile [N]
+    # frames that move, fluid on them, and the elements between
+    tank=i8,  # inertia of fluid with a mesh on frames, see `kernels.moving_frames`
+    wall=i8,  # outward force of the fluid on boundaries that move, minus that of the profile [N]
     travel=i8,  # of force elements: change of length since the start and its rate [m, m/s]
     along=i8,  # unit vectors of lines, between their points
     pin=i8,  # forces of constraints, three for each [N]
     body=i8,  # data of frames that move, see `kernels.moving_frames`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
     shaft=i8,  # speeds of shafts that laws of devices read before the nodes are solved [rad/s]
+    # sizes, and rows of other arrays than `out`
     size=i8,
     device_mark=i8,  # offset in `marks` of those of devices
     # number of rows of `power` that features fill, between those of networks and of devices
     feature_power=i8,
     feature_stored=i8,  # likewise of `stored`
+    # number of rows of `power` that features fill behind those of devices
+    last_power=i8,
+    last_stored=i8,  # likewise of `stored`
 )
 BODY_OUT = 45  # numbers of each body in `out`
-GN = 14  # index of g_n among the numbers of a frame, see `basins.basin_frames`
 TANK_OUT = 24  # numbers in `out` of each basin on a body, see `kernels.moving_frames`
 RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entries of `out`
 # Least slope [m2/s] of laws between levels in Newton's method; 0: it follows the flow. FIRM_SLOPE is that of limited
@@ -358,7 +364,7 @@ PROBE = record(
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
-CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
+CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of parts with a mesh
 GIVEN_FLOW = 18  # of a patch with given velocity
 WALL_VALUE = 19  # of a moving wall
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = (
@@ -374,221 +380,11 @@ SCHEDULE_VALUE = 28  # of schedule `index`
 # scalar probe has the kind in `head` and the index in `scalar`
 REACTION_VALUE, LOCAL_AFFINITY = 29, 30
 FEATURE_VALUE = 100  # plus the slot of a feature: its probes
-MOLAR_RATE, CHEMICAL_POWER, AFFINITY = 0, 1, 2
 # between nodes `index` and `cell`; floats[weights:] : fraction of the way, elevation there [m], and pressure because
 # this place lies below the line between the nodes [Pa]
 PRESSURE_BETWEEN = 31
 PATCH_FROUDE = 32  # Froude number of the flow through driven patch `index`
 SECTION_FLOW = 33  # through a section of basin `index`, by `count` marked faces
-
-BASIN = record(
-    kind=i8,  # code of its physics, see `basins.basin_patches`
-    deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
-    # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
-    given=i8,
-    scheme=i8,
-    limiter=i8,  # on rectangles
-    # offset in `plane` of depths of kerbs: of rows of a grid, or of cells, see `free_surface.surface_mesh`
-    kerbs=i8,
-    wide=f8,  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
-    steepest=f8,  # bound of gradients in cells of meshes, see `basins.cell_sides.gradient_share`
-    n=i8,  # number of cells
-    nx=i8,  # columns and rows of a rectangle; 0 for other meshes
-    ny=i8,
-    faces=i8,  # number of faces of a mesh, the last ones on the boundary
-    outer=i8,  # number of faces on the boundary
-    y=i8,  # first state; quantities follow each other, a row of cells each
-    spacing=i8,  # offset in `plane` of 1 / widths of columns, then of rows [1/m]
-    plan=i8,  # offset in `plane` of constant data, rows of cells
-    area=i8,  # offset in `plane` of areas of cells [m2]
-    # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
-    reflect=i8,
-    outer_given=i8,  # number of these values: 0 if the whole boundary is wall
-    through=i8,  # offset in `work` of inflows through faces of the boundary; -1 if none is open
-    # offset in `work` of rates that are computed only for flows through the boundary
-    boundary_rates=i8,
-    mesh=i8,  # offset in `plane` of numbers of a mesh
-    links=i8,  # offset in `integers` of numbers of a mesh
-    work=i8,  # offset of its part of `work`
-    thickness=f8,  # [m]
-    speed=f8,  # wave speed in a liquid at rest [m/s]
-    density=f8,  # of a liquid at rest [kg/m3]
-    table=i8,  # offset in `plane` of the table of its waves under law table
-    small=f8,  # square of a negligible value
-    carried=i8,  # first state of scalars, depth times value, scalar after scalar; -1 for none
-    lost=i8,  # offset of its cells among the losses of a scalar
-    # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
-    flows=i8,
-    outside=i8,  # offset in `work` of values of each scalar beyond the boundary
-    scalar_work=i8,  # offset in `work` of work arrays for scalars
-    fastest=f8,  # rate of a given velocity [1/s]
-    period=f8,  # period of the reversal of a given velocity [s]; 0 for none
-    friction=i8,  # NO_DRAG, MANNING or DARCY
-    roughness=i8,  # offset in `plane` of Manning's n or the friction factor of cells
-    held=f8,  # bound of the rate of friction [1/s]; infinity if it does not limit steps
-    damped=i8,  # 1 if rates are divided by 1 + h r of friction, which then does not limit steps
-    unsplit=f8,  # rate of its cells for the step limit over the rate from the kernels
-    rest=f8,  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
-    wall=i8,  # first of its moving walls
-    # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
-    walls=i8,
-    drawn=i8,  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
-    stretch=i8,  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
-    lines=i8,  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
-    thrust=i8,  # offset in `work` of forces on boundary faces, see `free_surface.surface_grid`
-    turn=i8,  # 0 if grid lines move along x, 1 if along y
-    body=i8,  # body that carries it; -1 for none
-    # 1 if its load acts on that body: forces move the body, or the joint load is an output
-    loads_body=i8,
-    frame=i8,  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
-    corners=i8,  # number of corners of a mesh
-    # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
-    places=i8,
-    sides=i8,  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
-    ends=i8,  # offset in `integers` of corners of sides and cells, see `moving_meshes`
-    # offset in `work` of flows at faces of driven patches, see `free_surface.patch_closures`; -1 for none
-    driven=i8,
-    rain=i8,  # schedule of the mean rate of rain; -1 for none
-    frames=i8,  # number of frames of rates of rain in cells; 0 for uniform rain
-    frame_rates=i8,  # offset in `plane` of these rates, a row of cells for each frame [m/s]
-    frame_position=i8,  # schedule of the position among frames, from 0 for the first
-    # offset in `work` of the present numbers of rain and soil, see `free_surface.water_sources`
-    present=i8,
-    rained=i8,  # state: height of rain since the start [m]
-    soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON or GREEN_AMPT
-    # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
-    soil_numbers=i8,
-    # length of each row of these numbers: the number of cells, or less for a uniform soil
-    soil_row=i8,
-    soil_work=i8,  # offset in `work` of rates of infiltration in cells, for probes
-    # first state of infiltrated heights of cells [m]; those of condensed times follow
-    infiltrated=i8,
-    source=i8,  # first of its rows in the ledger of rain and infiltration
-    total_area=f8,  # of all cells [m2]
-    # offset in `maxima` of greatest values of its cells, see `free_surface.surface_maxima`; -1 for none
-    maxima=i8,
-    maxima_row=i8,  # number of these for each row of cells; a mesh is one row
-    wet_depth=f8,  # depth above which a cell counts as wet there [m]
-    # offset in `integers` of faces with walls or in sections, see `free_surface.marked_faces`; -1 for none
-    marked=i8,
-    mark_rows=i8,  # number of rows of faces there
-    marks=i8,  # number of marks; on a mesh each face has two
-    marked_faces=i8,  # number of marked faces
-    crests=i8,  # offset in `plane` of their crests, heights and sizes
-    marked_work=i8,  # offset in `work` of flows through marked faces
-    sections=i8,  # 1 if there are sections, whose flows rows need
-)
-NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT = range(4)
-NO_DRAG, MANNING, DARCY = 0, 1, 2
-PATCHES = record(
-    basin=i8,
-    node=i8,
-    first=i8,  # offset of its cells in `integers`
-    count=i8,  # number of its cells
-    sizes=i8,  # offset in `plane` of the present area of these [m2] and length of its faces [m]
-    # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
-    ring=i8,
-    faces=i8,  # number of its faces
-    # Offset in `plane` of outward normals along x, along y, and length over area of cells, for each face; with
-    # moving walls also those as drawn.
-    normals=i8,
-    open=i8,  # 1 if it is not a wall and joins no link: its flow is that of the boundary
-    moves=i8,  # 1 if it is a moving wall
-    # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
-    values=i8,
-    # Offset in `integers` of the cells next inside those behind its faces, a cell itself if there is none; of an
-    # interior patch, its own cells at the faces around it. On a mesh the nearest cells around each cell behind.
-    second=i8,
-    stencil=i8,  # number of cells of `second` for each face
-    # on a mesh: offset in `plane` of their weights, see `free_surface.patch_closures.read_around`
-    weights=i8,
-    # Offset in `integers` of the faces before and after each face along a driven patch of a mesh; -1 if not needed.
-    neighbours=i8,
-    closure=i8,  # NO_CLOSURE, or the closure of a driven patch
-    drive=i8,  # schedule of its stage or discharge
-    depth=i8,  # schedule of the depth of supercritical inflow; -1 for none
-    numbers=i8,  # offset in `plane` of the levels of a rating, then of its flows
-    points=i8,  # number of these levels
-    conveyance=i8,  # offset in `plane` of sqrt(slope) / n of uniform flow at its faces [m^(1/3)/s]
-    valve=i8,  # restriction from the junction of its links to its cells
-    # offset in `work` of the states inside its faces, see `free_surface.patch_closures.faces_of`
-    inside=i8,
-    rest=f8,  # level at rest above the elevation of the basin [m]
-    lowest=f8,  # lowest bed of its cells above the level at rest, at least 0 [m]
-)
-NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED, INTERIOR = range(8)
-
-WALL = record(
-    basin=i8,
-    node=i8,  # node of its patch
-    y=i8,  # offset of its travel since the start [m]
-    mass=i8,  # row of the force on what moves with it, among the net forces in `out`; -1 for none
-    body=i8,  # frame on which it pushes; -1 for none
-    rate=i8,  # offset in y of its speed; -1 for none
-    speed=f8,  # at the start [m/s]
-    toward=f8,  # 1 if this speed is in the direction of the wall, -1 if in the opposite
-    inertia=f8,  # of what moves with it [kg]
-    lightness=f8,  # 1 / inertia, 0 for a fixed wall [1/kg]
-    schedule=i8,  # schedule of its travel; -1 for none
-    # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
-    weights=i8,
-    faces=i8,  # offset in `integers` of its face numbers on the boundary
-    count=i8,  # number of its faces
-    lengths=i8,  # offset in `plane` of lengths of its faces [m]
-    outward=f8,  # 1 if its travel is positive outward, -1 inward
-    rest=f8,  # force of the profile on it [N]
-)
-
-SCALAR = record(
-    # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
-    y=i8,
-    places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
-    # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
-    wall_masses=i8,
-    diffusivity=f8,
-    decay=f8,  # [1/s]
-    ambient=f8,  # value to which it decays
-    loss=i8,  # first of its rows in the ledger of decay
-    # Number of these rows: 0 without decay, 1, or a row for each state if steps are implicit, because rows of the
-    # Jacobian must depend on few states.
-    losses=i8,
-    initial=f8,  # inflow value if no other is given
-    least=f8,  # bounds of all possible values
-    greatest=f8,
-    molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
-    specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
-    zero=f8,  # absolute temperature at which its value is 0 [K]
-    # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
-    by_cell=i8,
-)
-
-HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
-    valve=i8,
-    device=i8,  # device whose further dissipation is included; -1 for none
-)
-
-EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node
-    node=i8,
-    place=i8,  # row of the temperature of the thermal node, see `features.networks`
-    conductance=f8,  # [W/K]
-    effectiveness=f8,
-    slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
-)
-
-REACTION = record(
-    program=i8,  # header row of the formula of its rate in `pieces`; -1 for mass action
-    scalars=i8,  # offset of the numbers of its scalars in `integers`
-    count=i8,  # number of these
-    # offset in `floats` of three numbers of each scalar: both orders, and its change in its own unit
-    data=i8,
-    extent=i8,  # first of its rows in the ledger of reactions
-    extents=i8,  # number of these rows: 1, or a row for each place, see SCALAR
-    limits=i8,  # 1 if its rate limits steps
-    forward=f8,  # constants of mass action [(mol/m3)^(1 - order)/s]
-    reverse=f8,
-    thermal=f8,  # R T [J/mol]
-)
-FORWARD_ORDER, REVERSE_ORDER, CHANGE = 0, 1, 2
 
 CLOCK = record(
     limit=f8,  # end of the segment: schedules take their left limit from here on [s]
@@ -606,14 +402,7 @@ RECORDS = {
     "schedules": SCHEDULE,
     "probes": PROBE,
     "devices": DEVICE,
-    "basins": BASIN,
-    "patches": PATCHES,
-    "scalars": SCALAR,
-    "heat_sources": HEAT_SOURCE,
-    "exchangers": EXCHANGER,
-    "walls": WALL,
     "couplings": COUPLING,
-    "reactions": REACTION,
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.

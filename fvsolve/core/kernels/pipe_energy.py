@@ -20,7 +20,6 @@ from fvsolve.core.kernels.density.steady_profile import rise_at
 from fvsolve.core.kernels.dtypes import JUNCTION, MUSCL, SHORT, UPWIND, WENO5
 from fvsolve.core.kernels.pipes import scheme_family
 from fvsolve.core.kernels.steady_friction import drag
-from fvsolve.core.kernels.viscosity import cell_reynolds
 from fvsolve.jit import njit
 
 GAUSS_POINTS = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
@@ -104,9 +103,11 @@ def pipe_power(t, y, dydt, out, tables, k, rows):
     dl = dydt[o + n : o + 2 * n]
     width, per = polynomial_width(st, n), 1.0 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
+    present = pipe["present"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = cell_reynolds(y, tables, k, i)
+        # A feature may have written the number of each cell.
+        reynolds = pipe["reynolds"] if present < 0 else tables.work[present + i]
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
@@ -191,9 +192,11 @@ def pipe_power_barotropic(t, y, dydt, out, tables, k, rows):
     width = polynomial_width(st, n)
     dx = pipe["dx"]
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
+    present = pipe["present"]
     friction, rate = 0.0, 0.0
     for i in range(n):
-        reynolds = cell_reynolds(y, tables, k, i)
+        # A feature may have written the number of each cell.
+        reynolds = pipe["reynolds"] if present < 0 else tables.work[present + i]
         for g in range(3):
             a, b = at_point(r, width, i, g), at_point(l, width, i, g)
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)

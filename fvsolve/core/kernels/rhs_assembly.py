@@ -37,7 +37,7 @@ class RhsTerms(NamedTuple):
     move: str = ""  # rates of columns, devices, and what moves
     rates: str = ""  # rates of cells
     boundary_exchange: str = ""  # exchange between bands of flows through boundaries
-    boundary_inflow: str = ""  # flows into cells through patches
+    boundary_inflow: str = ""  # flows into cells through the boundary
     accelerate: str = ""  # accelerations of frames that move, from all forces
     fluid_response: str = ""  # terms that depend on the accelerations of frames
     outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells
@@ -187,7 +187,7 @@ class ModelFeatures(NamedTuple):
     bands : True if threads or processes step bands of the state
     boundary_exchange : True if several bands have an open boundary
     forces : True if forces on pipes are probed
-    device_heat : True if the dissipation of devices heats the fluid
+    device_hooks : names of further functions of laws that functions of features call, keys of `calls.HOOKS`
     other fields : True if the model has such parts or properties
     """
 
@@ -208,7 +208,7 @@ class ModelFeatures(NamedTuple):
     boundary_exchange: bool = False
     forces: bool = False
     formulas: bool = False
-    device_heat: bool = False
+    device_hooks: tuple[str, ...] = ()
 
     def components(self) -> Iterator[RhsTerms]:
         """Yield the terms (`RhsTerms`) of all components of the model, in the order in which the functions run."""

@@ -221,13 +221,13 @@ def profile_size(draft: ModelDraft) -> int:
     """Size of the array `profile`, with data of the initial steady state along pipes; sets the offsets of each pipe.
 
     It starts with the sum of both waves at which each cell reaches vapour pressure [kg/s]. Under the density law
-    `linear`, masses per length at centres follow if the case has scalars. Under other density laws, each pipe adds
+    `linear`, masses per length at centres follow if a feature reads them. Under other density laws, each pipe adds
     masses per length at faces [kg/m], momentum fluxes at faces [N], masses per length at centres and, unless it is
     straight, rises above its `from` end [m].
     """
     at = draft.cells
     if draft.case.law.linear:
-        return 2 * at if draft.case.scalars else at
+        return 2 * at if any(feature.reads_masses for feature in draft.features) else at
     for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
         n = row["cells"]
         row["face"], row["flux"], row["center"] = at, at + n + 1, at + 2 * n + 2
@@ -283,14 +283,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         schedules=schedules,
         probes=draft.probe_table,
         devices=draft.device_table,
-        basins=draft.basin_table,
-        patches=draft.patch_table,
-        scalars=draft.scalar_table,
-        heat_sources=draft.heat_source_table,
-        exchangers=draft.exchanger_table,
-        walls=draft.wall_table,
         couplings=draft.coupling_table,
-        reactions=draft.reaction_table,
         integers=np.array(draft.integers, dtype=np.int64),
         floats=np.array(draft.floats, dtype=float),
         profile=profile,
@@ -372,10 +365,6 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["from_arriving"] = case.numerics.scheme == "upwind" and case.numerics.method == "euler"
     s["viscosity"] = draft.fluid.viscosity or 0.0
-    if (draft.scalar_table["specific_heat"] > 0.0).any():
-        s["temperature"] = int(draft.scalar_table["specific_heat"].argmax())
-        if draft.fluid.walther is not None:
-            s["walther_a"], s["walther_b"] = draft.fluid.walther
     s["start"] = case.numerics.start
     s["reads_solved"] = any(feature.reads_solved for feature in draft.features)
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity

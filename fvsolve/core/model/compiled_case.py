@@ -249,11 +249,11 @@ class CompiledCase:
             alone,
             forces=bool(self.layout["forces"] >= 0),
             formulas=bool((self.tables.schedules["pieces"] < 0).any()),
-            device_heat=bool((self.tables.heat_sources["device"] >= 0).any()),
         )
         terms = tuple(pair for feature in self.features for pair in feature.terms(self, cast))
         packages = tuple(name for feature in self.features for name in feature.packages)
-        cast = cast._replace(features=terms, further_packages=packages)
+        hooks = tuple(name for feature in self.features for name in feature.device_hooks)
+        cast = cast._replace(features=terms, further_packages=packages, device_hooks=hooks)
         return functions(cast)
 
     @property

@@ -197,9 +197,13 @@ def inputs_of(model: Model) -> dict[str, Input]:
     parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
     parts |= {name: link for name, link in case.links.items() if name not in parts}
     inputs: dict[str, Input] = {}
+    of_features = {
+        name: value for feature in model.features for name, value in feature.inputs(model).items()
+    }
     for name, part in parts.items():
         own = lowering_of(type(part)).of(part).inputs(model, name, part)
         inputs |= {f"{name}.{key}": value for key, value in own.items()}
-    for feature in model.features:
-        inputs |= feature.inputs(model)
-    return inputs
+        inputs |= {
+            key: value for key, value in of_features.items() if key.rpartition(".")[0] == name
+        }
+    return inputs | of_features

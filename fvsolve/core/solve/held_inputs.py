@@ -19,7 +19,7 @@ class HeldModel:
     """Copy of a model with some inputs held at constant values; the values can be changed.
 
     model : the copy; names : names of the inputs
-    fixed : True if a loop of the copy depends on the values from its start: limits of scalars, step limits of meshes
+    fixed : True if a loop of the copy depends on the values from its start: bounds of values, step limits of meshes
     Raises FvsolveError for an unknown input.
     """
 
@@ -34,7 +34,7 @@ class HeldModel:
                 raise FvsolveError(f"no input named {show(name)}{hint}")
         self.targets, tables = [known[name] for name in self.names], model.tables
         self.fixed = bool(self.targets) and (
-            bool(model.meshed) or any(target.scalar >= 0 for target in self.targets)
+            bool(model.meshed) or any(target.bounds is not None for target in self.targets)
         )
         schedules = tables.schedules.copy()
         nodes = tables.nodes.copy()
@@ -52,10 +52,9 @@ class HeldModel:
             # under the linear law a head becomes a pressure
             if target.node >= 0 and not self.linear:
                 nodes["head_given"][target.node] = target.sort is HEAD
-        scalars, features = tables.scalars.copy(), [feature.to_hold() for feature in model.features]
-        changed = {"schedules": schedules, "nodes": nodes, "scalars": scalars, "pieces": pieces}
-        # views that stay writable, while the tables of a model are read-only
-        self.values, self.bounds = pieces[first:, 3], scalars[:]
+        features = [feature.to_hold() for feature in model.features]
+        changed = {"schedules": schedules, "nodes": nodes, "pieces": pieces}
+        self.values = pieces[first:, 3]  # a view that stays writable, while tables are read-only
         self.of_features = {feature.slot: values for feature, values in features}
         self.model = replace(
             model, tables=tables._replace(**changed), features=[feature for feature, _ in features]
@@ -75,8 +74,9 @@ class HeldModel:
             values = [number, *(max(0.0, a * number + b) for _, a, b in target.parts)]
             self.values[row : row + len(values)] = values
             row += len(values)
-            if target.scalar >= 0:  # values of a scalar are limited to its bounds
-                bounds = self.bounds[target.scalar]
+            if target.bounds is not None:
+                slot, place = target.bounds
+                bounds = self.of_features[slot][place]
                 bounds["least"], bounds["greatest"] = (
                     min(bounds["least"], number),
                     max(bounds["greatest"], number),

@@ -25,10 +25,11 @@ def energy_refusal(case, feature) -> str:
     return ""
 
 
-def end_accounts(accounts, basins: list) -> None:
-    """Add the accounts of moving walls, then those of basins, in the order of `kernels.energy_rows`."""
+def end_accounts(accounts, own) -> None:
+    """Add the accounts of moving walls, then those of basins, in the order of `energy_rows`. own : the feature"""
+    basins = own.meshed
     names = [f"{basin.name}.{patch}" for basin in basins for patch in basin.walls]
-    for name, row in zip(names, accounts.model.tables.walls, strict=True):
+    for name, row in zip(names, own.walls, strict=True):
         at = accounts.take(2)
         if row["mass"] < 0 and row["body"] < 0:
             accounts.add("supplied", name, "wall", at)

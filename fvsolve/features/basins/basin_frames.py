@@ -14,10 +14,10 @@ accelerations along z away from the origin, and vertical momentum: both are of t
 length.
 """
 
-from fvsolve.core.kernels.dtypes import GN, NO_WEIGHT, STATUS, WHERE
+from fvsolve.core.kernels.dtypes import NO_WEIGHT, STATUS, WHERE
 from fvsolve.core.kernels.moving_frames import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.vectors import cross, rotate
+from fvsolve.features.basins.tables import GN, open_basins
 from fvsolve.jit import inline, njit
 
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].
@@ -40,7 +40,7 @@ def set_frames(t, y, dydt, out, handle):
 
     The status is set to NO_WEIGHT if the water of such a basin has no weight along the normal of its bed.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["frame"] >= 0:

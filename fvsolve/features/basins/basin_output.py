@@ -15,9 +15,9 @@ from math import sqrt
 
 from fvsolve.core.kernels.density import density
 from fvsolve.core.kernels.dtypes import PATCH_FLOW
-from fvsolve.core.kernels.energy_rows import BASIN_ROWS, basin_power_row
 from fvsolve.core.kernels.network_energy import total_pressure
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.basins.energy_rows import BASIN_ROWS, basin_power_row
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 # fields of velocities; numbers from FIRST_OWN on are fields of the physics
@@ -33,7 +33,7 @@ def velocity_value(field, u, v):
 @njit
 def observe_flows(t, y, out, handle, values):
     """Write the values of the probes of flows through patches [m3/s], under the density law `linear`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     probes = tables.probes
     for k in range(probes.size):
         if probes[k]["kind"] == PATCH_FLOW:
@@ -46,7 +46,7 @@ def observe_dense_flows(t, y, out, handle, values):
 
     The volume flow is that at the density of the liquid at the patch.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st = tables.settings[0]
     probes = tables.probes
     at = tables.layout[0]["pressure"]
@@ -79,7 +79,7 @@ def rest_potential(st, basin):
 @njit
 def patch_power(t, y, dydt, out, handle, power):
     """Set the entries of basins in `power` to zero, and add the power of the inflow through all patches [W]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     rho = tables.settings[0]["rho"]
     patches = tables.patches
     layout = tables.layout[0]

@@ -6,9 +6,8 @@ Compiled functions of a type of basin recognise its basins by a code (`physics_c
 from zlib import crc32
 
 from fvsolve.core.kernels import band_exchange
-from fvsolve.core.kernels.dtypes import DISCHARGE, GN
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.boundary_cells import patch_inflow
+from fvsolve.features.basins.tables import DISCHARGE, GN, open_basins
 from fvsolve.jit import njit
 
 # mass flow from outside up to which a patch is not short of water [kg/s]: rounding
@@ -55,7 +54,7 @@ def put_boundary_flows(t, y, dydt, out, handle):
 
     Basins with a given velocity are left out, as their flows are not computed.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -75,7 +74,7 @@ def record_patches(t, y, out, handle, values):
     At a patch with a scheduled discharge it is the first time at which this is held at critical outflow. Other open
     patches are excluded.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     patches = tables.patches
     marks = tables.marks
     nodes = tables.nodes

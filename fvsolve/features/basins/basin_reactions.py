@@ -7,10 +7,10 @@ from fvsolve.core.kernels.dtypes import (
     RATE_UNWANTED,
     REACTION_VALUE,
 )
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.advection import THIN
 from fvsolve.features.basins.basin_scalars import cell_value
 from fvsolve.features.basins.cell_sides import deviations_of
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.features.scalars.kernels.reactions import (
     add_observed,
     affinity_of,
@@ -42,7 +42,7 @@ def mass_per_depth(tables, basin, i):
 @njit
 def add_reactions(t, y, dydt, out, handle):
     """Add changes by reactions to the rates of scalars in all basins; write rates of reactions to the ledger."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         seen, n = deviations_of(basin, tables.seen, y), basin["n"]
@@ -67,7 +67,7 @@ def add_reactions(t, y, dydt, out, handle):
 @njit
 def limit_rates_in_basins(t, y, dydt, out, handle):
     """Raise the greatest rate of change by reactions in `out` to that in basins, if it limits steps [1/s]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     at = tables.layout[0]["quickest"]
     for b in range(
         tables.basins.size
@@ -85,7 +85,7 @@ def limit_rates_in_basins(t, y, dydt, out, handle):
 @njit
 def observe_reactions_in_basins(t, y, out, handle, values):
     """Write the values of probes of reactions to `values`, with places in basins."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for j in range(tables.probes.size):
         probe, sums = tables.probes[j], tables.scratch[:4]
         k = probe["index"]

@@ -8,17 +8,8 @@ amounts per area.
 from math import cos, pi
 
 from fvsolve.core.kernels import stage_sums
-from fvsolve.core.kernels.dtypes import (
-    CELL_SCALAR,
-    GIVEN_FLOW,
-    INTERIOR,
-    MUSCL,
-    NO_CLOSURE,
-    RATE,
-    UPWIND,
-)
+from fvsolve.core.kernels.dtypes import CELL_SCALAR, GIVEN_FLOW, MUSCL, RATE, UPWIND
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import advection, fifth_order
 from fvsolve.features.basins.advection import DRY, AdvectionGrid, GridFlows
 from fvsolve.features.basins.advection_faces import MeshFlows, advection_rates
@@ -31,6 +22,7 @@ from fvsolve.features.basins.boundary_cells import (
     weighted_volume,
 )
 from fvsolve.features.basins.cell_sides import deviations_of
+from fvsolve.features.basins.tables import INTERIOR, NO_CLOSURE, open_basins
 from fvsolve.features.scalars.kernels.scalar_transport import change_rate, record_loss
 from fvsolve.jit import njit
 
@@ -53,7 +45,7 @@ def patch_values(t, y, dydt, out, handle):
     It is the mean over the cells at the patch, with the weights area times `flow_weight`; with the areas alone as
     weights in a basin without depth, or if all cells are dry.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     nodes, value = tables.nodes.size, tables.layout[0]["value"]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -77,7 +69,7 @@ def patch_values(t, y, dydt, out, handle):
 @njit
 def observe_values(t, y, out, handle, values):
     """Write the values of the probes of scalars at points of basins to `values`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == CELL_SCALAR:
@@ -95,7 +87,7 @@ def observe_given_flows(t, y, out, handle, values):
 
     It is 0 at patches without flow.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:
             patch = tables.patches[tables.probes[k]["index"]]
@@ -208,7 +200,7 @@ def advect_on_grids(t, y, dydt, out, handle):
 
     out[RATE], which limits the step, is raised. Requested stage sums are formed too.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if not on_grid(basin, dydt):
@@ -272,7 +264,7 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
 
     The fluxes of weno5 are limited to keep the bounds of the scalars, see `fifth_order.add_fifth_order`.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if not on_grid(basin, dydt):
@@ -294,7 +286,7 @@ def add_fifth_order_on_grids(t, y, dydt, out, handle):
 @njit
 def diffuse_on_grids(t, y, dydt, out, handle):
     """Add diffusion to the rates of the amounts of all scalars in grids; raise out[RATE], which limits the step."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if not on_grid(basin, dydt):
@@ -319,7 +311,7 @@ def advect_on_meshes(t, y, dydt, out, handle):
 
     out[RATE], which limits the step, is raised.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     scalars = tables.scalars
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -356,7 +348,7 @@ def advect_on_meshes(t, y, dydt, out, handle):
 @njit
 def add_sources(t, y, dydt, out, handle):
     """Add decay and flows of links to the rates of all scalars; write losses by decay and boundary flows to `out`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         seen = deviations_of(basin, tables.seen, y)

@@ -8,35 +8,47 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.core.assembly import lowering
 from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.model_draft import aligned_zeros
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import lower
+from fvsolve.features.basins.tables import DISCHARGE, EMPTY, STAGE, BasinTables
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 
 # functions of the loads on bodies of water at rest, and of water at rest on moving walls
 LOADS_AT_REST = ("basin_frames: set_frames", "frame_forces: add_frame_forces")
 WALL_LOADS = ("moving_walls: push_bodies_at_rest",)
 PACKAGE = "fvsolve.features.basins"
+# closure of a patch -> key of its input, and kind of the input
+INPUTS = {DISCHARGE: ("discharge", lowering.FLOW), STAGE: ("stage", lowering.STAGE)}
 
 
 class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
-    """Basins of a case. meshed : `BasinRows` of each, in the order of their table; walls : table of moving walls"""
+    """Basins of a case.
+
+    meshed : `BasinRows` of each, in the order of their table; wall_names : names of moving walls, BASIN.PATCH
+    basins, patches, walls : see `tables`
+    """
 
     def __init__(self, case, given_up=()) -> None:
         super().__init__(case, given_up)
         self.meshed: list[Any] = []
-        self.walls = np.zeros(0, rec.WALL)
+        self.basins, self.patches, self.walls, *_ = EMPTY
+        self.wall_names: list[str] = []
+
+    def tables(self) -> BasinTables:
+        """Tables as compiled functions read them, without scalars."""
+        return EMPTY._replace(basins=self.basins, patches=self.patches, walls=self.walls)
 
     # build ----------
 
     def lower_behind_nodes(self, draft) -> None:
         lower.lower_basins(draft, self)
-        self.walls = draft.wall_table
 
     def probe(self, draft, probe, row) -> bool:
         from fvsolve.features.basins.lower_probes import lower_probe
 
-        return lower_probe(draft, self.meshed, probe, row)
+        return lower_probe(draft, self, probe, row)
 
     def change_settings(self, draft, settings) -> None:
         if draft.case.patches_with_faces:
@@ -48,7 +60,7 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
             )
 
     def reserve(self, draft) -> None:
-        lower.reserve_basins(draft)
+        lower.reserve_basins(draft, self)
 
     def start(self, draft, y: np.ndarray) -> None:
         lower.start_basins(self.meshed, y)
@@ -57,11 +69,15 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
         ]
 
     def level(self, draft, y: np.ndarray, attitudes=None) -> list[str]:
-        names = list(WALL_LOADS) if (draft.wall_table["body"] >= 0).any() else []
+        names = list(WALL_LOADS) if (self.walls["body"] >= 0).any() else []
         if any(basin.row["frame"] >= 0 for basin in self.meshed):
             lower.start_basins(self.meshed, y, None if attitudes is None else attitudes())
             names = [*LOADS_AT_REST, *names]
         return [f"{PACKAGE}.{name}" for name in names]
+
+    def close(self, draft) -> None:
+        for table in (self.basins, self.patches, self.walls):
+            table.flags.writeable = False
 
     def copy_for(self, case) -> Basins:
         own = copy.copy(self)
@@ -121,16 +137,26 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
                 ledger[1, k] = -basin.mass_in_soil(y)
 
     def open_nodes(self, model) -> set[int]:
-        return {int(row["node"]) for row in model.tables.patches if row["open"]}
+        return {int(row["node"]) for row in self.patches if row["open"]}
+
+    def inputs(self, model) -> dict[str, lowering.Input]:
+        found = {}
+        for row in self.patches:
+            key, sort = INPUTS.get(int(row["closure"]), ("", None))
+            if key:
+                found[f"{model.node_names[row['node']]}.{key}"] = lowering.Input(
+                    sort, int(row["drive"])
+                )
+        return found
 
     def driven(self) -> set[int]:
         return {int(k) for k in self.walls["schedule"]}
 
-    def held_tables(self, tables, t: float) -> dict[str, np.ndarray]:
-        """Tables in which given velocities that reverse periodically are held."""
-        if not any(row["period"] > 0.0 for row in tables.basins):
-            return {}
-        basins, plane = tables.basins.copy(), tables.plane.copy()
+    def held(self, tables, t: float, smooth: bool) -> tuple[Basins, dict[str, np.ndarray]]:
+        if not any(row["period"] > 0.0 for row in self.basins):
+            return self, {}
+        # given velocities that reverse periodically
+        own, basins, plane = copy.copy(self), self.basins.copy(), tables.plane.copy()
         for basin, row in zip(self.meshed, basins, strict=True):
             if row["period"] > 0.0:
                 grid = basin.mesh.grid
@@ -142,7 +168,9 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
                 factor = np.cos(np.pi * t / row["period"])
                 plane[row["flows"] : row["flows"] + faces] *= factor
                 row["fastest"], row["period"] = abs(factor) * row["fastest"], 0.0
-        return {"basins": basins, "plane": plane}
+        basins.flags.writeable = False
+        own.basins = basins
+        return own, {"plane": plane}
 
     def energy_refusal(self) -> str:
         from fvsolve.features.basins.accounts import energy_refusal
@@ -152,7 +180,7 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
     def end_accounts(self, accounts) -> None:
         from fvsolve.features.basins.accounts import end_accounts
 
-        end_accounts(accounts, self.meshed)
+        end_accounts(accounts, self)
 
     def add_fields(self, fields: dict, model, y: np.ndarray, out: np.ndarray) -> None:
         for basin in self.meshed:
@@ -169,7 +197,17 @@ class Basins(Feature, slot=4, wakes="kind basin, kind conduit"):
 
 
 class BasinRun(FeatureRun):
-    """Tables of basins whose geometry changes with time, in a run."""
+    """Tables in a run. basins : that of basins, a copy for each run, because studies of energy change it"""
+
+    def __init__(self, feature: Basins, run_data) -> None:
+        super().__init__(feature, run_data)
+        self.basins = feature.basins.copy()
+
+    def tables(self, view: str = "") -> BasinTables:
+        carried = scalar_tables(self.run_data.model)
+        return self.feature.tables()._replace(
+            basins=self.basins, scalars=carried.scalars, reactions=carried.reactions
+        )
 
     def written_tables(self) -> dict[str, np.ndarray]:
         tables = self.run_data.model.tables
@@ -177,17 +215,17 @@ class BasinRun(FeatureRun):
             return {}
         plane = aligned_zeros(tables.plane.size)
         plane[:] = tables.plane
-        return {"plane": plane, "basins": tables.basins.copy()}
+        return {"plane": plane}
 
     def for_energy(self) -> None:
-        if any(basin.row["frame"] >= 0 for basin in self.feature.meshed):
-            self.run_data.tables.basins["loads_body"] = 1
+        self.basins["loads_body"] = 1
 
     def critical_outflows(self, i: int) -> list[float]:
         tables = self.run_data.tables
         work = self.run_data.written.work
         found = []
-        for patch in tables.patches[tables.patches["valve"] >= 0]:
+        patches = self.feature.patches
+        for patch in patches[patches["valve"] >= 0]:
             basin = self.feature.meshed[patch["basin"]]
             if tables.valves["from_node"][patch["valve"]] == i and hasattr(
                 basin, "greatest_outflow"
@@ -196,8 +234,8 @@ class BasinRun(FeatureRun):
         return found
 
     def held_marks(self, start: float, t: float, entered: np.ndarray) -> list:
-        if not np.isin(self.run_data.tables.patches["closure"], lower.HELD).any():
+        if not np.isin(self.feature.patches["closure"], lower.HELD).any():
             return []
         from fvsolve.features.basins.held_discharges import held_discharges
 
-        return held_discharges(self.run_data, start, t, entered)
+        return held_discharges(self.run_data, self.feature.patches, start, t, entered)

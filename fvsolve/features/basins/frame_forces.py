@@ -31,7 +31,6 @@ the deviation of depth from rest, 0 for the depth at rest; twice : 2 W_z [1/s]; 
 from fvsolve.core.kernels import moving_frames as body
 from fvsolve.core.kernels.dtypes import LAW_LINEAR, RATE, TANK_OUT
 from fvsolve.core.kernels.moving_frames import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, body_row
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.core.kernels.vectors import cross, dot, rotate, rotate_back, write_vector
 from fvsolve.features.basins import basin_frames as frame
 from fvsolve.features.basins.basin_frames import (
@@ -42,6 +41,7 @@ from fvsolve.features.basins.basin_frames import (
 )
 from fvsolve.features.basins.basin_output import basin_first_row
 from fvsolve.features.basins.free_surface.surface_energy import velocity_factor
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import inline, njit
 
 
@@ -53,7 +53,7 @@ def add_frame_forces(t, y, dydt, out, handle):
     `loads_body` is 1: forces move the body, a probe observes the load of a joint, or energy is computed. The Coriolis
     rate 2 W_z raises out[RATE], which limits the step. If `dydt` is empty, the rates are those in `tables.work`.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["frame"] < 0:
@@ -75,7 +75,7 @@ def correct_for_bodies(t, y, dydt, out, handle):
 
     The inertia is that at the present depth or density, under all density laws.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         if basin["frame"] < 0:
@@ -407,7 +407,7 @@ def add_power(t, y, dydt, out, handle, power):
 
     The rate of storage and the power that the model dissipates are written to the entries of `basin_output` too.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     plane = tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -516,7 +516,7 @@ def add_stored(t, y, dydt, out, handle, stored):
     The potential energy is zero at elevation 0. For a liquid the result is added to the entry of `stored`, the energy
     of the liquid in axes of the basin. For water with a free surface it replaces the entry.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     plane = tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.solve.run_summary import Mark, scheduled_volume
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.lower import HELD
 
 HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or from an interior patch
@@ -18,20 +18,23 @@ HELD_TEXTS = (  # of a scheduled outflow, and of an outflow through links or fro
 )
 
 
-def held_discharges(run_data, start: float, t: float, entered: np.ndarray) -> list[Mark]:
+def held_discharges(
+    run_data, patches: np.ndarray, start: float, t: float, entered: np.ndarray
+) -> list[Mark]:
     """Marks of patches whose scheduled outflow, or that of their links, is more than critical flow, which leaves.
 
-    start, t : times of start and end [s]; entered : float64[nodes]  mass that has entered at each node [kg]
+    patches : table of patches; start, t : times of start and end [s]
+    entered : float64[nodes]  mass that has entered at each node [kg]
     """
     model, marks = run_data.model, []
     times = run_data.marks[len(model.pipes) + len(model.node_names) :]
-    for row in model.tables.patches[np.isin(model.tables.patches["closure"], HELD)]:
+    for row in patches[np.isin(patches["closure"], HELD)]:
         name = model.node_names[row["node"]].removesuffix(".inside")
         time = float(times[row["node"]])
         if np.isfinite(time):
             basin, _, patch = name.partition(".")
             volume = float(entered[row["node"]]) / model.case.properties.density
-            linked = row["closure"] != rec.DISCHARGE
+            linked = row["closure"] != records.DISCHARGE
             if not linked:
                 volume -= scheduled_volume(
                     model.case.nodes[basin].patches[patch].discharge, start, t

@@ -6,9 +6,11 @@ import numpy as np
 
 from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.features.basins import tables as records
+from fvsolve.features.basins.energy_rows import BASIN_ROWS, WALL_ROWS
 
 # closures of patches whose outflow is held at critical flow
-HELD = (rec.DISCHARGE, rec.LINKED, rec.INTERIOR)
+HELD = (records.DISCHARGE, records.LINKED, records.INTERIOR)
 
 
 def lower_basins(draft, own) -> None:
@@ -18,27 +20,31 @@ def lower_basins(draft, own) -> None:
     """
     case = draft.case
     own.meshed = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
-    draft.basin_table = np.zeros(len(own.meshed), rec.BASIN)
-    for k, (basin, row) in enumerate(zip(own.meshed, draft.basin_table, strict=True)):
+    own.basins = np.zeros(len(own.meshed), records.BASIN)
+    for k, (basin, row) in enumerate(zip(own.meshed, own.basins, strict=True)):
         basin.number = k
         basin.lower_common(draft, row)
     if any(basin.moves for basin in own.meshed):
         from fvsolve.features.basins.lower_motion import lower_walls
 
-        lower_walls(draft)
+        lower_walls(draft, own)
     patches = [(name, place) for name, place in case.places.items() if place.kind == "patch"]
-    draft.patch_table, names = np.zeros(len(patches), rec.PATCHES), list(case.meshes)
-    for row, (name, place) in zip(draft.patch_table, patches, strict=True):
+    own.patches, names = np.zeros(len(patches), records.PATCHES), list(case.meshes)
+    for basin in own.meshed:
+        basin.all_patches = own.patches
+    for row, (name, place) in zip(own.patches, patches, strict=True):
         row["basin"], row["node"] = names.index(place.basin), draft.node_index[name]
         own.meshed[row["basin"]].lower_patch(draft, place.patch, row)
 
 
-def reserve_basins(draft) -> None:
+def reserve_basins(draft, own) -> None:
     """Reserve the arrays of basins and moving walls; rows of the ledger: rain, and negative infiltration."""
     sizes = draft.sizes
-    basins = len(draft.basin_table)
-    walls = len(draft.wall_table)
-    sizes.ledger("source", draft.sources)
+    basins = len(own.basins)
+    walls = len(own.walls)
+    sizes.ledger("source", len(own.sources))
+    sizes.last_power += WALL_ROWS * walls + BASIN_ROWS * basins
+    sizes.last_stored += basins
     sizes.out("wall", walls)
     sizes.out("tank", rec.TANK_OUT * basins if frames_of(draft) else 0)
     sizes.run_array("seen", draft.size if walls else 0)

@@ -10,6 +10,7 @@ import numpy as np
 from fvsolve.core.assembly.meshed_parts import MeshedPart
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.errors import listing
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.boundary_cells import BAND_MARGIN
 from fvsolve.features.basins.cell_sides import BLOCK, HEAD, INDICES
 
@@ -84,9 +85,9 @@ class BandedRows(MeshedPart):
         from fvsolve.features.basins.lower_pattern import cells_at_faces  # loads scipy
 
         integers, number = tables.integers, self.number
-        for patch in tables.patches[tables.patches["basin"] == number]:
+        for patch in self.all_patches[self.all_patches["basin"] == number]:
             yield integers[patch["first"] : patch["first"] + patch["count"]]
-            if patch["closure"] != rec.NO_CLOSURE:
+            if patch["closure"] != records.NO_CLOSURE:
                 yield cells_at_faces(integers, patch)
         probes = tables.probes
         for probe in probes[

@@ -20,6 +20,7 @@ from fvsolve.core.steppers.analysis.stability_properties import ssp_radius
 from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.features.basins import advection_faces
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.advection import DRY, advection_work, diffusion_work
 from fvsolve.features.basins.basin_output import SPEED, U, V
 from fvsolve.features.basins.basin_patches import physics_code
@@ -543,7 +544,7 @@ class BasinRows(BandedRows):
         states, none = int(self.row["y"]) + np.arange(self.n), NO_STATE
         if self.deep:
             yield bound_rows(states, none, none, self.at_rest(), 0.0, -1.0, np.inf)
-        if self.fades > 0.0 and self.row["friction"] != rec.NO_DRAG:
+        if self.fades > 0.0 and self.row["friction"] != records.NO_DRAG:
             for k in range(1, len(self.quantities)):
                 yield bound_rows(
                     states + k * self.n, states, none, self.at_rest(), 1.0, self.fades, -1.0

@@ -10,9 +10,9 @@ import numpy as np
 from fvsolve.case import moving_walls as case
 from fvsolve.case.bodies import carriers, free_joints, level_over
 from fvsolve.core.assembly.features import coordinate_of, frames_of
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.basins import basin_frames as frame
 from fvsolve.features.basins import cell_sides, moving_meshes
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.cell_sides import BLOCK
 from fvsolve.features.basins.moving_walls import VECTOR_MARGIN
 
@@ -268,14 +268,12 @@ def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarra
     return place + turn @ np.array(basin.part.place), turn @ basin.part.rotation
 
 
-def lower_walls(draft) -> None:
+def lower_walls(draft, own) -> None:
     """Fill the table of moving walls of a draft of a model, and add states for their travels."""
     parts = [(basin, patch) for basin in draft.meshed for patch in basin.walls]
-    draft.wall_table, draft.wall_names = (
-        np.zeros(len(parts), rec.WALL),
-        [f"{b.name}.{patch}" for b, patch in parts],
-    )
-    for row, (basin, patch) in zip(draft.wall_table, parts, strict=True):
+    own.walls = own.pushes_at_rest = np.zeros(len(parts), records.WALL)
+    own.wall_names = [f"{basin.name}.{patch}" for basin, patch in parts]
+    for row, (basin, patch) in zip(own.walls, parts, strict=True):
         stated, (axis, side) = basin.part.patches[patch], case.outward(basin.mesh, patch)
         row["basin"], row["outward"] = draft.meshed.index(basin), side
         row["node"] = draft.node_index[f"{basin.name}.{patch}"]
@@ -322,7 +320,7 @@ def lower_walls(draft) -> None:
         row["lengths"] = draft.to_plane(length)
         row["rest"] = float(np.sum(length * basin.thrust_at_rest()[wall_cells]))
     for k, basin in enumerate(draft.meshed):
-        faces_of_wall = np.flatnonzero(draft.wall_table["basin"] == k)
+        faces_of_wall = np.flatnonzero(own.walls["basin"] == k)
         basin.row["walls"], basin.row["wall"] = (
             faces_of_wall.size,
             faces_of_wall[0] if faces_of_wall.size else 0,

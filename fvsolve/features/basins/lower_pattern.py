@@ -4,10 +4,11 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.core.kernels import dtypes as rec
+from fvsolve.features.basins import tables as records
 
 STENCIL_RADIUS = 3  # stencil radius of the fifth order
 # closures of patches through whose faces the flow of links passes
-THROUGH_FACES = (rec.LINKED, rec.INTERIOR)
+THROUGH_FACES = (records.LINKED, records.INTERIOR)
 
 
 def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.core.kernels.dtypes import RATE
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import cell_sides as side
 from fvsolve.features.basins.cell_sides import (
     BLOCK,
@@ -32,6 +31,7 @@ from fvsolve.features.basins.cell_sides import (
     side_numbers,
 )
 from fvsolve.features.basins.moving_walls import size_patch
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 START, STOP, BEYOND, ENDS = range(4)
@@ -89,7 +89,7 @@ def ends_of(integers, basin):
 @njit
 def update_meshes(t, y, seen, out, handle):
     """Compute corners, centres, sides and patches of all meshes (not grids) between moving walls at the states y."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
             move_corners(tables, tables.basins[b], y)
@@ -334,7 +334,7 @@ def put_lengths(face, side_lengths, lengths):
 @njit
 def set_side_speeds(t, y, dydt, out, handle):
     """Write the speeds of all sides of moving meshes along their normals [m/s]; raise out[RATE] to limit the step."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
             out[RATE] = max(out[RATE], put_speeds(tables, tables.basins[b]))

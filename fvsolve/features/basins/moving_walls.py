@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.core.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
-from fvsolve.core.kernels.energy_rows import WALL_ROWS, wall_power_row
+from fvsolve.core.kernels.dtypes import NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.core.kernels.moving_frames import FORCE
 from fvsolve.core.kernels.moving_frames import body_row as row_of_body
 from fvsolve.core.kernels.schedule_pieces import schedule_slopes
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import cell_sides as stretching
 from fvsolve.features.basins.basin_output import basin_first_row
 from fvsolve.features.basins.cell_sides import BLOCK, MEASURES, blocks, row_across, stretch_of_cell
+from fvsolve.features.basins.energy_rows import WALL_ROWS, wall_power_row
+from fvsolve.features.basins.tables import NO_DRAG, open_basins
 from fvsolve.jit import njit
 
 # quantities of probes, in the order of `parts.basin.MovingWall`
@@ -51,7 +51,7 @@ def update_geometry(t, y, seen, out, handle):
     If the argument `seen` is empty, kernels of rates follow. Then, if the kernel of a basin reads the states
     themselves, only deviations next to patches and walls are computed, unless scalars or friction need all.
     """
-    tables, done = open_tables(handle), 0
+    tables, done = open_basins(handle), 0
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["walls"] > 0:
@@ -244,7 +244,7 @@ def set_line_speeds(t, y, dydt, out, handle):
     On other meshes the speeds are those of corners, and `moving_meshes.set_side_speeds` raises out[RATE]. The status is
     set to NO_WIDTH if a cell is narrower than LEAST_WIDTH times its undeformed width.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     plane, walls = tables.plane, tables.walls
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -338,7 +338,7 @@ def push_body(out, tables, wall, force):
 @njit
 def push_bodies_at_rest(t, y, dydt, out, handle):
     """Add the forces on walls in the steady start to the forces on the bodies that move with the walls."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.walls.size):
         if tables.walls[k]["body"] >= 0:
             push_body(out, tables, tables.walls[k], tables.walls[k]["rest"])
@@ -350,7 +350,7 @@ def add_wall_forces(t, y, dydt, out, handle):
 
     The waves that walls radiate raise out[RATE], which limits the step. On bodies, the forces at rest are added too.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     layout = tables.layout[0]
     walls = tables.walls
     st = tables.settings[0]
@@ -386,7 +386,7 @@ def stretch_scalar_rates(t, y, dydt, out, handle):
 
     A, A0 : present and undeformed area of a cell. The rates of other states are computed in that form directly.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         if basin["walls"] == 0 or basin["carried"] < 0:
@@ -408,7 +408,7 @@ def observe_walls(t, y, out, handle, values):
 
     The travel is positive along the axis x or y.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]
         if probe["kind"] != WALL_VALUE:
@@ -437,7 +437,7 @@ def wall_power(t, y, dydt, out, handle, power):
 
     The supplied minus the dissipated power is added to the inflow power of the basin.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.walls.size):
         work = supplied_power(t, tables, k, y, out)
         dissipated = dissipated_power(tables, tables.walls[k])

@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fvsolve.core.assembly.features import FeaturePattern
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.jacobian_pattern import Pairs
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.features.basins import lower_pattern as pattern
+from fvsolve.features.basins import tables as records
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 
 
 class BasinPattern(FeaturePattern):
@@ -19,10 +20,10 @@ class BasinPattern(FeaturePattern):
 
     def __init__(self, feature, couplings) -> None:
         super().__init__(feature)
-        tables = couplings.model.tables
         self.of, self.basins = couplings, feature.meshed
-        self.tables, self.integers, self.walls = tables, tables.integers, tables.walls
-        self.patches = {int(row["node"]): row for row in tables.patches}
+        self.integers, self.walls = couplings.model.tables.integers, feature.walls
+        self.scalars = scalar_tables(couplings.model).scalars
+        self.patches = {int(row["node"]): row for row in feature.patches}
 
     def pairs(self) -> Iterator[Pairs]:
         for basin in self.basins:
@@ -31,9 +32,9 @@ class BasinPattern(FeaturePattern):
                 yield pattern.source_pattern(basin)
         yield from self.boundary_pairs()
         yield from self.wall_pairs()
-        if len(self.tables.scalars):
+        if len(self.scalars):
             yield from map(pattern.scalar_pattern, self.basins)
-        for q, scalar in enumerate(self.tables.scalars):
+        for q, scalar in enumerate(self.scalars):
             yield from self.carried_through_boundaries(q)
             if scalar["losses"] > 0:
                 yield from self.decay_pairs(q, scalar)
@@ -47,8 +48,14 @@ class BasinPattern(FeaturePattern):
                     pattern.neighbours(basin), self.integers[behind : behind + row["faces"]]
                 )
                 yield pairs_of(unique_states(self.of.size + i), pattern.cell_states(basin, cells))
-            joint = rec.DISCHARGE, rec.RATING, *pattern.THROUGH_FACES  # one level for all faces
-            if row["closure"] in joint or (row["closure"] == rec.STAGE and row["neighbours"] >= 0):
+            joint = (
+                records.DISCHARGE,
+                records.RATING,
+                *pattern.THROUGH_FACES,
+            )  # one level for all faces
+            if row["closure"] in joint or (
+                row["closure"] == records.STAGE and row["neighbours"] >= 0
+            ):
                 read = unique_states(
                     self.behind(i),
                     pattern.cell_states(basin, pattern.cells_at_faces(self.integers, row)),
@@ -132,7 +139,7 @@ class BasinPattern(FeaturePattern):
 
     def decay_pairs(self, q: int, scalar) -> Iterator[Pairs]:
         """Yield couplings of the decay of scalar q in the ledger with the amounts and depths that decay."""
-        first = self.of.size + len(self.of.nodes) * (1 + len(self.tables.scalars)) + scalar["loss"]
+        first = self.of.size + len(self.of.nodes) * (1 + len(self.scalars)) + scalar["loss"]
         rows = first + np.arange(scalar["losses"])  # a single row for all states, or one for each
         for basin in self.basins:
             cells = np.arange(basin.n)

@@ -138,7 +138,7 @@ class Configuration(StaticForces):
             ]
             net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
         net += np.abs(self.by_features[self.free])
-        for row in self.draft.wall_table:
+        for row in self.motion.still_pushes:
             net += abs(row["rest"]) * (self.free == row["mass"])
         return sizes
 

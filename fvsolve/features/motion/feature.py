@@ -94,6 +94,7 @@ TABLES = {  # name of a table of a case -> its record
     "pin_table": records.PIN,
     "bushing_table": records.BUSHING,
     "moving_segment_table": records.MOVING_SEGMENT,
+    "tank_table": records.TANK,
     "mass_table": records.MASS,
     "brace_table": records.BRACE,
     "stop_table": records.STOP,
@@ -111,6 +112,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
     mass_index : name -> row of `mass_table`; None -> row of the fixed frame of elements between points
     points, lines : rows of their tables while these are filled; point_index : name of a point -> its row
     factor_size : number of entries of the factor of the mass matrix
+    still_pushes : rows of `pushes_at_rest` of all features
     locked : piston -> sides whose closed chambers may support a load
     shut : piston -> sides that no open link joins to another node
     """
@@ -132,6 +134,7 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         self.point_index: dict[str, int] = {}
         self.lines: list[tuple] = []
         self.factor_size = 0
+        self.still_pushes: list = []
         self.locked: dict[int, list[str]] = {}
         self.shut: dict[int, list[str]] = {}
 
@@ -169,6 +172,11 @@ class Motion(Feature, slot=5, wakes="kind mass, kind frame, kind body"):
         lower.lower_masses(draft)
         lower.lower_lines(draft)
         self.leaks, self.leak_names = self.piston_table, self.piston_names
+
+    def lower_behind_meshes(self, draft) -> None:
+        rows = [(part.row["body"], part.row["loads_body"]) for part in draft.meshed]
+        self.tank_table = np.array(rows, records.TANK)
+        self.still_pushes = [row for own in draft.features for row in own.pushes_at_rest]
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
@@ -386,9 +394,10 @@ class MotionRun(FeatureRun):
     def __init__(self, feature: Motion, run_data) -> None:
         super().__init__(feature, run_data)
         self.segments = feature.moving_segment_table.copy()
+        self.tanks = feature.tank_table.copy()
 
     def tables(self, view: str = "") -> MotionTables:
-        return self.feature.tables()._replace(moving_segments=self.segments)
+        return self.feature.tables()._replace(moving_segments=self.segments, tanks=self.tanks)
 
     def for_energy(self) -> None:
         case = self.run_data.model.case
@@ -400,6 +409,7 @@ class MotionRun(FeatureRun):
                 f"the energy of this network on a body is not supported; {'; '.join(faults)}"
             )
         self.segments["loads_body"] = records.JOINT_LOAD_READ
+        self.tanks["loads_body"] = 1
 
     def end_notices(self, y: np.ndarray) -> list:
         # the length of Euler parameters is 1; the difference measures the time error

@@ -106,7 +106,7 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
     for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):
         total[first] -= push
         total[second] += push
-    for row in draft.wall_table:
+    for row in motion.still_pushes:
         if row["mass"] >= 0:
             total[row["mass"]] += row["outward"] * row["rest"]
     return total
@@ -137,7 +137,7 @@ def start_masses(draft, start) -> list[str]:
     total = forces_on_masses(draft, pushes)
     for push, ends in zip(pushes, pushed_masses(draft), strict=True):
         size[ends] += abs(push)
-    for row in draft.wall_table:
+    for row in motion.still_pushes:
         if row["mass"] >= 0:
             size[row["mass"]] += abs(row["rest"])
     masses["force"] = np.where(np.abs(total) > draft.rounding * size, total, 0.0)

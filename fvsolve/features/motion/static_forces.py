@@ -6,7 +6,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.table_handle import make_handle, with_features
 from fvsolve.core.model.run_data import zeros_for_run
 from fvsolve.features.motion.kernels import tables as records
-from fvsolve.features.motion.kernels.tables import SLOT, motion_of
+from fvsolve.features.motion.kernels.tables import motion_of
 
 FOLDER = "fvsolve.features.motion.kernels"
 MOTION = f"{FOLDER}.body_kinematics: kinematics"
@@ -30,7 +30,7 @@ def call_pieces(
 ) -> None:
     """Call the named kernel functions in turn, in the way of the right-hand side; they write to `out` and run arrays.
 
-    all_tables : tables of a model, arrays of a run, tables of motion; pieces : names "MODULE: FUNCTION"
+    all_tables : tables of a model, arrays of a run, features; pieces : names "MODULE: FUNCTION"
     """
     from fvsolve.core.kernels import calls  # not loaded for cases without bodies
     from fvsolve.core.kernels.rhs_assembly import load_function
@@ -41,9 +41,12 @@ def call_pieces(
             load_function(*piece.rsplit(".", 1)), calls.RATES
         )
     run = calls.compile_as(calls.rhs_in_turn, calls.RATES)
-    tables, written, own = all_tables
+    tables, written, features = all_tables
+    own = [None] * (1 + max(feature.slot for feature in features))
+    for feature in features:
+        own[feature.slot] = feature.tables()
     kept: list = []  # arrays behind the handle
-    written = with_features(written, [*[None] * SLOT, own], kept)
+    written = with_features(written, own, kept)
     handle = make_handle((*tables, *written, addresses, calls.empty_calls(0, len(calls.HOOKS))))
     run(t, y, rates, out, handle)
 
@@ -66,7 +69,7 @@ def mass_factor(model, y: np.ndarray) -> np.ndarray:
     written.clock["limit"] = np.inf
     motion = motion_of(model)
     call_pieces(
-        (model.tables, written, motion.tables()), (MOTION, ACCELERATE), t, y.copy(), model.new_out()
+        (model.tables, written, model.features), (MOTION, ACCELERATE), t, y.copy(), model.new_out()
     )
     freedoms = motion.freedom_table
     diagonal = 8 * len(freedoms) + freedoms["row"] + freedoms["depth"]
@@ -101,7 +104,7 @@ class StaticForces:
         """Call the named kernel functions of bodies and joints."""
         rates = np.zeros(self.draft.size) if LOADS in pieces else NONE
         call_pieces(
-            (self.tables, self.written, self.motion.tables()),
+            (self.tables, self.written, self.draft.features),
             pieces,
             self.t,
             self.y,

@@ -68,7 +68,7 @@ class Networks(
         )
         self.settings = np.zeros(1, tables.NETWORK_SETTINGS)
         self.shafts: list[str] = []
-        self.turned = self.turned_devices = np.zeros(0, dtype=np.int64)
+        self.turned = self.turned_devices = self.thermal_rows = np.zeros(0, dtype=np.int64)
 
     # build ----------
 
@@ -146,7 +146,7 @@ class Networks(
             # schedules that features set after `prepare`
             if (model.tables.schedules["pieces"] == 0).any():
                 found.append(("pipes", DRIVEN_SHAFTS))
-        return found + ([("carried", EXCHANGERS)] if len(model.tables.exchangers) else [])
+        return found + ([("carried", EXCHANGERS)] if len(self.thermal_rows) else [])
 
     def run(self, run_data) -> FeatureRun:
         return FeatureRun(self, run_data) if self.network is None else NetworkRun(self, run_data)
@@ -221,6 +221,7 @@ class NetworkRun(FeatureRun):
             own.settings,
             own.turned,
             own.turned_devices,
+            own.thermal_rows,
             self.places,
             self.factors,
         )

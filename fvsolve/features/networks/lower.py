@@ -8,7 +8,6 @@ import numpy as np
 
 from fvsolve.core.assembly.features import coordinate_of
 from fvsolve.core.assembly.lowering import lowering_of
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.features.networks.elimination import (
     Elimination,
     NetworkError,
@@ -192,7 +191,11 @@ def fill_tables(own, draft, network: Network) -> None:
             row["index"] = [switch.name for switch in network.switches].index(name)
         else:
             row["index"] = [other.name for other in network.booked].index(name)
-    draft.exchanger_table = exchanger_rows(draft, network)
+    thermal = [draft.case.links[name].to for name in exchanger_names(draft.case)]
+    own.thermal_rows = np.array([network.node_row(node) for node in thermal], dtype=np.int64)
+    for scalar in draft.case.scalars.values():
+        if scalar.heat:
+            own.settings[0]["zero"] = scalar.zero
     by_shaft = {k: device.turns_with(part) for k, (_, part, device) in enumerate(draft.devices)}
     devices = [k for k, shaft in by_shaft.items() if shaft is not None]
     own.shafts = list(dict.fromkeys(by_shaft[k] for k in devices))
@@ -223,25 +226,6 @@ def fill_tables(own, draft, network: Network) -> None:
             if switch.kind == codes.DIODE:
                 ohm = network.elements[network.numbers[f"{switch.name}.resistance"]].value
                 row["rounding"] = CURRENT_ROUNDING * sum(map(source_size, network.sources)) / ohm
-
-
-def exchanger_rows(draft, network: Network) -> np.ndarray:
-    """Table of heat exchangers."""
-    case = draft.case
-    capacity = {item.ends[0]: item.value for item in network.stores.values() if item.thermal}
-    table = np.zeros(len(exchanger_names(case)), rec.EXCHANGER)
-    for name, row in zip(exchanger_names(case), table, strict=True):
-        link = case.links[name]
-        row["node"], row["place"] = (
-            draft.node_index[draft.inside(link.from_)],
-            network.node_row(link.to),
-        )
-        row["conductance"], row["effectiveness"] = (
-            link.conductance or 0.0,
-            link.effectiveness or 0.0,
-        )
-        row["slowness"] = 1.0 / capacity[link.to] if link.to in capacity else 0.0
-    return table
 
 
 def response_sizes(network: Network, case) -> dict[int, float]:

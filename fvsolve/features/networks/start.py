@@ -13,7 +13,6 @@ from fvsolve.errors import listing
 from fvsolve.features.networks.elimination import Elimination, NetworkError, Terms, substituted
 from fvsolve.features.networks.faults import network_faults, tie_fault
 from fvsolve.parts import law_elements as codes
-from fvsolve.parts.heat import exchanger_names
 from fvsolve.parts.network_elements import Element
 
 TURNS = 60  # changes of switches, and of nonlinear sources, in the search
@@ -124,18 +123,16 @@ class NetworkStart:
         """
         case, name = self.draft.case, item.reads[1]
         link = case.links[name]
-        row = self.draft.tables.exchangers[exchanger_names(case).index(name)]
         label, scalar = next((key, value) for key, value in case.scalars.items() if value.heat)
-        place, i = case.nodes[link.from_], int(row["node"])
+        place, i = case.nodes[link.from_], self.draft.node_index[self.draft.inside(link.from_)]
         value = place.scalars[label].first if label in place.scalars else scalar.initial
         heat, node = self.network.columns[item.name], self.potential_column(item.ends[1])
         inflow = 0.0
         for table in (self.draft.valve_table, self.draft.pipe_table):
             inflow += float(table["flow"][table["to_node"] == i].clip(min=0.0).sum())
             inflow -= float(table["flow"][table["from_node"] == i].clip(max=0.0).sum())
-        conductance = float(
-            row["conductance"] + row["effectiveness"] * inflow * scalar.specific_heat
-        )
+        effectiveness = link.effectiveness or 0.0
+        conductance = (link.conductance or 0.0) + effectiveness * inflow * scalar.specific_heat
         if node in self.free and place.kind == "junction":
             text = f"its temperature at the start follows from that of junction {link.from_}"
             self.draft.fault(self.stores[node].part, f"{text}; give the key `initial_temperature`")

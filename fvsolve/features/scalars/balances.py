@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
+from fvsolve.features.scalars.kernels.tables import CHANGE, scalar_tables
 from fvsolve.features.scalars.lower import STORES, wall_masses
 from fvsolve.features.scalars.reactions import reacting
 from fvsolve.parts.heat import exchanger_names
@@ -12,17 +12,18 @@ from fvsolve.parts.heat import exchanger_names
 
 def amount_indices(model) -> np.ndarray:
     """Indices of the states that are scalar amounts in pipes and nodes : int64[m]."""
-    if not len(model.tables.scalars):
+    scalars = scalar_tables(model).scalars
+    if not len(scalars):
         return np.zeros(0, dtype=int)
     count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
-    return np.concatenate([row["y"] + np.arange(count) for row in model.tables.scalars])
+    return np.concatenate([row["y"] + np.arange(count) for row in scalars])
 
 
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     """Values of all scalars in the cells of pipe k : name -> float64[cells]."""
     pipe, values = model.tables.pipes[k], {}
     n, o = int(pipe["cells"]), int(pipe["y"])
-    for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
+    for row, name in zip(scalar_tables(model).scalars, model.case.scalars, strict=True):
         base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
         mass = (
             model.tables.profile[base : base + n]
@@ -42,7 +43,7 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
     """Amount of scalar q in all pipes, nodes and basins [kg times the unit of the scalar]."""
     pipes = model.tables.pipes
     nodes = model.tables.nodes
-    row = model.tables.scalars[q]
+    row = scalar_tables(model).scalars[q]
     total = 0.0
     for pipe in pipes:
         at = int(row["y"] + pipe["cell"])
@@ -59,7 +60,7 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 def wall_amount(model, q: int, y: np.ndarray) -> float:
     """Amount of scalar q in the walls of all pipes [kg times the unit of the scalar]; `total_amount` includes it."""
     name, total = list(model.case.scalars)[q], 0.0
-    for k, wall in enumerate(wall_masses(model.tables, model.tables.scalars[q])):
+    for k, wall in enumerate(wall_masses(model.tables, scalar_tables(model).scalars[q])):
         if wall > 0.0:
             total += (
                 wall * model.tables.pipes[k]["dx"] * float(np.sum(pipe_values(model, k, y)[name]))
@@ -79,7 +80,9 @@ def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[s
     ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)
-    for q, (name, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
+    for q, (name, row) in enumerate(
+        zip(model.case.scalars, scalar_tables(model).scalars, strict=True)
+    ):
         flows = ledger[:, n + q * n : n + (q + 1) * n]
         decay = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
         decayed = -float(np.sum(decay[:, : row["losses"]]))
@@ -127,11 +130,11 @@ def formed_amount(model, q: int, ledger: np.ndarray) -> float:
     """Amount of scalar q that reactions have formed [kg times its unit]; ledger : as for `scalar_ledgers`."""
     tables, formed = model.tables, 0.0
     first = int(model.layout["extent"] - model.layout["supply"])
-    for row in tables.reactions:
+    for row in scalar_tables(model).reactions:
         members = tables.integers[row["scalars"] : row["scalars"] + row["count"]].tolist()
         if q in members:
             at = first + int(row["extent"])
-            change = tables.floats[row["data"] + 3 * members.index(q) + rec.CHANGE]
+            change = tables.floats[row["data"] + 3 * members.index(q) + CHANGE]
             formed += change * float(np.sum(ledger[:, at : at + int(row["extents"])]))
     return formed
 
@@ -141,7 +144,9 @@ def heat_by_part(model, ledger: np.ndarray, q: int) -> dict[str, float]:
 
     It is empty for a scalar q that heat does not change; ledger : as for `scalar_ledgers`
     """
-    tables, scale = model.tables, float(model.tables.scalars[q]["specific_heat"])
+    tables = scalar_tables(model)
+    scalar = tables.scalars[q]
+    scale = float(scalar["specific_heat"])
     if scale == 0.0:
         return {}
     first, last = (int(model.layout[name] - model.layout["supply"]) for name in ("heat", "extent"))
@@ -150,9 +155,9 @@ def heat_by_part(model, ledger: np.ndarray, q: int) -> dict[str, float]:
     for row, value in zip(tables.heat_sources, rows, strict=False):
         name = model.valve_names[row["valve"]]
         heat[name] = heat.get(name, 0.0) + float(value)
-    for pipe, row in zip(model.pipes, tables.pipes, strict=True):
+    for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["heat"] >= 0:
-            count = int(row["cells"]) if tables.scalars[q]["by_cell"] else 1
+            count = int(row["cells"]) if scalar["by_cell"] else 1
             heat[pipe.name] = float(rows[row["heat"] :][:count].sum())
     exchangers = rows[rows.size - len(tables.exchangers) :]
     return heat | {

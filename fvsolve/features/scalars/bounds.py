@@ -3,6 +3,7 @@
 import numpy as np
 
 from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import STORES, wall_masses
 
 
@@ -12,7 +13,7 @@ def scalar_bounds(model, q: int):
     The mass per length in the cells of a pipe follows from both waves, plus the wall mass. The mass in a tank or
     chamber follows from its state. In a basin it is the depth, or 1 without variable depth (`basin.deep` False).
     """
-    row, tables = model.tables.scalars[q], model.tables
+    row, tables = scalar_tables(model).scalars[q], model.tables
     if np.isinf(row["least"]):
         return
     limits = row["least"], row["greatest"]

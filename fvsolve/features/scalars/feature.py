@@ -2,41 +2,73 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 
 import numpy as np
 
 from fvsolve.core.assembly.features import Feature, FeatureRun
-from fvsolve.core.assembly.lowering import lowering_of
+from fvsolve.core.assembly.lowering import VALUE, Input, lowering_of
 from fvsolve.core.assembly.scheme_codes import lower_position
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.core.model.probe_tables import cells_at_point, fill_probes
 from fvsolve.features.scalars import lower, reactions
 from fvsolve.features.scalars.kernels import terms
+from fvsolve.features.scalars.kernels.tables import EMPTY, ScalarTables
 from fvsolve.parts.nodes_and_links import is_in_network
 
-REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.dtypes`
+REACTION_QUANTITIES = ("rate", "power", "affinity")  # in the order of `kernels.tables`
 SENSED = (rec.NODE_SCALAR, rec.PIPE_SCALAR)
 
 
 class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
-    """Scalars, reactions and heat of a case."""
+    """Scalars, reactions and heat of a case.
+
+    heat_rows : rows in the ledger of the heat of restrictions and pipes; arrays : see `kernels.tables`
+    """
+
+    def __init__(self, case, given_up=()) -> None:
+        super().__init__(case, given_up)
+        self.scalars, self.heat_sources, self.exchangers, self.reactions = EMPTY
+        self.heat_rows, self.reads_masses = 0, bool(case.scalars)
+
+    def tables(self) -> ScalarTables:
+        """Tables as compiled functions read them."""
+        return ScalarTables(self.scalars, self.heat_sources, self.exchangers, self.reactions)
 
     def lower_behind_meshes(self, draft) -> None:
-        lower.lower_scalars(draft)
-        reactions.lower_reactions(draft)
+        lower.lower_scalars(draft, self)
+        reactions.lower_reactions(draft, self)
+
+    def lower_last(self, draft) -> None:
+        lower.lower_exchangers(draft, self)
 
     def reserve_ledger(self, draft) -> None:
-        lower.reserve_scalars(draft)
-        reactions.reserve_reactions(draft)
+        lower.reserve_scalars(draft, self)
+        reactions.reserve_reactions(draft, self)
+
+    def reserve(self, draft) -> None:
+        for pipe in draft.pipe_table:
+            if pipe["temperature"] > 0.0:
+                pipe["present"] = draft.to_work(int(pipe["cells"]))
 
     def settle(self, draft) -> list[str]:
-        lower.scale_scalars(draft)
+        lower.scale_scalars(draft, self)
         return []
 
     def start(self, draft, y: np.ndarray) -> None:
-        lower.start_amounts(draft, y)
+        lower.start_amounts(draft, self, y)
+
+    def close(self, draft) -> None:
+        for table in self.tables():
+            table.flags.writeable = False
+
+    def copy_for(self, case) -> Scalars:
+        own = copy.copy(self)
+        own.case = case
+        own.scalars, own.heat_sources, own.exchangers, own.reactions = map(np.copy, self.tables())
+        return own
 
     def probe(self, draft, probe, row) -> bool:
         case = draft.case
@@ -51,7 +83,7 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
             probe.name in case.lumped or (probe.name in case.meshes and probe.point is None)
         ):
             return False
-        row["scalar"] = draft.scalar_index[probe.quantity]
+        row["scalar"] = list(case.scalars).index(probe.quantity)
         if probe.point is not None:
             row["kind"] = rec.CELL_SCALAR
             cells_at_point(draft, row, probe)
@@ -83,15 +115,17 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
     # model ----------
 
     def terms(self, model, cast) -> Iterator[tuple[str, RhsTerms]]:
-        linear, tables = cast.family == "linear", model.tables
-        heated = bool((tables.scalars["specific_heat"] > 0.0).any())
+        linear, pipes = cast.family == "linear", model.tables.pipes
+        heated = bool((self.scalars["specific_heat"] > 0.0).any())
         if any(
             row["kind"] in SENSED for feature in model.features for row in feature.probe_rows()[0]
         ):
             if heated:
                 yield "solved", terms.HEAT_FOR_EVENTS[linear]
             yield "solved", terms.VALUES_FOR_EVENTS
-        if len(tables.scalars):
+        if (pipes["present"] >= 0).any():
+            yield "first", terms.REYNOLDS
+        if len(self.scalars):
             yield "carried", terms.AMOUNTS
             if not cast.alone:
                 yield "carried", terms.MIXED
@@ -99,13 +133,36 @@ class Scalars(Feature, slot=2, wakes="section scalars, section reactions"):
                 yield "carried", terms.CARRIED
             if heated:
                 yield "carried", terms.HEAT[linear]
-            if cast.pipes and (tables.pipes["temperature"] > 0.0).any():
+            if cast.pipes and (pipes["temperature"] > 0.0).any():
                 yield "carried", terms.VISCOSITY
-        if len(tables.reactions):  # those in basins are added later
+        if len(self.reactions):  # those in basins are added later
             yield "carried", terms.REACTIONS
 
     def run(self, run_data) -> FeatureRun:
         return ScalarRun(self, run_data)
+
+    def inputs(self, model) -> dict[str, Input]:
+        inputs = {}
+        for i, (place, node) in enumerate(model.case.places.items()):
+            for q, (name, row) in enumerate(zip(model.case.scalars, self.scalars, strict=True)):
+                schedule = int(model.tables.integers[row["places"] + i])
+                if node.own_scalars == "inflow" and schedule >= 0:
+                    inputs[f"{place}.{name}"] = Input(VALUE, schedule, bounds=(self.slot, q))
+        return inputs
+
+    def held(self, tables, t: float, smooth: bool) -> tuple[Scalars, dict[str, np.ndarray]]:
+        if not smooth:
+            return self, {}
+        own, bounds = self.to_hold()
+        bounds["least"], bounds["greatest"] = -np.inf, np.inf
+        return own, {}
+
+    def to_hold(self) -> tuple[Scalars, np.ndarray]:
+        own = copy.copy(self)
+        own.scalars = self.scalars.copy()
+        bounds = own.scalars[:]  # this view stays writable
+        own.scalars.flags.writeable = False
+        return own, bounds
 
     def pattern(self, couplings):
         from fvsolve.features.scalars.pattern import ScalarPattern
@@ -170,7 +227,7 @@ class ScalarRun(FeatureRun):
         from fvsolve.features.scalars.kernels.scalar_transport import GREATEST_RISE
 
         model = self.run_data.model
-        k = model.tables.heat_sources[index]["valve"]
+        k = self.feature.heat_sources[index]["valve"]
         end = "from_node" if out[model.layout["valve"] + k] < 0.0 else "to_node"
         names = {
             "part": model.valve_names[k],

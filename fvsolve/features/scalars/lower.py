@@ -11,24 +11,30 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.steppers.tableau import METHODS
 from fvsolve.errors import Notice
+from fvsolve.features.scalars.kernels import tables as records
 from fvsolve.features.scalars.reactions import reacting
 from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
 from fvsolve.parts.heat import exchanger_names
+from fvsolve.parts.network_elements import network_of
 from fvsolve.units import show
 
 STORES = (rec.TANK, rec.CHAMBER)
 UNBOUNDED = 1e100  # greatest value of a scalar that reactions form
 
 
-def lower_scalars(draft) -> None:
-    """Fill the table of scalars; add states for their amounts and schedules for their values."""
+def lower_scalars(draft, own) -> None:
+    """Fill the tables of scalars and heat; add states for their amounts and schedules for their values.
+
+    own : the feature, which receives the tables
+    """
     case = draft.case
     pipes = draft.pipe_table
     nodes = draft.node_table
-    basins = draft.basin_table
-    draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
-    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
+    meshed = draft.meshed
+    mesh_cells = sum(part.n for part in meshed)
+    own.scalars = np.zeros(len(case.scalars), records.SCALAR)
+    for row, (name, scalar) in zip(own.scalars, case.scalars.items(), strict=True):
         for key in ("diffusivity", "decay", "ambient", "initial"):
             row[key] = getattr(scalar, key)
         names = [f"{mesh.name}.{name}[{i}]" for mesh in draft.meshes for i in range(mesh.cells)]
@@ -43,9 +49,9 @@ def lower_scalars(draft) -> None:
         draft.integers += places
         row["least"], row["greatest"] = bounds(case, name)
         if scalar.decay > 0.0:
-            row["loss"] = sum(draft.scalar_table["losses"])
+            row["loss"] = sum(own.scalars["losses"])
             row["losses"] = (
-                1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+                1 if explicit(case.numerics.method) else draft.size - row["y"] + mesh_cells
             )
         row["wall_masses"] = len(draft.floats)
         draft.floats += [
@@ -55,11 +61,14 @@ def lower_scalars(draft) -> None:
             ),
             0.0,
         ]
-        basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
+        for k, part in enumerate(meshed):
+            part.row["lost"] = draft.size - row["y"] + sum(other.n for other in meshed[:k])
         if scalar.heat:
             row["specific_heat"], row["zero"] = scalar.specific_heat, scalar.zero
+            if draft.fluid.walther is not None:
+                row["walther_a"], row["walther_b"] = draft.fluid.walther
             row["by_cell"] = not explicit(case.numerics.method)
-            lower_heat(draft, name, scalar.heat_from or (), row["by_cell"])
+            lower_heat(draft, own, name, scalar.heat_from or (), row["by_cell"])
             if not scalar.heat_from and not exchanger_names(case):
                 text = f"{name}: no part heats or cools the fluid; expected parts in `heat_from`, or a heat-exchanger"
                 draft.warnings.append(Notice("start", f"scalars.{name}", text))
@@ -67,15 +76,29 @@ def lower_scalars(draft) -> None:
         pipes["center"] = draft.cells + pipes["cell"]
 
 
-def reserve_scalars(draft) -> None:
+def lower_exchangers(draft, own) -> None:
+    """Fill the table of heat exchangers, also from the heat capacities of their thermal nodes in the network."""
+    names = exchanger_names(draft.case)
+    stores = network_of(draft).stores.values() if names else ()
+    capacity = {item.ends[0]: item.value for item in stores if item.thermal}
+    own.exchangers = np.zeros(len(names), records.EXCHANGER)
+    for name, row in zip(names, own.exchangers, strict=True):
+        link = draft.case.links[name]
+        row["node"] = draft.node_index[draft.inside(link.from_)]
+        row["conductance"] = link.conductance or 0.0
+        row["effectiveness"] = link.effectiveness or 0.0
+        row["slowness"] = 1.0 / capacity[link.to] if link.to in capacity else 0.0
+
+
+def reserve_scalars(draft, own) -> None:
     """Reserve the arrays of scalars and heat exchangers; rows of the ledger: inflow through nodes, decay, heat."""
-    scalars = len(draft.scalar_table)
+    scalars = len(own.scalars)
     nodes = len(draft.node_table)
     pipes = len(draft.pipe_table)
-    exchangers, sizes = len(draft.exchanger_table), draft.sizes
+    exchangers, sizes = len(own.exchangers), draft.sizes
     sizes.ledger("gain", scalars * nodes)
-    sizes.ledger("loss", sum(draft.scalar_table["losses"]))
-    sizes.ledger("heat", draft.heat_rows + exchangers)
+    sizes.ledger("loss", sum(own.scalars["losses"]))
+    sizes.ledger("heat", own.heat_rows + exchangers)
     for name, size in (
         ("value", scalars * nodes),
         ("edge", 2 * pipes * scalars),
@@ -89,7 +112,7 @@ def reserve_scalars(draft) -> None:
         sizes.need_scratch(4 * scalars * nodes)
 
 
-def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
+def lower_heat(draft, own, scalar: str, heat_from: Any, by_cell: bool) -> None:
     """Fill the table of restrictions that heat the fluid, and the rows of pipes in the ledger of heat.
 
     heat_from : names of parts, or "all"; by_cell : True for a row of the ledger for each cell, else for each pipe
@@ -123,7 +146,9 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
         device, dissipates = devices.get(name, (-1, True))
         if dissipates and (heats(owners.get(link, link)) or heats(link)):
             rows.append((k, device))
-    draft.heat_source_table = np.array(rows, rec.HEAT_SOURCE)
+    own.heat_sources = np.array(rows, records.HEAT_SOURCE)
+    if (own.heat_sources["device"] >= 0).any():
+        own.device_hooks = "power", "heat"
     count = len(rows)
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
         if heats(name):
@@ -134,7 +159,7 @@ def lower_heat(draft, scalar: str, heat_from: Any, by_cell: bool) -> None:
                 )
             row["heat"] = count
             count += int(row["cells"]) if by_cell else 1
-    draft.heat_rows = count
+    own.heat_rows = count
     for name in sorted(unused):
         text = f"{show(name)} dissipates nothing in the fluid; expected valves, pipes and other parts with losses"
         draft.fault(f"scalars.{scalar}.heat_from", text)
@@ -172,7 +197,7 @@ def stated_range(case, name: str) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def scale_scalars(draft) -> None:
+def scale_scalars(draft, own) -> None:
     """Set steady masses per length in pipes, and the size of a small deviation of scalar amounts in pipes and nodes."""
     profile, rho = draft.tables.profile, draft.fluid.density
     for k, row in enumerate(
@@ -181,7 +206,7 @@ def scale_scalars(draft) -> None:
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
         profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
     scale = np.array(draft.scale)
-    for row, name in zip(draft.scalar_table, draft.case.scalars, strict=True):
+    for row, name in zip(own.scalars, draft.case.scalars, strict=True):
         typical = typical_value(draft.case, name)
         for pipe, wall in zip(draft.pipe_table, wall_masses(draft.tables, row), strict=True):
             at = row["y"] + pipe["cell"]
@@ -214,10 +239,10 @@ def indices_at_nodes(draft, row) -> np.ndarray:
     )
 
 
-def start_amounts(draft, y: np.ndarray) -> None:
+def start_amounts(draft, own, y: np.ndarray) -> None:
     """Write the amounts of all scalars in pipes, tanks and chambers at the start into the state vector y."""
     case, profile = draft.case, draft.tables.profile
-    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
+    for row, (name, scalar) in zip(own.scalars, case.scalars.items(), strict=True):
         for pipe, mesh, wall in zip(
             draft.pipe_table, draft.meshes, wall_masses(draft.tables, row), strict=True
         ):

@@ -10,6 +10,7 @@ from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.steady import union
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import STORES
 from fvsolve.features.scalars.reactions import names_read
 from fvsolve.parts import law_elements as codes
@@ -27,23 +28,22 @@ class ScalarPattern(FeaturePattern):
 
     def pairs(self) -> Iterator[Pairs]:
         model = self.couplings.model
-        for q in range(len(model.tables.scalars)):
+        for q in range(len(self.feature.scalars)):
             yield from ScalarCouplings(self.couplings, model, q).pairs()
         yield from reaction_pairs(self.couplings, model)
 
     def source(self, row) -> np.ndarray | None:
         if row["kind"] != codes.FLUID_HEAT:
             return None
-        node = int(self.couplings.model.tables.exchangers[int(row["index"])]["node"])
+        node = int(self.feature.exchangers[int(row["index"])]["node"])
         return unique_states(self.temperature.values[node], *self.temperature.through[node])
 
     @cached_property
     def temperature(self):
         """Couplings of the scalar that is the temperature of the fluid."""
         model = self.couplings.model
-        return ScalarCouplings(
-            self.couplings, model, int(np.argmax(model.tables.scalars["specific_heat"]))
-        )
+        q = int(np.argmax(self.feature.scalars["specific_heat"]))
+        return ScalarCouplings(self.couplings, model, q)
 
 
 class ScalarCouplings:
@@ -53,10 +53,11 @@ class ScalarCouplings:
     """
 
     def __init__(self, couplings, model, q: int) -> None:
-        self.of, self.row = couplings, model.tables.scalars[q]
+        self.of, self.tables = couplings, scalar_tables(model)
+        self.row = self.tables.scalars[q]
         self.q, of, nodes = q, couplings, len(couplings.nodes)
         self.ledger = of.size + nodes * (1 + q)
-        self.loss = of.size + nodes * (1 + len(model.tables.scalars)) + self.row["loss"]
+        self.loss = of.size + nodes * (1 + len(self.tables.scalars)) + self.row["loss"]
         self.places = model.tables.integers[self.row["places"] : self.row["places"] + nodes]
         self.stores = np.isin(of.nodes["kind"], STORES)
         self.wide = max(LIMITER_CELLS, of.reach.behind, of.reach.ahead)
@@ -70,13 +71,13 @@ class ScalarCouplings:
             flow = [of.sets[i], of.sets[j], of.opening_states(valve)]
             self.through[i] += flow
             self.through[j] += flow
-        self.heated, self.tables = self.row["specific_heat"] > 0.0, model.tables
+        self.heated = self.row["specific_heat"] > 0.0
         # rows of the ledger up to that of heat
         self.heat_end = int(model.layout["extent"] - model.layout["supply"])
-        for exchanger in self.tables.exchangers if self.heated else ():
-            self.through[exchanger["node"]].append(
-                with_slot(of.features, codes.SLOT).row_states(exchanger["place"])
-            )
+        for k, exchanger in enumerate(self.tables.exchangers if self.heated else ()):
+            network = with_slot(of.features, codes.SLOT)
+            thermal = network.row_states(network.feature.thermal_rows[k])
+            self.through[exchanger["node"]].append(thermal)
         for source in self.tables.heat_sources if self.heated else ():
             for i in ends_of(of.valves[source["valve"]]):
                 self.through[i] += self.heat_states(source)
@@ -226,13 +227,13 @@ def reaction_pairs(couplings, model) -> Iterator[Pairs]:
 
     These are amounts of scalars and the mass at the same place.
     """
-    tables, scalars = model.tables, list(model.case.scalars)
+    tables, scalars = scalar_tables(model), list(model.case.scalars)
     ledger = (
         couplings.size
         + len(couplings.nodes) * (1 + len(scalars))
         + int(sum(tables.scalars["losses"]))
     )
-    stores = np.flatnonzero(np.isin(tables.nodes["kind"], STORES))
+    stores = np.flatnonzero(np.isin(model.tables.nodes["kind"], STORES))
     for row, reaction in zip(tables.reactions, model.case.reactions.values(), strict=True):
         changed = [
             scalars.index(name)
@@ -257,7 +258,7 @@ def reacting_places(
     stores : numbers of nodes with storage
     """
     tables = model.tables
-    scalars, nodes = tables.scalars, tables.nodes
+    scalars, nodes = scalar_tables(model).scalars, tables.nodes
     for pipe in tables.pipes:
         cells = np.arange(pipe["cells"])
         masses = [pipe["y"] + cells, pipe["y"] + pipe["cells"] + cells]

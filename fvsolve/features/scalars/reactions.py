@@ -12,6 +12,7 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.formula_programs import INPUT
 from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import listing
+from fvsolve.features.scalars.kernels.tables import REACTION, scalar_tables
 from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
 
@@ -21,20 +22,23 @@ if TYPE_CHECKING:
 GAS_CONSTANT = 8.31446261815324  # [J/mol/K], exact in the SI
 
 
-def lower_reactions(draft) -> None:
-    """Fill the table of reactions, and the factors of scalars that are amounts; add faults of rates at the start."""
-    case, scalars = draft.case, draft.scalar_table
+def lower_reactions(draft, own) -> None:
+    """Fill the table of reactions, and the factors of scalars that are amounts; add faults of rates at the start.
+
+    own : the feature, which receives the table
+    """
+    case, scalars = draft.case, own.scalars
     for row, scalar in zip(scalars, case.scalars.values(), strict=True):
         row["molar"] = 1.0
         if case.reactions:
             row["molar"] = molar_factor(scalar) or 1.0
     if not case.reactions:
         return
-    table = draft.reaction_table = np.zeros(len(case.reactions), rec.REACTION)
+    table = own.reactions = np.zeros(len(case.reactions), REACTION)
     method = METHODS.get(case.numerics.method)
     explicit, places = method is not None and method.explicit, draft.size - int(scalars["y"][0])
     places = int(scalars["y"][1] - scalars["y"][0]) if len(scalars) > 1 else places
-    places += int(sum(draft.basin_table["n"]))
+    places += sum(part.n for part in draft.meshed)
     for row, reaction in zip(table, case.reactions.values(), strict=True):
         sides, names = reaction.sides, reaction.sides.names
         row["program"] = -1
@@ -60,10 +64,10 @@ def lower_reactions(draft) -> None:
         check_start(draft, name, reaction)
 
 
-def reserve_reactions(draft) -> None:
+def reserve_reactions(draft, own) -> None:
     """Reserve the arrays of reactions; rows of the ledger: rates times the mass that reacts."""
-    draft.sizes.ledger("extent", sum(draft.reaction_table["extents"]))
-    draft.sizes.out("quickest", len(draft.reaction_table) > 0)
+    draft.sizes.ledger("extent", sum(own.reactions["extents"]))
+    draft.sizes.out("quickest", len(own.reactions) > 0)
 
 
 def reacting(case, side: str = "") -> set[str]:
@@ -187,7 +191,7 @@ def reaction_facts(model) -> dict[str, dict[str, Any]]:
     out = model.evaluate(model.case.numerics.start, model.start)[1]
     facts, rho = {}, model.case.properties.density
     for row, (name, reaction) in zip(
-        model.tables.reactions, model.case.reactions.items(), strict=True
+        scalar_tables(model).reactions, model.case.reactions.items(), strict=True
     ):
         at = int(model.layout["extent"] + row["extent"])
         flow = float(np.sum(out[at : at + int(row["extents"])])) / rho

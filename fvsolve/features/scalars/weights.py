@@ -4,6 +4,7 @@ import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.energy_norm import SCALAR_WEIGHT
+from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import typical_value
 
 
@@ -13,7 +14,7 @@ def weigh_scalars(model, weights: np.ndarray) -> None:
     for basin in model.meshed:
         for q, amount in enumerate(basin.amounts(weights) if basin.scalars else ()):
             amount[:] = SCALAR_WEIGHT * 0.5 * basin.mesh.area / greatest_value(model, q) ** 2
-    for q, scalar in enumerate(tables.scalars):
+    for q, scalar in enumerate(scalar_tables(model).scalars):
         share = SCALAR_WEIGHT / greatest_value(model, q) ** 2
         for row in tables.pipes:
             cells = slice(scalar["y"] + row["cell"], scalar["y"] + row["cell"] + row["cells"])

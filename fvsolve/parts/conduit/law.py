@@ -185,10 +185,11 @@ def end_of(out, tables, k, drop):
     k : restriction of the end; drop : of the pressure, to the cell [Pa]
     """
     at, st = tables.valves[k]["data"], tables.settings[0]
-    patch = tables.patches[int(tables.floats[at + NUMBERS])]
-    pressure = out[tables.layout[0]["pressure"] + patch["node"]] + drop
-    z = pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
-    return section_at(tables.floats, at), z, read_state(tables.work, patch["inside"])
+    pressure = out[tables.layout[0]["pressure"] + tables.valves[k]["to_node"]] + drop
+    # behind those of the section: lowest bed above the level at rest [m], offset in `work` of the state inside
+    lowest, inside = tables.floats[at + NUMBERS], int(tables.floats[at + NUMBERS + 1])
+    z = pressure / (st["rho"] * st["gravity"]) + lowest
+    return section_at(tables.floats, at), z, read_state(tables.work, inside)
 
 
 @njit

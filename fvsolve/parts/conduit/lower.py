@@ -62,12 +62,11 @@ class ConduitEndRows(Restriction, kind="conduit-end"):
         row["drive"] = 1.0
 
     def numbers(self, draft, name, link) -> list[float]:
-        patches = [place for place in draft.case.places.values() if place.kind == "patch"]
         conduit = draft.case.links[link.conduit]
         section = section_of(
             draft.case.gravity, conduit.diameter, conduit.celerity(draft.case.gravity)
         )
-        return [*section, float(patches.index(draft.case.places[link.to]))]
+        return [*section, 0.0, 0.0]  # the last two are written when the end is lowered
 
     def follow(self, start, k: int) -> None:
         """Leave the drop as it is: it is the height of the node over the water, and critical outflow has many drops."""

@@ -27,7 +27,7 @@ class PipeRows(Lowering, kind="pipe"):
         row["end_admittance"] = row["admittance"]
         row["cell"], draft.cells = draft.cells, draft.cells + n
         z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
-        row["rise"] = row["heat"] = -1
+        row["rise"] = row["heat"] = row["present"] = -1
         if link.profile is None:
             row["slope"] = (z[1] - z[0]) / link.length
         row["noise"] = (1e-9 * draft.fluid.density * area * speed) ** 2

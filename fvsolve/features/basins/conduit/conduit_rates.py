@@ -7,11 +7,11 @@ radius R. Cells are computed in blocks, see `conduit_cells`.
 
 from math import inf
 
-from fvsolve.core.kernels.dtypes import CELL_FIELD, NO_DRAG, RATE, UPWIND
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.dtypes import CELL_FIELD, RATE, UPWIND
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.conduit import conduit_cells as cells
 from fvsolve.features.basins.conduit.conduit_cells import cell_state, fastest
+from fvsolve.features.basins.tables import NO_DRAG, open_basins
 from fvsolve.jit import njit
 from fvsolve.parts.conduit.law import INSIDE, end_flow, end_state, read_state, section_at
 from fvsolve.parts.conduit.law_section import celerity, section_at_depth
@@ -65,7 +65,7 @@ def read_ends(t, y, dydt, out, handle):
 
     A dry end has its surface at the invert. The pressure is the change since the start [Pa].
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st, layout = tables.settings[0], tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -195,7 +195,7 @@ def block_rates(tables, b, section, y, dydt, first, last, ends):
 @njit
 def conduit_rates(t, y, dydt, out, handle):
     """Write the rates of the cells of all conduits; out[RATE], which limits the step, is raised."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or dydt.size == 0:
@@ -215,7 +215,7 @@ def conduit_rates(t, y, dydt, out, handle):
 @njit
 def add_end_scalars(t, y, dydt, out, handle):
     """Add the scalars in the flows through the ends of conduits to the rates of the amounts in the cells there."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     layout, nodes = tables.layout[0], tables.nodes.size
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
@@ -233,7 +233,7 @@ def add_end_scalars(t, y, dydt, out, handle):
 @njit
 def damp_conduits(h, y, rates, quick, handle):
     """Divide the rates of flows by 1 + h R for friction, and write h R to `quick`; see `bed_friction.damp_flows`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["damped"] == 0:
@@ -258,7 +258,7 @@ def damp_conduits(h, y, rates, quick, handle):
 @njit
 def observe_conduits(t, y, out, handle, values):
     """Write the values of probes in conduits: scale times depth [m], area [m2] or flow [m3/s], plus offset."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != OWN_CODE:

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.errors import Notice
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.basin_terms import SHORTAGES
 from fvsolve.features.basins.conduit import conduit_rates
 from fvsolve.features.basins.conduit.conduit_cells import (
@@ -116,7 +116,7 @@ class ConduitWaterRows(RowsWithFriction):
         row["table"] = draft.to_plane(np.array(self.section))
         row["work"] = draft.to_work(conduit_rates.WORK + 2 * self.n)
         row["rest"] = self.case.properties.density * self.case.gravity * self.part.level
-        row["friction"] = rec.MANNING if any(self.rough) else rec.NO_DRAG
+        row["friction"] = records.MANNING if any(self.rough) else records.NO_DRAG
         row["roughness"] = draft.to_plane(np.array(self.rough))
         row["held"], row["damped"], row["unsplit"] = self.rate_cap, self.damped, COURANT_FACTOR
 
@@ -124,12 +124,12 @@ class ConduitWaterRows(RowsWithFriction):
         super().lower_patch(draft, patch, row)
         i = 0 if patch == "from" else -1
         level = self.part.level
-        row["closure"], row["valve"] = (
-            rec.LINKED,
-            draft.valve_names.index(f"{self.name}.{patch}.face"),
-        )
+        row["closure"] = records.LINKED
+        row["valve"] = k = draft.valve_names.index(f"{self.name}.{patch}.face")
         row["rest"], row["lowest"] = self.conduit.inverts[i] - level, max(self.bed[i] - level, 0.0)
         row["depth"], row["inside"], row["stencil"] = -1, draft.to_work(INSIDE), 1
+        at = int(draft.valve_table[k]["data"]) + len(self.section)
+        draft.floats[at : at + 2] = float(row["lowest"]), float(row["inside"])
         row["second"] = len(draft.integers)
         inner = min(1, self.n - 1) if patch == "from" else max(self.n - 2, 0)
         draft.integers.append(inner)

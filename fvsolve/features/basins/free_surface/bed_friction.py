@@ -9,8 +9,8 @@ on a body that forces move, cap r smoothly, r -> r / (1 + r / RATE_CAP); thin fi
 from math import sqrt
 
 from fvsolve.core.kernels.cube_root import cube_root_reciprocal
-from fvsolve.core.kernels.dtypes import MANNING
 from fvsolve.features.basins.free_surface.surface_rows import THIN
+from fvsolve.features.basins.tables import MANNING
 from fvsolve.jit import njit
 
 RATE_CAP = 20.0  # [1/s]

@@ -1,20 +1,22 @@
 """Flow through the faces of a patch from the junction of its links into its cells, by the level at the junction.
 
-Its number is the row of the patch. The pressure of the cells is their mean, so the level of the junction above that at
-rest is the sum of this pressure and the drop over rho g. The flow is that of `patch_closures.patch_flow`.
+Its numbers are those of the patch: lowest bed of its cells above the level at rest, offset in `work` of the states
+inside its faces, number of its faces. The pressure of the cells is their mean, so the level of the junction above that
+at rest is the sum of this pressure and the drop over rho g. The flow is that of `patch_closures.patch_flow`.
 """
 
 from fvsolve.core.kernels.dtypes import FIRM
 from fvsolve.core.kernels.structures import FACE_SHARE, least_slope
 from fvsolve.features.basins.free_surface.patch_closures import (
     DEEPEST,
-    faces_inside,
+    faces_at,
     lowest_bed,
     patch_flow,
     solve_level,
 )
 from fvsolve.jit import njit
 
+NUMBERS = 3  # of a patch
 SAME_FLOW = 1e-9  # relative difference of flows that counts as rounding
 NEAR = 1e-12  # least length of a chord [m]
 # derivative at dry faces over their length: speed of waves in a millimetre of water [m/s]
@@ -22,11 +24,21 @@ DRY_SPEED = 0.1
 
 
 @njit
-def junction_level(out, tables, patch, drop):
-    """Level of the junction of a patch above the level at rest [m]. drop : of pressure, to the cells [Pa]"""
-    st = tables.settings[0]
-    pressure = out[tables.layout[0]["pressure"] + patch["node"]] + drop
-    return pressure / (st["rho"] * st["gravity"]) + patch["lowest"]
+def junction_level(out, tables, k, drop):
+    """Level of the junction of a patch above the level at rest [m].
+
+    k : restriction of its faces; drop : of pressure, to the cells [Pa]
+    """
+    st, valve = tables.settings[0], tables.valves[k]
+    pressure = out[tables.layout[0]["pressure"] + valve["to_node"]] + drop
+    return pressure / (st["rho"] * st["gravity"]) + tables.floats[valve["data"]]
+
+
+@njit
+def faces_of(tables, k):
+    """State inside the faces of the patch of restriction k, as for `patch_flow`."""
+    at = tables.valves[k]["data"]
+    return faces_at(tables.work, int(tables.floats[at + 1]), int(tables.floats[at + 2]))
 
 
 @njit
@@ -61,22 +73,15 @@ def level_step(g, faces, z, target, firm):
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
     """(a, s) of `restrictions.restriction_step`: Newton's step."""
-    patch, st = tables.patches[int(tables.floats[tables.valves[k]["data"]])], tables.settings[0]
-    z = junction_level(out, tables, patch, drop)
-    a, s = level_step(
-        st["gravity"], faces_inside(tables, patch), z, m / st["rho"], FACE_SHARE * out[FIRM]
-    )
+    st = tables.settings[0]
+    z = junction_level(out, tables, k, drop)
+    a, s = level_step(st["gravity"], faces_of(tables, k), z, m / st["rho"], FACE_SHARE * out[FIRM])
     return st["rho"] * a, s / st["gravity"]
 
 
 @njit
 def slope(out, tables, k, g, drop):
     """Derivative of the mass flow by the drop [kg/s/Pa]."""
-    patch = tables.patches[int(tables.floats[tables.valves[k]["data"]])]
     gravity = tables.settings[0]["gravity"]
-    return (
-        patch_flow(gravity, junction_level(out, tables, patch, drop), faces_inside(tables, patch))[
-            1
-        ]
-        / gravity
-    )
+    z = junction_level(out, tables, k, drop)
+    return patch_flow(gravity, z, faces_of(tables, k))[1] / gravity

@@ -15,6 +15,7 @@ from fvsolve.core.kernels.rhs_assembly import RhsTerms
 from fvsolve.core.kernels.structures import FACE_SHARE
 from fvsolve.errors import Notice
 from fvsolve.features.basins import mesh_blocks
+from fvsolve.features.basins import tables as records
 from fvsolve.features.basins.basin_terms import FRAME_FORCES, SHORTAGES
 from fvsolve.features.basins.free_surface import (
     law_patch_face,
@@ -61,11 +62,11 @@ TIME_SCALE = 10.0  # [s] of condensed times of soils
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
 CLOSURES = {  # key of a driven patch, or word of its key `boundary` -> code
-    "stage": rec.STAGE,
-    "discharge": rec.DISCHARGE,
-    "rating": rec.RATING,
-    "normal_slope": rec.NORMAL_SLOPE,
-    "critical": rec.CRITICAL,
+    "stage": records.STAGE,
+    "discharge": records.DISCHARGE,
+    "rating": records.RATING,
+    "normal_slope": records.NORMAL_SLOPE,
+    "critical": records.CRITICAL,
 }
 # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
 COURANT_FACTOR = 2.0
@@ -80,15 +81,15 @@ def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]
     if all(np.ptp(values) == 0.0 for values in fields):
         fields = [np.full(water_sources.CHUNK, values[0]) for values in fields]
     if model == "constant":
-        return rec.CONSTANT_RATE, np.array(fields)
+        return records.CONSTANT_RATE, np.array(fields)
     if model == "green-ampt":
         conductivity, suction, deficit = fields
         store, ponded = suction * deficit, conductivity * water_sources.EARLY
-        return rec.GREEN_AMPT, np.array(
+        return records.GREEN_AMPT, np.array(
             [conductivity, store, np.sqrt(2.0 * store * ponded) + ponded]
         )
     initial, final, decay = fields
-    return rec.HORTON, np.array([final, initial - final, decay])
+    return records.HORTON, np.array([final, initial - final, decay])
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
@@ -124,8 +125,7 @@ class PatchFaceRows(Restriction, kind="patch-face"):
         row["drive"] = 1.0
 
     def numbers(self, draft, name, link) -> list[float]:
-        patches = [place for place in draft.case.places.values() if place.kind == "patch"]
-        return [float(patches.index(draft.case.places[link.to]))]
+        return [0.0] * law_patch_face.NUMBERS  # written by `lower_patch`
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function as in `Restriction.stepper`, for water at rest."""
@@ -207,7 +207,8 @@ class FreeSurfaceRows(RowsWithFriction):
         return 0 if self.soil is None else 1 if self.soil.model == "constant" else 2
 
     def lower_sources(self, draft, row) -> None:
-        row["present"], row["source"] = draft.to_work(water_sources.PRESENT_NUMBERS), draft.sources
+        row["present"] = draft.to_work(water_sources.PRESENT_NUMBERS)
+        row["source"] = sum(len(other.source_names) for other in draft.meshed[: self.number])
         if self.soil is not None:  # right after the states of cells
             row["soil"], numbers = soil_numbers(
                 self.soil.model, [self.formula(shape) for shape in self.soil.shapes]
@@ -234,7 +235,6 @@ class FreeSurfaceRows(RowsWithFriction):
                 rain = Schedule(kind, times, frames @ self.mesh.area / self.mesh.area.sum())
             row["rain"] = draft.schedules.add(rain)
             row["rained"] = draft.states(Numbered(f"{self.name}.rained", 1), HEIGHT_SCALE)
-        draft.sources += len(self.source_names)
 
     def mass_in_soil(self, y: np.ndarray) -> float:
         at = int(self.row["infiltrated"])
@@ -278,8 +278,12 @@ class FreeSurfaceRows(RowsWithFriction):
             )
             draft.integers += faces.ravel().tolist()
         if has_faces:
-            row["closure"] = rec.INTERIOR if is_interior else rec.LINKED
-            row["valve"] = draft.valve_names.index(f"{self.name}.{patch}.face")
+            row["closure"] = records.INTERIOR if is_interior else records.LINKED
+            row["valve"] = k = draft.valve_names.index(f"{self.name}.{patch}.face")
+            at = int(draft.valve_table[k]["data"])
+            draft.floats[at : at + law_patch_face.NUMBERS] = map(
+                float, (row["lowest"], row["inside"], row["faces"])
+            )
             return
         stated = self.part.patches[patch]
         row["closure"] = CLOSURES[stated.closure]
@@ -340,7 +344,7 @@ class FreeSurfaceRows(RowsWithFriction):
         part, weight = self.part, self.case.properties.density * self.case.gravity
         row["rest"] = weight * (part.level + (part.elevation or 0.0))
         if part.manning is not None or part.factor is not None:
-            row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
+            row["friction"] = records.DARCY if part.manning is None else records.MANNING
             row["roughness"] = draft.to_plane(self.roughness)
             row["held"], row["damped"] = self.rate_cap, self.damped
         row["unsplit"] = COURANT_FACTOR
@@ -503,7 +507,7 @@ class FreeSurfaceRows(RowsWithFriction):
     def friction_in_cells(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         depth = self.depth_of(y)
         zeros = np.zeros(self.n)
-        law = rec.DARCY if self.part.manning is None else rec.MANNING
+        law = records.DARCY if self.part.manning is None else records.MANNING
         rate = np.zeros(self.n)
         flows = (y[1], y[2])
         contents = (zeros - 1.0, zeros)

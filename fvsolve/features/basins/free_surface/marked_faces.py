@@ -16,7 +16,6 @@ import numpy as np
 
 from fvsolve.core.kernels.dtypes import SECTION_FLOW
 from fvsolve.core.kernels.structures import weir_flow
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.cell_sides import BLOCK, CELL, INDICES
 from fvsolve.features.basins.free_surface.surface_rows import (
     AFTER,
@@ -30,6 +29,7 @@ from fvsolve.features.basins.free_surface.surface_rows import (
     WAVE,
 )
 from fvsolve.features.basins.hll_flux import hll_flux
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 WEIR_ENDS, FLUX_BEGINS = 0.9, 0.95  # lesser over greater depth above the crest
@@ -342,7 +342,7 @@ def save_sums(marks, row, w, rows):
 @njit
 def observe_sections(t, y, out, handle, values):
     """Write the flows through sections [m3/s]: sums of flows of marked faces times weights."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]
         if probe["kind"] == SECTION_FLOW:

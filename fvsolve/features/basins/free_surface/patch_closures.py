@@ -17,23 +17,23 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.core.kernels.cube_root import cube_root_reciprocal
-from fvsolve.core.kernels.dtypes import (
+from fvsolve.core.kernels.dtypes import PATCH_FROUDE
+from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.features.basins.basin_patches import physics_code
+from fvsolve.features.basins.cell_sides import deviations_of
+from fvsolve.features.basins.free_surface.surface_rows import THIN
+from fvsolve.features.basins.hll_flux import TINY
+from fvsolve.features.basins.tables import (
     CRITICAL,
     DISCHARGE,
     INTERIOR,
     LINKED,
     NO_CLOSURE,
     NORMAL_SLOPE,
-    PATCH_FROUDE,
     RATING,
     STAGE,
+    open_basins,
 )
-from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.features.basins.basin_patches import physics_code
-from fvsolve.features.basins.cell_sides import deviations_of
-from fvsolve.features.basins.free_surface.surface_rows import THIN
-from fvsolve.features.basins.hll_flux import TINY
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -257,9 +257,14 @@ def read_cell(plane, basin, k, x, y, deviations):
 @njit
 def faces_inside(tables, patch):
     """Four arrays of the state inside the faces of a patch, see `read_faces`."""
-    at, n = patch["inside"], patch["faces"]
-    work = tables.work[at : at + 4 * n]
-    return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n :]
+    return faces_at(tables.work, patch["inside"], patch["faces"])
+
+
+@njit
+def faces_at(work, at, n):
+    """Four arrays of the state inside n faces, from index `at` of the array `work` on."""
+    rows = work[at : at + 4 * n]
+    return rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n :]
 
 
 @njit
@@ -528,7 +533,7 @@ def put_discharge(tables, patch, rows, total, target, wide, given, may_hold, lea
 @njit
 def close_patches(t, y, dydt, out, handle):
     """Write flows and momentum at the faces of all driven patches, for the rates of cells."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
@@ -543,7 +548,7 @@ def close_patches(t, y, dydt, out, handle):
 @njit
 def observe_froude(t, y, out, handle, values):
     """Write the Froude numbers of flows through driven patches: flow over the sum of length, depth and wave speed."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     g = tables.settings[0]["gravity"]
     for p in range(tables.probes.size):
         if tables.probes[p]["kind"] == PATCH_FROUDE:

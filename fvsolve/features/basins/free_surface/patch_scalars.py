@@ -6,13 +6,12 @@ interior patch leave in proportion to their volumes. The network reads the amoun
 so the schemes of advection take these faces for walls, and their flows are added here.
 """
 
-from fvsolve.core.kernels.dtypes import INTERIOR, LINKED
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.basin_scalars import cell_value
 from fvsolve.features.basins.boundary_cells import LEAST_DEPTH, depth_at_patch, patch_area
 from fvsolve.features.basins.cell_sides import deviations_of
 from fvsolve.features.basins.free_surface.patch_closures import FLOW, faces_inside
+from fvsolve.features.basins.tables import INTERIOR, LINKED, open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -62,7 +61,7 @@ def values_at_faces(t, y, dydt, out, handle):
     Without outflow the mean of the cells, which `patch_values` has written, remains. The flows through these faces are
     set to zero for the schemes of advection.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
@@ -82,7 +81,7 @@ def values_at_faces(t, y, dydt, out, handle):
 @njit
 def add_face_flows(t, y, dydt, out, handle):
     """Add the scalars in the flow of links through patches of water to the rates of cells."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]

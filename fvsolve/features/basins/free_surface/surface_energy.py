@@ -6,9 +6,7 @@ width q [m2/s]. For the rows of the array `power` see `basin_output`.
 
 from math import sqrt
 
-from fvsolve.core.kernels.dtypes import INTERIOR, LINKED, NO_DRAG
 from fvsolve.core.kernels.network_energy import total_pressure
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_output import basin_first_row, rest_potential
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.boundary_cells import (
@@ -28,6 +26,7 @@ from fvsolve.features.basins.free_surface.patch_closures import (
 )
 from fvsolve.features.basins.free_surface.surface_rows import THIN
 from fvsolve.features.basins.moving_walls import area_growth_rate
+from fvsolve.features.basins.tables import INTERIOR, LINKED, NO_DRAG, open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -43,7 +42,7 @@ def velocity_factor(depth):
 @njit
 def add_power(t, y, dydt, out, handle, power):
     """Write losses at patches, power of friction and rate of storage of all basins of water to `power` [W]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     patches, layout = tables.patches, tables.layout[0]
     for b in range(tables.basins.size):
         if tables.basins[b]["kind"] == OWN_CODE:
@@ -213,7 +212,7 @@ def interior_loss(tables, patch, flow, y, dydt, out):
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
     """Write the stored energy of all basins of water, relative to that at rest, to `stored` [J]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st = tables.settings[0]
     basins = tables.basins
     plane = tables.plane
@@ -244,7 +243,7 @@ def is_moving(basin):
 @njit
 def add_wall_power(t, y, dydt, out, handle, power):
     """Correct the rate of storage in `power` for changing cell areas A: subtract rho g h^2 / 2 dA/dt [W] of cells."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -264,7 +263,7 @@ def add_wall_power(t, y, dydt, out, handle, power):
 @njit
 def add_wall_stored(t, y, dydt, out, handle, stored):
     """Add the energy of water at rest [J] on the area that cells have gained by the motion of walls to `stored`."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st = tables.settings[0]
     plane = tables.plane
     first = stored.size - tables.basins.size

@@ -13,9 +13,9 @@ their bands into one array.
 """
 
 from fvsolve.core.kernels.band_exchange import BAND
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.boundary_cells import band_cells
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -56,7 +56,7 @@ def record_maxima(t, y, out, handle, values):
 
     y : states, of basins with moving walls the deviations `seen`. Only the first band updates an undivided basin.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or basin["maxima"] < 0:

@@ -2,9 +2,8 @@
 
 from math import inf, sqrt
 
-from fvsolve.core.kernels.dtypes import CELL_FIELD, GN, INTERIOR, LINKED, NO_SOIL, PATCH, RATE
+from fvsolve.core.kernels.dtypes import CELL_FIELD, PATCH, RATE
 from fvsolve.core.kernels.restrictions import head_drop
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import boundary_cells as near
 from fvsolve.features.basins.basin_frames import potential_coefficients
 from fvsolve.features.basins.basin_output import FIRST_OWN, velocity_value
@@ -25,6 +24,7 @@ from fvsolve.features.basins.free_surface.water_sources import (
     rain_rate,
     sum_of_products,
 )
+from fvsolve.features.basins.tables import GN, INTERIOR, LINKED, NO_SOIL, open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -107,7 +107,7 @@ def patch_pressures(t, y, dydt, out, handle):
     [Pa/kg]. The supply of the node is set to 0. States inside the faces of linked patches are written to their work
     arrays.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st, layout = tables.settings[0], tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -137,7 +137,7 @@ def patch_pressures(t, y, dydt, out, handle):
 @njit
 def patch_flows(t, y, dydt, out, handle):
     """Add the mass and momentum of flows through patches of water to the rates of the cells next to them."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -254,7 +254,7 @@ def limit_inflow_rate(t, y, dydt, out, handle):
 
     Their speed is taken as sqrt(drop / rho), with the pressure drop across the valve.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st = tables.settings[0]
     valves = tables.valves
     patches = tables.patches
@@ -276,7 +276,7 @@ def observe_water(t, y, out, handle, values):
 
     `scale` and `offset` are columns of the table of probes.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != OWN_CODE:

@@ -3,8 +3,7 @@
 from math import inf
 
 from fvsolve.core.kernels import stage_sums as sums_of
-from fvsolve.core.kernels.dtypes import NO_DRAG, NO_SOIL, RATE
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.core.kernels.dtypes import RATE
 from fvsolve.features.basins import mesh_blocks
 from fvsolve.features.basins.basin_patches import (
     needs_rates,
@@ -32,6 +31,7 @@ from fvsolve.features.basins.free_surface.water_sources import (
 )
 from fvsolve.features.basins.moving_meshes import mesh_motion
 from fvsolve.features.basins.moving_walls import grid_motion
+from fvsolve.features.basins.tables import NO_DRAG, NO_SOIL, open_basins
 from fvsolve.jit import njit, specialise
 
 OWN_CODE = physics_code(__package__)
@@ -97,7 +97,7 @@ def damp_stages(h, y, rates, quick, handle):
 
     h : time step [s]; quick : h R of each unit flow is written here; for R see `bed_friction.damp_flows`
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     g = tables.settings[0]["gravity"]
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -347,7 +347,7 @@ def _rates(t, y, dydt, out, handle):
 
     The flows through open patches are written to `out`, and out[RATE], which limits the step, is raised.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if (

@@ -18,8 +18,8 @@ the capacity, and T stays as it is.
 
 from math import exp, log1p, sqrt
 
-from fvsolve.core.kernels.dtypes import CONSTANT_RATE, GREEN_AMPT, HORTON, NO_SOIL
 from fvsolve.core.kernels.schedule_pieces import schedule_value
+from fvsolve.features.basins.tables import CONSTANT_RATE, GREEN_AMPT, HORTON, NO_SOIL
 from fvsolve.jit import njit
 
 DRAIN_TIME = 10.0  # [s]

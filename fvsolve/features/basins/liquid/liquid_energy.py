@@ -5,10 +5,10 @@ density rho, its deviation r [kg/m3], wave speed a [m/s], mass-flow density m [k
 `power` see `basin_output`.
 """
 
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_output import basin_first_row, rest_potential
 from fvsolve.features.basins.basin_patches import physics_code
 from fvsolve.features.basins.moving_walls import area_growth_rate, speed_of
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit
 
 OWN_CODE = physics_code(__package__)
@@ -17,7 +17,7 @@ OWN_CODE = physics_code(__package__)
 @njit
 def add_power(t, y, dydt, out, handle, power):
     """Write the rate of change of the stored energy of every liquid to `power` [W]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         if tables.basins[b]["kind"] == OWN_CODE:
             rows = power[basin_first_row(tables, power, b) :]
@@ -44,7 +44,7 @@ def liquid_power(st, basin, plane, y, dydt, rows):
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
     """Write the stored energy of every liquid, relative to that at rest, to `stored` [J]."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st, basins = tables.settings[0], tables.basins
     for b in range(basins.size):
         basin, total = basins[b], 0.0
@@ -87,7 +87,7 @@ def add_wall_power(t, y, dydt, out, handle, power):
 
     In a smaller area the same mass has a higher density and energy. Moving walls also change the potential energy.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
         basin, total = tables.basins[b], 0.0
@@ -116,7 +116,7 @@ def add_wall_power(t, y, dydt, out, handle, power):
 @njit
 def add_wall_stored(t, y, dydt, out, handle, stored):
     """Add the potential energy of the mass displaced by walls [J] to the stored energy of their basins."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     first = stored.size - tables.basins.size
     for k in range(tables.walls.size):
         wall = tables.walls[k]

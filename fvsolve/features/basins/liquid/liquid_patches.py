@@ -3,12 +3,12 @@
 from math import log1p
 
 from fvsolve.core.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins.basin_output import FIRST_OWN, velocity_value
 from fvsolve.features.basins.basin_patches import add_link_momentum, physics_code
 from fvsolve.features.basins.boundary_cells import patch_area, patch_length
 from fvsolve.features.basins.cell_sides import deviations_of, stretch_of_cell
 from fvsolve.features.basins.liquid.riemann_invariants import pressure
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit, specialise
 
 OWN_CODE = physics_code(__package__)
@@ -76,7 +76,7 @@ def _patch_pressures(t, y, dydt, out, handle):
     The pressure is the deviation from the steady start [Pa]; the slope is per mass in the cells next to the patch
     [Pa/kg]. The supply of the node is set to 0, the available fraction of outflow to 1.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
         patch = tables.patches[k]
@@ -106,7 +106,7 @@ patch_pressures_table = specialise(_patch_pressures, "patch_pressures_table", TA
 @njit
 def patch_flows(t, y, dydt, out, handle):
     """Add the mass and momentum of flows through patches of liquids to the rates of the cells next to them."""
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
@@ -161,7 +161,7 @@ def _observe_liquid(t, y, out, handle, values):
     A pressure is the first result of `READ` plus `offset`, under other density laws than `table` multiplied by `scale`:
     two columns of the table of probes.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:

@@ -9,7 +9,6 @@ side the liquid rests in the same axes, with its pressure at rest at their origi
 
 from fvsolve.core.kernels import stage_sums as sums_of
 from fvsolve.core.kernels.dtypes import RATE
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.basins import basin_frames as frames
 from fvsolve.features.basins import mesh_blocks
 from fvsolve.features.basins.basin_patches import needs_rates, physics_code, put_open_flows
@@ -24,6 +23,7 @@ from fvsolve.features.basins.liquid.liquid_sides import (
 )
 from fvsolve.features.basins.moving_meshes import mesh_motion
 from fvsolve.features.basins.moving_walls import grid_motion
+from fvsolve.features.basins.tables import open_basins
 from fvsolve.jit import njit, specialise
 
 OWN_CODE = physics_code(__package__)
@@ -295,7 +295,7 @@ def _rates(t, y, dydt, out, handle):
 
     The flows through open patches are written to `out`, and out[RATE], which limits the step, is raised.
     """
-    tables = open_tables(handle)
+    tables = open_basins(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["kind"] != OWN_CODE or (basin["nx"] > 0) != GRIDS or motion_of(basin) != MOTION:

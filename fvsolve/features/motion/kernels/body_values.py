@@ -159,8 +159,8 @@ def joint_load(out, tables, i):
         force = minus(plus(force, push), applied)
         torque = plus(torque, minus(turn, vector_product(offset, applied)))
         # FORCE contains the water of a basin for q'' = 0; here follows its part due to q''.
-        for k in range(tables.basins.size):
-            if tables.basins[k]["body"] == j and tables.basins[k]["loads_body"] == 1:
+        for k in range(tables.tanks.size):
+            if tables.tanks[k]["body"] == j and tables.tanks[k]["loads_body"] == 1:
                 load = extra_basin_load(out, tables, k)
                 force = minus(force, load[:3])
                 torque = minus(minus(torque, load[3:]), vector_product(offset, load[:3]))
@@ -173,7 +173,7 @@ def extra_basin_load(out, tables, b):
 
     Returns six numbers in axes of the world: force [N], torque about the origin of the body [N m].
     """
-    here, tank = body_row(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    here, tank = body_row(tables, tables.tanks[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     arm = minus(vector(out, tank + layout.BASIN_ARM), vector(out, here + layout.ARM))
     # Only the part of the motion that q'' causes: total minus bias.
     spin = minus(vector(out, here + layout.SPIN_RATE), vector(out, here + layout.SPIN_BIAS))

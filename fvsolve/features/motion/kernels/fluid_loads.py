@@ -555,8 +555,8 @@ def add_basin_inertia(out, tables):
     freedoms = tables.freedoms
     paths = tables.integers
     n = tables.freedoms.size
-    for b in range(tables.basins.size):
-        i = nearest_free_body(tables, tables.basins[b]["body"])
+    for b in range(tables.tanks.size):
+        i = nearest_free_body(tables, tables.tanks[b]["body"])
         tank = tables.layout[0]["tank"] + TANK_OUT * b
         if i < 0:
             continue

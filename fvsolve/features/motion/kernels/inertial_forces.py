@@ -102,13 +102,13 @@ def tank_drives(tables, out, i, level):
     """(`bottom_pressure_per_density` of the tank at node i, its value under gravity at the start) [J/kg].
 
     A tank whose fluid has no weight at its surface would lose the fluid: it ends the run, by the status NO_WEIGHT.
-    out[WHERE] is then i plus the number of basins, because lower numbers denote basins.
+    out[WHERE] is then i plus the number of parts with a mesh, which lower numbers denote.
     """
     segment = tables.moving_segments[tables.nodes[i]["forcing"]]
     drive = bottom_pressure_per_density(tables, out, segment, level)
     # The pressure must rise with depth at the surface, or the fluid would leave it.
     if not bottom_pressure_per_density(tables, out, segment, level + THIN_LAYER) > drive:
-        out[STATUS], out[WHERE] = NO_WEIGHT, tables.basins.size + i
+        out[STATUS], out[WHERE] = NO_WEIGHT, tables.tanks.size + i
     return drive, segment["rest"]
 
 

@@ -89,6 +89,11 @@ MOVING_SEGMENT = record(
     loads_body=i8,  # load on the body: MOVED_BY_FORCES, JOINT_LOAD_READ, or 0 if neither applies
 )
 
+TANK = record(  # fluid of a part with a mesh, in the order of its numbers in `out`
+    body=i8,  # body that carries it; -1 for none
+    loads_body=i8,  # 1 if its load acts on that body: forces move it, or the joint load is read
+)
+
 MASS = record(
     y=i8,  # offset in y of its position, then velocity, both as deviations; -1 for a frame
     lightness=f8,  # 1 / mass, 0 for a frame [1/kg]
@@ -155,6 +160,7 @@ RECORDS = {
     "pins": PIN,
     "bushings": BUSHING,
     "moving_segments": MOVING_SEGMENT,
+    "tanks": TANK,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,

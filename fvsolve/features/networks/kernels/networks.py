@@ -159,11 +159,10 @@ def known_sources(t, y, dydt, out, handle):
 @njit
 def write_temperatures(y, out, tables):
     """Write the temperatures of the thermal nodes of heat exchangers, in the unit of the scalar, to `out`."""
-    exchangers, at = tables.exchangers, tables.layout[0]["exchange"]
-    if exchangers.size > 0:
-        zero = tables.scalars[tables.settings[0]["temperature"]]["zero"]
-        for k in range(exchangers.size):
-            out[at + 2 * k] = row_value(y, out, tables, exchangers[k]["place"]) - zero
+    rows, at = tables.thermal_rows, tables.layout[0]["exchange"]
+    zero = tables.network_settings[0]["zero"]
+    for k in range(rows.size):
+        out[at + 2 * k] = row_value(y, out, tables, rows[k]) - zero
 
 
 @njit

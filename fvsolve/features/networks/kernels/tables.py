@@ -39,8 +39,12 @@ NETWORK_SWITCH = record(
     factor=f8,  # greatest torque at rest over a scheduled torque
     rounding=f8,  # slip of friction, or reverse current of a diode, that is rounding
 )
-NETWORK_SETTINGS = record(inputs=i8)  # offset in `out` of the sources: change since the start
+NETWORK_SETTINGS = record(
+    inputs=i8,  # offset in `out` of the sources: change since the start
+    zero=f8,  # absolute temperature at which the temperature of the fluid is 0 in its unit [K]
+)
 # turned : row of the speed of each shaft that a device reads; turned_devices : these devices
+# thermal_rows : row of the temperature of the thermal node of each heat exchanger
 # network_places, network_factors : written by a run, see `networks`
 NetworkTables = namedtuple(
     "NetworkTables",
@@ -52,6 +56,7 @@ NetworkTables = namedtuple(
         "network_settings",
         "turned",
         "turned_devices",
+        "thermal_rows",
         "network_places",
         "network_factors",
     ),
@@ -64,7 +69,7 @@ def network_types() -> NetworkTables:
     from numba import from_dtype, types
 
     records = (NETWORK_INPUT, NETWORK_RATE, NETWORK_ELEMENT, NETWORK_SWITCH, NETWORK_SETTINGS)
-    kinds = (*map(from_dtype, records), types.int64, types.int64, types.int64, types.float64)
+    kinds = (*map(from_dtype, records), *[types.int64] * 4, types.float64)
     return NetworkTables(*(types.Array(kind, 1, "C") for kind in kinds))
 
 

@@ -16,8 +16,9 @@ from fvsolve.core.kernels.pipe_energy import (
 )
 from fvsolve.core.kernels.steady_friction import drag
 from fvsolve.core.kernels.table_handle import open_tables
-from fvsolve.core.kernels.viscosity import cell_reynolds
 from fvsolve.features.scalars.kernels.scalar_transport import heated_scalar
+from fvsolve.features.scalars.kernels.tables import open_scalars
+from fvsolve.features.scalars.kernels.viscosity import cell_reynolds
 from fvsolve.jit import specialise
 
 POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates
@@ -25,7 +26,7 @@ POTENTIAL = BAROTROPIC = RESTRICTIONS = None  # constants of the templates
 
 def _heat_of_restrictions(t, y, dydt, out, handle):
     """Write the heat of restrictions over the specific heat [kg K/s] to `out`."""
-    tables = open_tables(handle)
+    tables, core = open_scalars(handle), open_tables(handle)
     st = tables.settings[0]
     layout = tables.layout[0]
     sources = tables.heat_sources
@@ -41,9 +42,9 @@ def _heat_of_restrictions(t, y, dydt, out, handle):
             hook, own = tables.hooks[device["hooks"], POWER], tables.hooks[device["hooks"], HEAT]
             # A device may state its heat; else all power that it dissipates is heat.
             if own != 0:
-                heat += calls.call_heat(own, t, y, out, tables, device)
+                heat += calls.call_heat(own, t, y, out, core, device)
             elif hook != 0:  # `y` in place of rates, which the dissipation does not read
-                heat += calls.call_power(hook, t, y, y, out, tables, device)[2]
+                heat += calls.call_power(hook, t, y, y, out, core, device)[2]
         out[layout["heat"] + j] = heat / specific_heat
 
 
@@ -53,10 +54,11 @@ def _heat_of_pipes(t, y, dydt, out, handle):
     The power of friction is averaged over a cell as in `pipe_energy.pipe_power`. Unsteady friction adds the part that
     its relaxation variables dissipate.
     """
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     st = tables.settings[0]
     layout = tables.layout[0]
-    scalar = tables.scalars[heated_scalar(tables)]
+    q = heated_scalar(tables)
+    scalar = tables.scalars[q]
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         pipe = tables.pipes[p]
         if pipe["heat"] < 0:
@@ -71,7 +73,7 @@ def _heat_of_pipes(t, y, dydt, out, handle):
         total = 0.0
         full = st["rho"] * pipe["area"]
         for i in range(n):
-            power, reynolds = 0.0, cell_reynolds(y, tables, p, i)
+            power, reynolds = 0.0, cell_reynolds(y, tables, q, p, i)
             for g in range(3):
                 a, b = at_point(r, width, i, g), at_point(l, width, i, g)
                 flow = pipe["flow"] + (a - b)

@@ -12,24 +12,26 @@ from math import inf, log
 
 from fvsolve.core.kernels.dtypes import (
     CELL_SCALAR,
-    CHANGE,
-    CHEMICAL_POWER,
-    FORWARD_ORDER,
     LOCAL_AFFINITY,
-    MOLAR_RATE,
     RATE,
     RATE_UNWANTED,
     REACTION_VALUE,
-    REVERSE_ORDER,
 )
 from fvsolve.core.kernels.formula_programs import run_program
-from fvsolve.core.kernels.table_handle import open_tables
 from fvsolve.features.scalars.kernels.scalar_transport import (
     DRY_DEPTH,
     cell_mass,
     has_storage,
     value_at_probe,
     wall_mass,
+)
+from fvsolve.features.scalars.kernels.tables import (
+    CHANGE,
+    CHEMICAL_POWER,
+    FORWARD_ORDER,
+    MOLAR_RATE,
+    REVERSE_ORDER,
+    open_scalars,
 )
 from fvsolve.jit import njit
 
@@ -157,7 +159,7 @@ def stored_mass(y, node):
 @njit
 def limit_rates(t, y, dydt, out, handle):
     """Write the greatest rate of change by reactions in pipes and nodes to `out`, if it limits steps [1/s]."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     at = tables.layout[0]["quickest"]
     scalar = tables.scalars[0]
     stride = scalar_stride(tables)
@@ -183,7 +185,7 @@ def limit_rates(t, y, dydt, out, handle):
 @njit
 def reaction_rates(t, y, dydt, out, handle):
     """Add changes by reactions to the rates in pipes and nodes; write rates of all reactions to the ledger."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     layout = tables.layout[0]
     scalar = tables.scalars[0]
     stride = scalar_stride(tables)
@@ -276,7 +278,7 @@ def chosen(code, sums):
 @njit
 def observe_reactions(t, y, out, handle, values):
     """Write the values of probes of reactions to `values`, without places in basins."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for j in range(tables.probes.size):
         probe = tables.probes[j]
         k, sums = probe["index"], tables.scratch[:4]

@@ -33,7 +33,7 @@ from fvsolve.core.kernels.dtypes import (
 )
 from fvsolve.core.kernels.reconstruction import by_limiter, inner_slopes, limited
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.scalars.kernels.tables import open_scalars
 from fvsolve.jit import njit
 
 # Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.
@@ -614,7 +614,7 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
 @njit
 def clear_losses(t, y, dydt, out, handle):
     """Clear the entries of decay in the record of gains and losses."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for q in range(tables.scalars.size):
         if tables.scalars[q]["losses"] > 0:
             out[tables.layout[0]["loss"] + tables.scalars[q]["loss"]] = 0.0
@@ -623,7 +623,7 @@ def clear_losses(t, y, dydt, out, handle):
 @njit
 def pipe_outlet_values(t, y, dydt, out, handle):
     """Write the values of all scalars in the water that leaves pipes to `out`."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for q in range(tables.scalars.size):
         outlet_values(y, out, tables, q)
 
@@ -634,7 +634,7 @@ def mix_scalars(t, y, dydt, out, handle):
 
     Also raise out[RATE] to the rate at which inflow replaces stored mass [1/s].
     """
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for q in range(tables.scalars.size):
         mix_nodes(t, y, out, tables, q)
         exchange_amounts(t, y, dydt, out, tables, q)
@@ -643,7 +643,7 @@ def mix_scalars(t, y, dydt, out, handle):
 @njit
 def mix_for_events(t, y, out, handle, g):
     """Write values of scalars at pipe ends and nodes to `out` before event functions of blocks; g is not used."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for q in range(tables.scalars.size):
         outlet_values(y, out, tables, q)
         mix_nodes(t, y, out, tables, q)
@@ -652,7 +652,7 @@ def mix_for_events(t, y, out, handle, g):
 @njit
 def scalar_rates(t, y, dydt, out, handle):
     """Write d/dt of the amounts of all scalars in pipes to `dydt`, unless it is empty."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         pipe_scalar_rates(y, dydt, out, tables, p)
 
@@ -688,7 +688,7 @@ def value_at_probe(y, out, tables, probe, kind, i, q):
 @njit
 def observe_scalars(t, y, out, handle, values):
     """Write the values of scalar probes to `values`: at a node, at a pipe end, or between the centres of two cells."""
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == NODE_SCALAR or probe["kind"] == PIPE_SCALAR:

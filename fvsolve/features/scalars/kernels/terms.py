@@ -37,4 +37,5 @@ HEAT_FOR_EVENTS = {
     False: RhsTerms(package=PACKAGE, events="fluid_heat: heat_for_events_barotropic"),
 }
 VALUES_FOR_EVENTS = RhsTerms(package=PACKAGE, events="scalar_transport: mix_for_events")
-VISCOSITY = RhsTerms(rates="viscosity: viscous_friction")
+VISCOSITY = RhsTerms(package=PACKAGE, rates="viscosity: viscous_friction")
+REYNOLDS = RhsTerms(package=PACKAGE, network_power="viscosity: write_reynolds")

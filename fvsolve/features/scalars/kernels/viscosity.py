@@ -10,7 +10,8 @@ from math import log10
 from fvsolve.core.kernels.dtypes import FRICTION_ROUGH, LAW_LINEAR
 from fvsolve.core.kernels.pipes import GAUSS
 from fvsolve.core.kernels.steady_friction import drag
-from fvsolve.core.kernels.table_handle import open_tables
+from fvsolve.features.scalars.kernels.scalar_transport import heated_scalar
+from fvsolve.features.scalars.kernels.tables import open_scalars
 from fvsolve.jit import njit
 
 SAME = 1e-14  # relative difference of temperatures that is rounding
@@ -25,25 +26,39 @@ def walther_viscosity(a, b, temperature):
 
 
 @njit
-def cell_reynolds(y, tables, p, i):
-    """Reynolds number per mass flow [s/kg] in cell i of pipe p, at the present temperature of the cell."""
-    st, pipe = tables.settings[0], tables.pipes[p]
-    if st["walther_b"] == 0.0 or pipe["friction"] != FRICTION_ROUGH:
+def cell_reynolds(y, tables, q, p, i):
+    """Reynolds number per mass flow [s/kg] in cell i of pipe p, at the present temperature of the cell.
+
+    q : number of the scalar that is this temperature
+    """
+    scalar, pipe = tables.scalars[q], tables.pipes[p]
+    if scalar["walther_b"] == 0.0 or pipe["friction"] != FRICTION_ROUGH:
         return pipe["reynolds"]
-    k, n = st["temperature"], pipe["cells"]
+    n = pipe["cells"]
     mass = (
         tables.profile[pipe["center"] + i]
         + (y[pipe["y"] + i] + y[pipe["y"] + n + i]) / pipe["speed"]
     )
-    mass += tables.floats[tables.scalars[k]["wall_masses"] + p]
-    temperature = y[tables.scalars[k]["y"] + pipe["cell"] + i] / mass + tables.scalars[k]["zero"]
+    mass += tables.floats[scalar["wall_masses"] + p]
+    temperature = y[scalar["y"] + pipe["cell"] + i] / mass + scalar["zero"]
     # Rounding of the temperature must not disturb a steady flow.
     if abs(temperature - pipe["temperature"]) <= SAME * pipe["temperature"]:
         return pipe["reynolds"]
-    start = walther_viscosity(st["walther_a"], st["walther_b"], pipe["temperature"])
+    start = walther_viscosity(scalar["walther_a"], scalar["walther_b"], pipe["temperature"])
     return pipe["reynolds"] * (
-        start / walther_viscosity(st["walther_a"], st["walther_b"], temperature)
+        start / walther_viscosity(scalar["walther_a"], scalar["walther_b"], temperature)
     )
+
+
+@njit
+def write_reynolds(t, y, dydt, out, handle, power):
+    """Write the Reynolds numbers per mass flow in the cells of pipes to `work`, for the powers of friction."""
+    tables = open_scalars(handle)
+    q = heated_scalar(tables)
+    for p in range(tables.pipes.size):
+        at = tables.pipes[p]["present"]
+        for i in range(tables.pipes[p]["cells"] if at >= 0 else 0):
+            tables.work[at + i] = cell_reynolds(y, tables, q, p, i)
 
 
 @njit
@@ -52,8 +67,9 @@ def viscous_friction(t, y, dydt, out, handle):
 
     It is averaged over the two Gauss points of `pipes.subtract_friction`; with cavities it is that at the centre.
     """
-    tables = open_tables(handle)
+    tables = open_scalars(handle)
     st = tables.settings[0]
+    q = heated_scalar(tables)
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         pipe = tables.pipes[p]
         if pipe["friction"] != FRICTION_ROUGH:
@@ -68,7 +84,7 @@ def viscous_friction(t, y, dydt, out, handle):
         roughness = pipe["roughness"]
         before = pipe["reynolds"]
         for i in range(n):
-            now = cell_reynolds(y, tables, p, i)
+            now = cell_reynolds(y, tables, q, p, i)
             # The rates of waves already contain the friction at this temperature.
             if now == before:
                 continue
