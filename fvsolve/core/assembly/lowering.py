@@ -17,7 +17,7 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.restrictions import flow_at_drop, step_at, transition_of
 from fvsolve.core.steady import Edge
-from fvsolve.errors import Notice
+from fvsolve.errors import FvsolveError, Notice
 
 
 class InputKind(NamedTuple):
@@ -284,12 +284,27 @@ NEWTON_STEPS = 5  # Newton steps from a drop that is accurate to 1e-6
 def lowering_of(part: type) -> Lowering:
     """Conversion of a kind of part, from the module `lower` in the package of its declaration.
 
-    It is `NO_ROWS` if the kind has none.
+    It is `NO_ROWS` if the kind has none. Raises FvsolveError for a faulty conversion or law of another package.
     """
     package = part.__module__.rpartition(".")[0]
-    if find_spec(f"{package}.lower") is not None:
+    has_module = find_spec(f"{package}.lower") is not None
+    if has_module:
         import_module(f"{package}.lower")
-    return Lowering.kinds.get(part.kind, NO_ROWS)
+    lowering = Lowering.kinds.get(part.kind, NO_ROWS)
+    if isinstance(lowering, Device) and not lowering.quantities and hasattr(lowering.law, "value"):
+        lowering = lowering.varied(quantities=own_quantities(part))
+    if has_module and not package.startswith("fvsolve."):
+        from fvsolve.core.assembly.outside_parts import check_lowering
+
+        check_lowering(part, lowering, own_quantities(part))
+    return lowering
+
+
+def own_quantities(part: Any) -> tuple[str, ...]:
+    """Names of the quantities of a class of parts that its base class, such as a two-port, does not have."""
+    base = next(parent for parent in part.__mro__ if not getattr(parent, "kind", ""))
+    known = getattr(base, "quantities", {})
+    return tuple(name for name in getattr(part, "quantities", {}) if name not in known)
 
 
 NO_ROWS = Lowering()  # for parts without rows
@@ -312,7 +327,9 @@ def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
 class Device(Restriction):
     """Conversion of a kind of device to table rows: its states, and its state in the steady start.
 
-    mode : code of the kind in its law; quantities : names of its probes, in the order of codes in the law's `value`
+    mode : code of the kind in its law
+    quantities : names of its probes, in the order of codes in the law's `value`; if left out, those that its part adds
+    to the quantities of its base class
     events_only : True if only events open it; states : names of its states; remedy : advice for events that alternate
     controlling_event : index of the event by which it starts to control a rigid column, -1 for none
     """
@@ -496,9 +513,24 @@ def lower_devices(draft) -> None:
             row["valve"] = draft.valve_names.index(gate)
             draft.valve_table["device"][row["valve"]] = k
         draft.floats += device.numbers(draft, name, part)
-        for state, scale in zip(states, device.scales(draft, name, part), strict=True):
+        scales = device.scales(draft, name, part)
+        check_states(name, part, device, states, scales)
+        for state, scale in zip(states, scales, strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
+
+
+def check_states(name: str, part: Any, device: Device, states: tuple[str, ...], scales) -> None:
+    """Raise FvsolveError unless each state of a device has a scale above 0, and a function for its rate."""
+    moves = calls.hook_of(device.law, "move") is not None
+    outside = device.law is not None and not device.law.__name__.startswith("fvsolve.")
+    valid = len(scales) == len(states) and all(
+        isinstance(scale, (int, float, np.number)) and 0.0 < scale < math.inf for scale in scales
+    )
+    if not valid or (states and outside and not moves):
+        from fvsolve.core.assembly.outside_parts import fault_of_states
+
+        raise FvsolveError(fault_of_states(name, part, device, states, scales))
 
 
 def opening_of(start, k: int) -> float:
