@@ -89,31 +89,10 @@ GROUPS = {
 }
 
 
-def source_of(module: str) -> str:
-    """Package of others that contains a module, for messages: "the part tube of the package outkit".
-
-    module : name of the module. The text is "" for a module of fvsolve, of Python, and of a package without an entry
-    point.
-    """
-    first, _, below = module.partition(".")
-    if first == "fvsolve":
-        return ""
-    if first == OUTSIDE_FOLDERS and below:
-        (folder, *_) = sys.modules[f"{first}.{below.partition('.')[0]}"].__path__
-        return f"the part in the folder {folder}"
-    found = ""
-    for entry in _entry_points_on(tuple(sys.path)):
-        place = entry.place.partition(":")[0].strip()
-        if f"{module}.".startswith(f"{place}."):
-            return f"the {GROUPS.get(entry.group, 'object')} {entry.name} of the package {entry.package}"
-        if place.partition(".")[0] == first:
-            found = f"the package {entry.package}"
-    return found
-
-
-def entry_points(group: str) -> list[EntryPoint]:
-    """Entry points of a group, of all installed packages."""
-    return [entry for entry in _entry_points_on(tuple(sys.path)) if entry.group == group]
+def entry_points(group: str = "") -> list[EntryPoint]:
+    """Entry points of a group, or of all groups, of all installed packages."""
+    found = _entry_points_on(tuple(sys.path))
+    return [entry for entry in found if group in ("", entry.group)]
 
 
 @cache

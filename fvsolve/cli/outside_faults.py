@@ -5,7 +5,7 @@ import re
 import sys
 from types import FrameType, TracebackType
 
-from fvsolve.declarations import source_of
+from fvsolve.core.assembly.lowering_checks import source_of
 from fvsolve.errors import did_you_mean
 
 # Error messages of numba: place of a fault, of records without a column, and lines that only repeat.

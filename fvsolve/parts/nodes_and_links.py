@@ -5,12 +5,10 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.kinds import Kinds
 from fvsolve.parts.table_model import Table, check_table, keys_json, read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Quantity, ReadContext, Rows, Text, UsualRange, Value
-from fvsolve.units import DIMENSIONS
 
 # of nodes in networks of potential and flow
 NETWORK_DOMAINS = ("rotational", "electrical", "thermal")
@@ -35,6 +33,8 @@ class Part(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if not cls.__module__.startswith("fvsolve."):
+            from fvsolve.core.assembly.lowering_checks import check_dimensions
+
             check_dimensions(cls)
         if kind:
             cls.kind = kind
@@ -49,20 +49,6 @@ class Part(Table):
     def variant(cls, given: dict[str, Any]) -> "type[Part]":
         """Class of a part with the given keys: this class, or a subclass with other ports or quantities."""
         return cls
-
-
-def check_dimensions(part: Any) -> None:
-    """Raise FvsolveError if a quantity of a class of parts has an unknown dimension."""
-    for name, dimension in {
-        **getattr(part, "quantities", {}),
-        **getattr(part, "along", {}),
-    }.items():
-        if dimension not in DIMENSIONS:
-            expected = f"; expected one of {', '.join(DIMENSIONS)}"
-            raise FvsolveError(
-                f'{part.__module__}.{part.__name__}: the quantity "{name}" has the unknown dimension '
-                f'"{dimension}"{did_you_mean(str(dimension), DIMENSIONS) or expected}'
-            )
 
 
 class Node(Part):

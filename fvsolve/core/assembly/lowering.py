@@ -17,7 +17,7 @@ from fvsolve.core.kernels import calls
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.restrictions import flow_at_drop, step_at, transition_of
 from fvsolve.core.steady import Edge
-from fvsolve.errors import FvsolveError, Notice
+from fvsolve.errors import Notice
 
 
 class InputKind(NamedTuple):
@@ -291,20 +291,11 @@ def lowering_of(part: type) -> Lowering:
     if has_module:
         import_module(f"{package}.lower")
     lowering = Lowering.kinds.get(part.kind, NO_ROWS)
-    if isinstance(lowering, Device) and not lowering.quantities and hasattr(lowering.law, "value"):
-        lowering = lowering.varied(quantities=own_quantities(part))
-    if has_module and not package.startswith("fvsolve."):
-        from fvsolve.core.assembly.outside_parts import check_lowering
+    if not has_module or package.startswith("fvsolve."):
+        return lowering
+    from fvsolve.core.assembly.lowering_checks import checked
 
-        check_lowering(part, lowering, own_quantities(part))
-    return lowering
-
-
-def own_quantities(part: Any) -> tuple[str, ...]:
-    """Names of the quantities of a class of parts that its base class, such as a two-port, does not have."""
-    base = next(parent for parent in part.__mro__ if not getattr(parent, "kind", ""))
-    known = getattr(base, "quantities", {})
-    return tuple(name for name in getattr(part, "quantities", {}) if name not in known)
+    return checked(part, lowering)
 
 
 NO_ROWS = Lowering()  # for parts without rows
@@ -328,8 +319,8 @@ class Device(Restriction):
     """Conversion of a kind of device to table rows: its states, and its state in the steady start.
 
     mode : code of the kind in its law
-    quantities : names of its probes, in the order of codes in the law's `value`; if left out, those that its part adds
-    to the quantities of its base class
+    quantities : names of its probes, in the order of codes in the law's `value`; if a part of another package leaves
+    them out, those that it adds to the quantities of its base class
     events_only : True if only events open it; states : names of its states; remedy : advice for events that alternate
     controlling_event : index of the event by which it starts to control a rigid column, -1 for none
     """
@@ -489,6 +480,8 @@ def lower_devices(draft) -> None:
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     for column in ("valve", "node", "second", "schedule", "y", "row", "travel"):
         table[column] = -1
+    if draft.devices:
+        from fvsolve.core.assembly.lowering_checks import check_states
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
@@ -518,19 +511,6 @@ def lower_devices(draft) -> None:
         for state, scale in zip(states, scales, strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
-
-
-def check_states(name: str, part: Any, device: Device, states: tuple[str, ...], scales) -> None:
-    """Raise FvsolveError unless each state of a device has a scale above 0, and a function for its rate."""
-    moves = calls.hook_of(device.law, "move") is not None
-    outside = device.law is not None and not device.law.__name__.startswith("fvsolve.")
-    valid = len(scales) == len(states) and all(
-        isinstance(scale, (int, float, np.number)) and 0.0 < scale < math.inf for scale in scales
-    )
-    if not valid or (states and outside and not moves):
-        from fvsolve.core.assembly.outside_parts import fault_of_states
-
-        raise FvsolveError(fault_of_states(name, part, device, states, scales))
 
 
 def opening_of(start, k: int) -> float:

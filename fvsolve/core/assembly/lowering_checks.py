@@ -1,37 +1,63 @@
-"""Checks of the conversions and laws of parts of other packages, whose faults give wrong numbers without them."""
+"""Checks of parts of other packages, of their conversions and laws: some faults would give wrong numbers."""
 
 import inspect
+import math
 import sys
 from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
-from fvsolve.core.kernels.calls import HOOKS
-from fvsolve.declarations import source_of
+import numpy as np
+
+from fvsolve.core.kernels.calls import HOOKS, hook_of
+from fvsolve.declarations import GROUPS, OUTSIDE_FOLDERS, entry_points
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.jit import COMPILING
+from fvsolve.units import DIMENSIONS
 
 # module of the methods that a conversion inherits if it has none of its own
 INHERITED = "fvsolve.core.assembly.lowering"
 
 
-def check_lowering(part: type, lowering: Any, own: tuple[str, ...]) -> None:
-    """Raise FvsolveError for a fault of the conversion or the law of a class of parts.
+def checked(part: type, lowering: Any) -> Any:
+    """Conversion of a class of parts, with the quantities of the part if it states none.
 
-    own : quantities that the part adds to those of its base class
+    Raises FvsolveError for a fault of the conversion or of its law.
     """
+    own = own_quantities(part)
+    if lowering.is_device and not lowering.quantities and hasattr(lowering.law, "value"):
+        lowering = lowering.varied(quantities=own)
     faults = [*_faults_of_kind(part, lowering)]
     if not faults:
-        if (
-            lowering.is_device
-            and lowering.law is None
-            and type(lowering).of.__module__ == INHERITED
-        ):
+        inherits = type(lowering).of.__module__ == INHERITED
+        if lowering.is_device and lowering.law is None and inherits:
             faults.append(f"{place_of(type(lowering))}: a device has no law; expected `law = law`")
         faults += _faults_of_quantities(part, lowering, own)
         faults += faults_of_law(lowering.law)
     if faults:
         raise FvsolveError(f"{_source(part)}: {'; '.join(faults)}")
+    return lowering
+
+
+def own_quantities(part: Any) -> tuple[str, ...]:
+    """Names of the quantities of a class of parts that its base class, such as a two-port, does not have."""
+    base = next(parent for parent in part.__mro__ if not getattr(parent, "kind", ""))
+    known = getattr(base, "quantities", {})
+    return tuple(name for name in getattr(part, "quantities", {}) if name not in known)
+
+
+def check_dimensions(part: Any) -> None:
+    """Raise FvsolveError if a quantity of a class of parts has an unknown dimension."""
+    for name, dimension in {
+        **getattr(part, "quantities", {}),
+        **getattr(part, "along", {}),
+    }.items():
+        if dimension not in DIMENSIONS:
+            expected = f"; expected one of {', '.join(DIMENSIONS)}"
+            raise FvsolveError(
+                f'{part.__module__}.{part.__name__}: the quantity "{name}" has the unknown dimension '
+                f'"{dimension}"{did_you_mean(str(dimension), DIMENSIONS) or expected}'
+            )
 
 
 def _faults_of_kind(part: Any, lowering: Any) -> Iterator[str]:
@@ -93,6 +119,19 @@ def faults_of_law(law: ModuleType | None) -> Iterator[str]:
             )
 
 
+def check_states(name: str, part: Any, device: Any, states: tuple[str, ...], scales) -> None:
+    """Raise FvsolveError unless each state of a device has a scale above 0, and a function for its rate."""
+    moves = hook_of(device.law, "move") is not None
+    outside = device.law is not None and not device.law.__name__.startswith("fvsolve.")
+    valid = len(scales) == len(states) and all(
+        isinstance(scale, (int, float, np.number)) and 0.0 < scale < math.inf for scale in scales
+    )
+    if outside and (faults := [*faults_of_law(device.law)]):
+        raise FvsolveError(f"{_source(type(part))}: {'; '.join(faults)}")
+    if not valid or (states and outside and not moves):
+        raise FvsolveError(fault_of_states(name, part, device, states, scales))
+
+
 def fault_of_states(name: str, part: Any, device: Any, states: tuple[str, ...], scales: Any) -> str:
     """Text about states of a device without a rate, or without a scale above 0 for each of them."""
     head = f"{_source(type(part))}, in {name}: {place_of(type(device))}"
@@ -102,7 +141,7 @@ def fault_of_states(name: str, part: Any, device: Any, states: tuple[str, ...], 
         )
         return f"{head}: {given}; expected a number above 0 for each state, its small deviation in its own unit"
     for state, scale in zip(states, scales, strict=True):
-        if not isinstance(scale, (int, float)) or not 0.0 < scale < float("inf"):
+        if not (isinstance(scale, (int, float, np.number)) and 0.0 < scale < math.inf):
             return (
                 f'{head}: `scales` gives {scale!r} for the state "{state}"; expected a number above 0, '
                 "a small deviation of the state in its own unit"
@@ -135,3 +174,25 @@ def _source(part: type) -> str:
 
 def _quoted(names: Any) -> str:
     return ", ".join(f'"{name}"' for name in names)
+
+
+def source_of(module: str) -> str:
+    """Package of others that contains a module, for messages: "the part tube of the package outkit".
+
+    module : name of the module. The text is "" for a module of fvsolve, of Python, and of a package without an entry
+    point.
+    """
+    first, _, below = module.partition(".")
+    if first == "fvsolve":
+        return ""
+    if first == OUTSIDE_FOLDERS and below:
+        (folder, *_) = sys.modules[f"{first}.{below.partition('.')[0]}"].__path__
+        return f"the part in the folder {folder}"
+    found = ""
+    for entry in entry_points():
+        place = entry.place.partition(":")[0].strip()
+        if f"{module}.".startswith(f"{place}."):
+            return f"the {GROUPS.get(entry.group, 'object')} {entry.name} of the package {entry.package}"
+        if place.partition(".")[0] == first:
+            found = f"the package {entry.package}"
+    return found
