@@ -26,6 +26,7 @@ REST_IS_MISSING = re.compile(
 OTHER = {
     ("a-part-from-nothing", 0),
     ("a-part-from-nothing", 1),
+    *(("a-part-with-a-state", k) for k in range(3)),
     ("attitudes", 0),
     ("extending", 0),
     ("extending", 1),
