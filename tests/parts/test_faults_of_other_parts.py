@@ -61,10 +61,9 @@ def set(t, y, out, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    if dydt.size > 0:
-        valve, first = tables.valves[device["valve"]], tables.layout[0]["pressure"]
-        change = out[first + valve["from_node"]] - out[first + valve["to_node"]]
-        dydt[device["y"]] = (valve["drop"] + change) / tables.floats[device["data"]]
+    valve, first = tables.valves[device["valve"]], tables.layout[0]["pressure"]
+    change = out[first + valve["from_node"]] - out[first + valve["to_node"]]
+    dydt[device["y"]] = (valve["drop"] + change) / tables.floats[device["data"]]
 
 
 @njit

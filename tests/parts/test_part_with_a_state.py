@@ -49,6 +49,13 @@ def test_the_page_lists_all_dimensions_and_all_files_of_the_package():
     assert len(FILES) == 11 and len(RUNS) == 2
 
 
+def test_the_rates_of_a_state_always_have_their_array(home):
+    """Without JIT, a law that writes to an empty array would raise IndexError, at rows and in the ledger."""
+    words = ["-m", "fvsolve", "energy", "u-tube.toml", "--set", "numerics.end=0.9"]
+    done = python(home, *words, "--set", "output.every=0.25", NUMBA_DISABLE_JIT="1")
+    assert "finished at t = 0.9 s" in done.stdout
+
+
 HEATED = """
 import fvsolve
 from fvsolve.studies import energy

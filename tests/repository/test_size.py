@@ -74,7 +74,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/mesh": (647, 2),
     "tests/model": (3126, 11),
     "tests/output": (1110, 4),
-    "tests/parts": (25959, 54),
+    "tests/parts": (25965, 54),
     "tests/reference": (7469, 66),
     "tests/report": (1158, 4),
     "tests/repository": (7142, 32),
