@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
+from numba import from_dtype
+
 import fvsolve
 import fvsolve.steppers
 import fvsolve.studies
@@ -166,20 +168,71 @@ def tables() -> str:
     sections = ""
     for path in sorted(PACKAGE.rglob("*.py"), key=lambda path: ("core" not in path.parts, path)):
         text = path.read_text(encoding="utf-8")
-        if records := list(records_in(text)):
-            place = path.relative_to(PACKAGE)
-            owner = "the core" if place.parts[0] == "core" else place.parts[1].replace("_", " ")
-            sections += f"## Tables of {owner}\n\n`fvsolve/{place.as_posix()}`\n\n"
-            lines = text.splitlines()
-            for name, about, columns in records:
-                rows = []
-                for column in columns:
-                    row = column.value.end_lineno - 1
-                    # a record in one line has only its own
-                    own = "" if lines[row].startswith(name) else comment(lines, row)
-                    rows.append((f"`{column.arg}`", type_of(column.value), own))
-                sections += f"### {name}\n\n{escaped(about)}\n\n{table(('column', 'type', 'meaning'), rows)}\n"
+        if not (records := list(records_in(text))):
+            continue
+        place = path.relative_to(PACKAGE)
+        names = table_names(import_module(".".join(("fvsolve", *place.with_suffix("").parts))))
+        owner = "the core" if place.parts[0] == "core" else place.parts[1].replace("_", " ")
+        sections += f"## Tables of {owner}\n\n`fvsolve/{place.as_posix()}`\n\n"
+        for name, about, columns in records:
+            rows = table(("column", "type", "meaning"), column_rows(text, name, columns))
+            place_of_rows = f"`tables.{names[name]}[i]`" if name in names else ""
+            head = "\n\n".join(filter(None, [place_of_rows, escaped(about)]))
+            sections += f"### {name}\n\n{head}\n\n{rows}\n"
+        if arrays := [(f"`tables.{name}`", about) for name, about in arrays_in(text)]:
+            sections += f"### Arrays of numbers\n\n{table(('array', 'contents'), arrays)}\n"
     return sections
+
+
+def column_rows(text: str, name: str, columns: list[ast.keyword]) -> Iterator[tuple[str, str, str]]:
+    """Yield the rows of the table of a record type: column, type, meaning."""
+    lines = text.splitlines()
+    for column in columns:
+        row = column.value.end_lineno - 1
+        # a record in one line has only its own
+        own = "" if lines[row].startswith(name) else comment(lines, row)
+        yield f"`{column.arg}`", type_of(column.value), own
+
+
+def hooks() -> str:
+    """Table of the functions of the law of a part, from their declarations."""
+    from fvsolve.core.kernels.calls import HOOKS
+
+    rows = [
+        (f"`{name}({hook.names})`", hook.when, hook.results, hook.about)
+        for name, hook in HOOKS.items()
+    ]
+    return table(("function", "called", "result", "reads and writes"), rows)
+
+
+def table_names(module) -> dict[str, str]:
+    """Names by which compiled functions read the tables of a module : record type -> table."""
+    types = [
+        one()
+        for key, one in vars(module).items()
+        if key.endswith("_types") and one.__module__ == module.__name__
+    ]
+    records = {name: one for name, one in vars(module).items() if getattr(one, "names", None)}
+    return {
+        name: table
+        for name, one in records.items()
+        for fields in types
+        for table, kind in fields._asdict().items()
+        if kind.dtype == from_dtype(one)
+    }
+
+
+def arrays_in(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the arrays of numbers that a text of Python names in `Tables` and `RunArrays`: name, its comment."""
+    lines = text.splitlines()
+    for found in ast.parse(text).body:
+        if isinstance(found, ast.Assign) and ast.unparse(found.targets[0]) in (
+            "Tables",
+            "RunArrays",
+        ):
+            for one in found.value.args[1].elts:
+                if isinstance(one, ast.Constant):
+                    yield one.value, comment(lines, one.lineno - 1)
 
 
 def records_in(text: str) -> Iterator[tuple[str, str, list[ast.keyword]]]:
@@ -242,6 +295,7 @@ GENERATED = {
     "units": units,
     "names": names,
     "tables": tables,
+    "hooks": hooks,
     "validation": validation,
     "views": views,
 }

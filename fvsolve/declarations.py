@@ -22,6 +22,7 @@ from zlib import crc32
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 
 PACKAGE = Path(__file__).parent
+OUTSIDE_FOLDERS = "fvsolve_parts"  # package in which registered folders of parts appear
 Declared = TypeVar("Declared")
 
 
@@ -76,9 +77,22 @@ def member(module: ModuleType, attribute: str) -> Any:
     return value
 
 
-def entry_points(group: str) -> list[EntryPoint]:
-    """Entry points of a group, of all installed packages."""
-    return [entry for entry in _entry_points_on(tuple(sys.path)) if entry.group == group]
+# group of entry points -> noun; complete, although the indices are made when their modules are imported
+GROUPS = {
+    "fvsolve.commands": "command",
+    "fvsolve.exact_solutions": "exact solution",
+    "fvsolve.features": "feature",
+    "fvsolve.limiters": "limiter",
+    "fvsolve.parts": "part",
+    "fvsolve.sinks": "sink",
+    "fvsolve.studies": "study",
+}
+
+
+def entry_points(group: str = "") -> list[EntryPoint]:
+    """Entry points of a group, or of all groups, of all installed packages."""
+    found = _entry_points_on(tuple(sys.path))
+    return [entry for entry in found if group in ("", entry.group)]
 
 
 @cache
@@ -86,7 +100,7 @@ def _entry_points_on(path: tuple[str, ...]) -> list[EntryPoint]:
     """Entry points of the groups `fvsolve.*`, from the files of packages in the folders of `path`.
 
     The module importlib.metadata would take a fifth of the time of `fvsolve --help`. A package that is installed twice
-    counts once, as at an import.
+    counts once, as at an import. An unknown group causes a warning.
     """
     packages: dict[str, str] = {}
     for folder in path:
@@ -97,7 +111,7 @@ def _entry_points_on(path: tuple[str, ...]) -> list[EntryPoint]:
 
             for package in distributions(path=[folder]):
                 text = package.read_text("entry_points.txt") or ""
-                if "[fvsolve." in text:
+                if "[fvsolve" in text:
                     packages.setdefault(package.name, text)
             continue
         except OSError:
@@ -109,12 +123,19 @@ def _entry_points_on(path: tuple[str, ...]) -> list[EntryPoint]:
             except (OSError, UnicodeDecodeError):  # most packages have no such file
                 text = ""
             packages.setdefault(name.partition("-")[0], text)
-    return [
+    found = [
         entry
         for name, text in packages.items()
-        if "[fvsolve." in text
+        if "[fvsolve" in text
         for entry in _parsed(name, text)
     ]
+    for owner, group in dict.fromkeys((entry.package, entry.group) for entry in found):
+        hint = did_you_mean(group, GROUPS)
+        if group not in GROUPS and (hint or group.startswith("fvsolve.")):
+            expected = hint or f"; expected one of {', '.join(GROUPS)}"
+            text = f"unknown group of entry points {group} of {owner}{expected}"
+            warnings.warn(text, RuntimeWarning, stacklevel=2)
+    return found
 
 
 def _parsed(package: str, text: str) -> Iterator[EntryPoint]:
@@ -122,7 +143,7 @@ def _parsed(package: str, text: str) -> Iterator[EntryPoint]:
     for line in filter(None, (line.strip() for line in text.splitlines())):
         if line.startswith("["):
             group = line.strip("[] ")
-        elif "=" in line and group.startswith("fvsolve.") and not line.startswith(("#", ";")):
+        elif "=" in line and group.startswith("fvsolve") and not line.startswith(("#", ";")):
             name, _, place = line.partition("=")
             yield EntryPoint(package, group, name.strip(), place.partition("[")[0].strip())
 
@@ -227,6 +248,7 @@ class Declarations(Mapping[str, Declaration]):
         self.noun = noun
         self.header = header or header_of(noun)
         self.group = f"fvsolve.{plural.replace(' ', '_')}"
+        GROUPS.setdefault(self.group, noun)
         self.variable = f"FVSOLVE_{plural.replace(' ', '_').upper()}"
         self._unread = headers(patterns, self.header)
         self._own: dict[str, Declaration] = {}

@@ -77,20 +77,27 @@ def run_command() -> None:
             1,
         )
     except Exception as error:
-        # a defect of fvsolve: print its location, so that it can be reported
-        command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
-        source = f"{command.source}: " if command and command.source else ""
-        reader = " to its authors" if source else ""
-        trace = error.__traceback__
-        while trace.tb_next is not None:
-            trace = trace.tb_next
-        location = f"{trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno}"
-        text = f"internal error in {location}: {type(error).__name__}: {error}"
-        _exit_with(f"{source}{text}; please report it{reader}", 1)
+        _exit_with(defect_text(error), 1)
     finally:
         gc.enable()
         os.environ.pop("PYDANTIC_DISABLE_PLUGINS", None)
         warnings.formatwarning = before
+
+
+def defect_text(error: Exception) -> str:
+    """Text about an unexpected error, with its location, so that it can be reported to those who can correct it."""
+    from fvsolve.cli.outside_faults import outside_fault
+
+    command = COMMANDS.get(sys.argv[1]) if len(sys.argv) > 1 else None
+    source = f"{command.source}: " if command and command.source else ""
+    if not source and (text := outside_fault(error)):
+        return text
+    trace = error.__traceback__
+    while trace.tb_next is not None:
+        trace = trace.tb_next
+    location = f"{trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno}"
+    reader = " to its authors" if source else ""
+    return f"{source}internal error in {location}: {type(error).__name__}: {error}; please report it{reader}"
 
 
 def application(command: str = ""):

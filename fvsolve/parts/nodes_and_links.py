@@ -32,6 +32,10 @@ class Part(Table):
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
+        if not cls.__module__.startswith("fvsolve."):
+            from fvsolve.core.assembly.lowering_checks import check_dimensions
+
+            check_dimensions(cls)
         if kind:
             cls.kind = kind
             cls.kinds.declare(kind, cls, f"a {cls.noun} of type")

@@ -13,7 +13,7 @@ from typing import Any
 
 from fvsolve.argument_checks import PATH, validated
 from fvsolve.core.schemes import LIMITERS_VARIABLE
-from fvsolve.declarations import EntryPoint, entry_points, unreadable
+from fvsolve.declarations import OUTSIDE_FOLDERS, EntryPoint, entry_points, unreadable
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
 from fvsolve.units import show
@@ -22,7 +22,6 @@ GROUP, LIMITERS = "fvsolve.parts", "fvsolve.limiters"  # entry points
 # environment variable with the folders of registered parts, for other processes
 VARIABLE = "FVSOLVE_PARTS"
 FEATURE = re.compile(r"^\s*(?:from|import) fvsolve\.features\.(\w+)", re.MULTILINE)
-PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 
 @validated(folder=PATH)
@@ -39,8 +38,8 @@ def register_part(folder: str | os.PathLike[str]) -> None:
         raise FvsolveError(
             f"register_part: {show(str(folder))} has no part.py; expected the folder of a part"
         )
-    package = f"{PLUGIN_PACKAGE}.{path.name}"
-    for name, places in ((PLUGIN_PACKAGE, []), (package, [str(path)])):
+    package = f"{OUTSIDE_FOLDERS}.{path.name}"
+    for name, places in ((OUTSIDE_FOLDERS, []), (package, [str(path)])):
         if name not in sys.modules:
             spec = ModuleSpec(name, None, is_package=True)
             spec.submodule_search_locations = places
@@ -83,7 +82,7 @@ def installed_limiters() -> Iterator[tuple[str, Callable[[Any], None], Any]]:
     def register(entry: EntryPoint) -> None:
         own_limiters.register_limiter(entry.name, entry.load())
 
-    yield from ((f"entry points {LIMITERS}", register, entry) for entry in found)
+    yield from ((f"entry points {LIMITERS} of {entry.package}", register, entry) for entry in found)
     yield from (
         (LIMITERS_VARIABLE, own_limiters.read_entry, entry) for entry in own_limiters.entries()
     )
@@ -93,7 +92,7 @@ def declare_installed() -> None:
     """Declare parts and limiters of installed packages and of environment variables; warn of unreadable ones."""
     offered: list[tuple[str, Callable[[Any], None], Any]] = [
         *(
-            (f"{entry.name} of the entry points {GROUP}", declare, entry.place)
+            (f"{entry.name} of the entry points {GROUP} of {entry.package}", declare, entry.place)
             for entry in entry_points(GROUP)
         ),
         *((VARIABLE, register_part, folder) for folder in registered_folders()),

@@ -1,5 +1,7 @@
 """Declarations in the package, in installed packages and in files of a user are found without imports."""
 
+import ast
+import inspect
 import os
 import subprocess
 import sys
@@ -233,11 +235,25 @@ def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path
     done = python(home, "-c", code, FVSOLVE_PARTS=str(tmp_path / "absent"))
     assert done.stdout == "True\n"
     for text in (
-        "mill of the entry points fvsolve.parts: mill.lost cannot be read: No module named 'mill.lost'; correct or",
+        "mill of the entry points fvsolve.parts of mill: mill.lost cannot be read: No module named 'mill.lost'; ",
         f"FVSOLVE_PARTS: {tmp_path / 'absent'} cannot be read: register_part: ",
-        "entry points fvsolve.limiters: steep = mill:steep cannot be read: register_limiter: steep(-1e+15) fails: div",
+        "entry points fvsolve.limiters of mill: steep = mill:steep cannot be read: register_limiter: steep(-1e+15)",
     ):
         assert done.stderr.count(text) == 1
+
+
+def test_all_groups_of_entry_points_are_known_before_their_indices_are_imported():
+    import fvsolve.case.sections as sections
+    from fvsolve import cli, exact, studies
+    from fvsolve.core.assembly.features import FEATURES
+    from fvsolve.parts import plugins
+
+    indices = cli.COMMANDS, exact.NAMES, FEATURES, sections.SINKS, studies.STUDIES
+    groups = {index.group: index.noun for index in indices}
+    groups |= {plugins.GROUP: "part", plugins.LIMITERS: "limiter"}
+    known = ast.parse(inspect.getsource(declarations)).body
+    (known,) = [line for line in known if ast.unparse(line).startswith("GROUPS = ")]
+    assert ast.literal_eval(known.value) == groups
 
 
 HEADERS = {

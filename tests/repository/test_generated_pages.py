@@ -1,5 +1,6 @@
 """Generated reference pages: they contain every command with its options, every unit and every public name."""
 
+import ast
 import re
 import sys
 
@@ -10,6 +11,7 @@ from reference.folders import DOCS
 import fvsolve
 from fvsolve.cli import COMMANDS
 from fvsolve.core.kernels import dtypes
+from fvsolve.core.kernels.calls import HOOKS
 from fvsolve.units import UNITS, parse
 
 sys.path.append(str(DOCS))
@@ -78,6 +80,41 @@ def test_all_tables_of_the_core_and_of_features_are_there_with_each_column():
     ):
         assert re.findall(r"^\| `(\w+)` \|", sections[name], re.MULTILINE) == list(kind.names)
     assert "| `tau` | number | travel time of a stretch [s] |" in sections["DELAY"]
+    for name, table in (
+        ("VALVE", "valves"),
+        ("CLOCK", "clock"),
+        ("BODY", "bodies"),
+        ("CONTROL", "controls"),
+    ):
+        assert f"`tables.{table}[i]`" in sections[name]
+    assert "| `tables.floats` | numbers of laws" in text
+
+
+def test_each_column_has_a_meaning():
+    rows = re.findall(r"^\| `(.+?)` \|.*\| (.*) \|$", generated_pages.tables(), re.MULTILINE)
+    assert len(rows) > 500 and [name for name, about in rows if not about.strip()] == []
+
+
+def test_the_page_of_devices_has_the_table_of_all_functions_of_a_law():
+    """The table is that of `python docs/generated_pages.py hooks`; a law of the package names its arguments so."""
+    assert generated_pages.hooks() in (DOCS / "device.md").read_text("utf-8")
+    for path in generated_pages.PACKAGE.glob("parts/**/law*.py"):
+        for found in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(found, ast.FunctionDef) and (hook := HOOKS.get(found.name)):
+                names = [one.arg for one in found.args.args]
+                assert ", ".join(names) == hook.names, f"{path}: {found.name}"
+
+
+@pytest.mark.parametrize("name", HOOKS)
+def test_a_function_of_a_law_has_a_letter_for_each_argument(name):
+    hook = HOOKS[name]
+    letters = {"t": "t", "y": "V", "dydt": "V", "out": "V", "tables": "T", "device": "D", "k": "i"}
+    letters |= {"m": "t", "drop": "t", "denser": "t", "wide": "b", "quantity": "i", "before": "t"}
+    letters |= {"behind": "t", "ahead": "b", "g": "V" if name in ("events", "bends") else "t"}
+    assert "".join(letters[argument] for argument in hook.names.split(", ")) == hook.letters
+    assert (
+        hook.when and (hook.about or hook.results) and (hook.results != "") == (hook.returned != "")
+    )
 
 
 def test_lines_about_arguments_are_items_of_a_list():

@@ -361,7 +361,7 @@ def test_only_hashed_folders_compile():
     users = {
         path
         for path in cache_folders.PACKAGE.rglob("*.py")
-        if "njit" in path.read_text(encoding="utf-8")
+        if re.search(r"^@njit|\bnjit\(", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
     features = cache_folders.PACKAGE / "features"
     hashed = {

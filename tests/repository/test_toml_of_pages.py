@@ -28,6 +28,7 @@ OTHER = {
     ("a-block-of-your-own", 1),
     ("a-part-from-nothing", 0),
     ("a-part-from-nothing", 1),
+    *(("a-part-with-a-state", k) for k in range(3)),
     ("attitudes", 0),
     ("extending", 0),
     ("extending", 1),

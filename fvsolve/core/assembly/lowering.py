@@ -275,12 +275,18 @@ NEWTON_STEPS = 5  # Newton steps from a drop that is accurate to 1e-6
 def lowering_of(part: type) -> Lowering:
     """Conversion of a kind of part, from the module `lower` in the package of its declaration.
 
-    It is `NO_ROWS` if the kind has none.
+    It is `NO_ROWS` if the kind has none. Raises FvsolveError for a faulty conversion or law of another package.
     """
     package = part.__module__.rpartition(".")[0]
-    if find_spec(f"{package}.lower") is not None:
+    has_module = find_spec(f"{package}.lower") is not None
+    if has_module:
         import_module(f"{package}.lower")
-    return Lowering.kinds.get(part.kind, NO_ROWS)
+    lowering = Lowering.kinds.get(part.kind, NO_ROWS)
+    if not has_module or package.startswith("fvsolve."):
+        return lowering
+    from fvsolve.core.assembly.lowering_checks import checked
+
+    return checked(part, lowering)
 
 
 NO_ROWS = Lowering()  # for parts without rows
@@ -303,7 +309,9 @@ def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
 class Device(Restriction):
     """Conversion of a kind of device to table rows: its states, and its state in the steady start.
 
-    mode : code of the kind in its law; quantities : names of its probes, in the order of codes in the law's `value`
+    mode : code of the kind in its law
+    quantities : names of its probes, in the order of codes in the law's `value`; if a part of another package leaves
+    them out, those that it adds to the quantities of its base class
     events_only : True if only events open it; states : names of its states; remedy : advice for events that alternate
     controlling_event : index of the event by which it starts to control a rigid column, -1 for none
     """
@@ -463,6 +471,8 @@ def lower_devices(draft) -> None:
     table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
     for column in ("valve", "node", "second", "schedule", "y", "row", "travel"):
         table[column] = -1
+    if draft.devices:
+        from fvsolve.core.assembly.lowering_checks import check_states
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
@@ -487,7 +497,9 @@ def lower_devices(draft) -> None:
             row["valve"] = draft.valve_names.index(gate)
             draft.valve_table["device"][row["valve"]] = k
         draft.floats += device.numbers(draft, name, part)
-        for state, scale in zip(states, device.scales(draft, name, part), strict=True):
+        scales = device.scales(draft, name, part)
+        check_states(name, part, device, states, scales)
+        for state, scale in zip(states, scales, strict=True):
             at = draft.states([f"{name}.{state}"], scale)
             row["y"] = at if row["y"] < 0 else row["y"]
 

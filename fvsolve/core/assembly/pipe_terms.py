@@ -161,7 +161,7 @@ def add_terms(draft) -> dict[str, dict]:
     floats = draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid
     for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
-        law = draft.case.links[name].friction
+        law = draft.case.conduits[name].friction
         if law.model != "unsteady":
             continue
         unit = 4.0 * fluid.viscosity / (fluid.density * mesh.diameter**2)  # tau per time [1/s]

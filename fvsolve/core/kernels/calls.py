@@ -8,8 +8,9 @@ address are lost.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,39 +28,139 @@ ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys(
     (POWER, STORED), ENERGIES
 )
-HOOKS = {  # functions of the law of a part: types of arguments and of the result
-    # out : network values (node pressures as changes since the start [Pa], mass flows [kg/s], ...), read and written at
-    # the offsets in tables.layout[0] (LAYOUT of `kernels.dtypes`); tables : open handle, its attributes are the tables
-    # device : row of the part in tables.devices; t, y, dydt : time [s], states and their rates (empty if not requested)
-    # t, y, out, tables, device: writes conductances, speeds, pressures of vessels, from (t, y) and flags
-    "set": ("tVVTD", ""),
-    # t, y, dydt, out, tables, device: rates of its states if dydt.size > 0; out[RATE]
-    "move": ("tVVVTD", ""),
-    # t, y, out, tables, device, g: its event functions, from solved nodes
-    "events": ("tVVTDV", ""),
-    # t, y, out, tables, device, quantity: value of its quantity of that number
-    "value": ("tVVTDi", "t"),
-    # out, tables, device: 1 outside the range of validity of its law, TEMPORARY if this ends by itself, otherwise 0
-    "outside": ("VTD", "i"),
-    # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
+
+
+class Hook(NamedTuple):
+    """Function of the law of a part, with texts for messages and pages.
+
+    letters, returned : types of arguments and results, see `argument_types`; names : of the arguments; results : their
+    meanings; when : of the calls; about : what the function reads and writes
+    """
+
+    letters: str
+    returned: str
+    names: str = ""
+    results: str = ""
+    when: str = ""
+    about: str = ""
+
+
+# Arguments
+# t : time [s]; y, dydt : states and their rates; out : network values, at the offsets in tables.layout[0] (LAYOUT)
+# tables : open handle, whose attributes are the tables; device : row of the part in tables.devices
+# k : row of its restriction in tables.valves; g : conductance [kg2/s2/Pa]; m, drop : flow [kg/s] and drop [Pa]
+# denser, wide : see `restrictions.restriction_step`
+HOOKS = {
+    "set": Hook(
+        "tVVTD",
+        "",
+        "t, y, out, tables, device",
+        "",
+        "first in each evaluation of the rates, before the nodes are solved",
+        "From t, y and the flags of events, writes out[conductance + k] [kg2/s2/Pa] of its restriction and, if its law "
+        "reads it, out[drive + k]; of a vessel out[pressure + node], a change since the start [Pa], and "
+        "out[stiffness + row] [Pa/kg].",
+    ),
+    "move": Hook(
+        "tVVVTD",
+        "",
+        "t, y, dydt, out, tables, device",
+        "",
+        "after the nodes are solved, in each evaluation that computes rates",
+        "Reads the solved out: out[pressure + node] is a change since the start [Pa], out[valve + k] a mass flow "
+        "[kg/s]. Writes the rates of its states to dydt[device.y + i] [unit of the state/s]; may raise out[RATE], the "
+        "greatest rate that limits a step [1/s], unless it is RATE_UNWANTED.",
+    ),
+    "events": Hook(
+        "tVVTDV",
+        "",
+        "t, y, out, tables, device, g",
+        "",
+        "after the nodes are solved, at the ends of steps and in the search for an event",
+        "Writes its event functions to g[device.event + i]; a zero is an event (`self_acting_valves.event_pair`).",
+    ),
+    "value": Hook(
+        "tVVTDi",
+        "t",
+        "t, y, out, tables, device, quantity",
+        "value of the quantity of that number, in SI",
+        "at rows of the history, and after each step for extremes",
+        "Reads t, y and the solved out.",
+    ),
+    "outside": Hook(
+        "VTD",
+        "i",
+        "out, tables, device",
+        "1 outside the range of validity of the law, TEMPORARY if this ends by itself, else 0",
+        "after each step",
+        "Reads the solved out.",
+    ),
     # for the heat of the fluid the dissipation is computed with `y` in place of `dydt`, unless the law has `heat`
-    "power": ("tVVVTD", "ttt"),
-    # t, y, out, tables, device: heat into the fluid beside drop times flow [W]
-    "heat": ("tVVTD", "t"),
-    "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
-    # Restriction k, conductance g [kg2/s2/Pa], drop [Pa]; denser, wide : see `restrictions.restriction_step`
-    "step": (
+    "power": Hook(
+        "tVVVTD",
+        "ttt",
+        "t, y, dydt, out, tables, device",
+        "power supplied, rate of stored energy, power dissipated beside drop times flow [W]",
+        "at the stages of each step, if the energy is computed",
+        "Reads t, y, the rates of all states in dydt, and the solved out.",
+    ),
+    "heat": Hook(
+        "tVVTD",
+        "t",
+        "t, y, out, tables, device",
+        "heat into the fluid beside drop times flow [W]",
+        "in place of the dissipation of `power`, if friction heats the fluid",
+        "Reads t, y and the solved out.",
+    ),
+    "stored": Hook(
+        "VTD",
+        "t",
+        "y, tables, device",
+        "stored energy minus that at the start [J]",
+        "after each step, if the energy is computed",
+        "Reads y.",
+    ),
+    "step": Hook(
         "VTittttb",
         "tt",
-    ),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
-    "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
-    # out, tables, k, g, drop, denser, wide: d flow / d lifting pressure at constant drop
-    "lift": ("VTitttb", "t"),
-    # tables, k, drop, g: event functions of a restriction, from the drop alone
-    "bends": ("TitV", ""),
-    # t, y, tables, device, p' upstream, p' downstream (changes since the start [Pa]), drop, ahead: dx/dt of the lift x
-    # and its slope over the drop [1/s/Pa], for a change of the upstream (`ahead`) or of the downstream pressure
-    "lead": ("tVTDtttb", "tt"),
+        "out, tables, k, g, m, drop, denser, wide",
+        "a [kg/s], s [kg/s/Pa]: the next Newton step changes the flow by a + s d(drop)",
+        "several times while the nodes are solved, if the conductance is above 0; also in the steady start",
+        "Reads what `set` has written; pressures are not solved yet.",
+    ),
+    "slope": Hook(
+        "VTitt",
+        "t",
+        "out, tables, k, g, drop",
+        "d flow / d drop [kg/s/Pa]",
+        "after the nodes are solved, for the rate that limits a step",
+        "Reads the solved out.",
+    ),
+    "lift": Hook(
+        "VTitttb",
+        "t",
+        "out, tables, k, g, drop, denser, wide",
+        "d flow / d lifting pressure at constant drop [kg/s/Pa]",
+        "as `step`, if a pressure lifts the restriction at once",
+        "Reads what `set` has written; pressures are not solved yet.",
+    ),
+    "bends": Hook(
+        "TitV",
+        "",
+        "tables, k, drop, g",
+        "",
+        "as `events`, for a restriction whose law has kinks",
+        "Writes event functions to g[tables.valves[k].event + i], from the drop alone.",
+    ),
+    "lead": Hook(
+        "tVTDtttb",
+        "tt",
+        "t, y, tables, device, before, behind, drop, ahead",
+        "dx/dt of the lift x [1/s] and its slope over the drop [1/s/Pa]",
+        "for a valve that is nearly shut at the end of a rigid column",
+        "Reads the changes of both pressures since the start, `before` and `behind` [Pa]; the slope is for a change of "
+        "the upstream (`ahead`) or of the downstream pressure.",
+    ),
 }
 
 
@@ -107,17 +208,18 @@ def function_address(function, letters: str):
     return function.address(letters, argument_types) if COMPILING else function
 
 
-def hook_of(law, name: str, hooks: dict[str, tuple[str, str]] = HOOKS):
+def hook_of(law, name: str, hooks: Mapping[str, tuple] = HOOKS):
     """Function `name` of the module `law`, which contains the law of a part; None if the module has no such function.
 
     name : key of `hooks`. Raises FvsolveError for a wrong number of arguments.
     """
-    function, expected = getattr(law, name, None), len(hooks[name][0])
-    if function is None or function.__code__.co_argcount == expected:
+    function, (letters, _, *names) = getattr(law, name, None), hooks[name]
+    if function is None or function.__code__.co_argcount == len(letters):
         return function
-    error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
+    code, expected = function.__code__, names[0] if names else f"{len(letters)} arguments"
     raise FvsolveError(
-        f"{error}; expected the {expected} arguments listed in kernels.calls.HOOKS, or another name of the function"
+        f"{law.__name__}.{name} ({code.co_filename}, line {code.co_firstlineno}) has {code.co_argcount} arguments; "
+        f"expected {expected}, or another name of the function"
     )
 
 
@@ -158,19 +260,19 @@ call_reader = call_at_address("call_reader", READS)  # reads a state and fills `
 # fills `rows` with powers [W] or stored energies [J]
 call_energies = call_at_address("call_energies", ENERGIES)
 # Functions of the law of a device, or of restriction k (from `step` on).
-call_set = call_at_address("call_set", *HOOKS["set"])
-call_move = call_at_address("call_move", *HOOKS["move"])
-call_events = call_at_address("call_events", *HOOKS["events"])
-call_value = call_at_address("call_value", *HOOKS["value"])
-call_outside = call_at_address("call_outside", *HOOKS["outside"])
-call_power = call_at_address("call_power", *HOOKS["power"])
-call_heat = call_at_address("call_heat", *HOOKS["heat"])
-call_stored = call_at_address("call_stored", *HOOKS["stored"])
-call_lead = call_at_address("call_lead", *HOOKS["lead"])
-call_step = call_at_address("call_step", *HOOKS["step"])
-call_slope = call_at_address("call_slope", *HOOKS["slope"])
-call_lift = call_at_address("call_lift", *HOOKS["lift"])
-call_bends = call_at_address("call_bends", *HOOKS["bends"])
+call_set = call_at_address("call_set", *HOOKS["set"][:2])
+call_move = call_at_address("call_move", *HOOKS["move"][:2])
+call_events = call_at_address("call_events", *HOOKS["events"][:2])
+call_value = call_at_address("call_value", *HOOKS["value"][:2])
+call_outside = call_at_address("call_outside", *HOOKS["outside"][:2])
+call_power = call_at_address("call_power", *HOOKS["power"][:2])
+call_heat = call_at_address("call_heat", *HOOKS["heat"][:2])
+call_stored = call_at_address("call_stored", *HOOKS["stored"][:2])
+call_lead = call_at_address("call_lead", *HOOKS["lead"][:2])
+call_step = call_at_address("call_step", *HOOKS["step"][:2])
+call_slope = call_at_address("call_slope", *HOOKS["slope"][:2])
+call_lift = call_at_address("call_lift", *HOOKS["lift"][:2])
+call_bends = call_at_address("call_bends", *HOOKS["bends"][:2])
 
 
 @njit(forceinline=True)

@@ -40,7 +40,12 @@ def set_devices(t, y, dydt, out, handle):
 
 @njit
 def device_rates(t, y, dydt, out, handle):
-    """Write d/dt of device states to `dydt`, unless it is empty; raise out[RATE] to their greatest rate [1/s]."""
+    """Write d/dt of device states to `dydt`, and raise out[RATE] to their greatest rate [1/s]; if `dydt` is not empty.
+
+    Laws would otherwise need a branch each, without which they write beyond their array.
+    """
+    if dydt.size == 0:
+        return
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]

@@ -40,17 +40,17 @@ def record(**columns: str) -> np.dtype:
 
 
 SETTINGS = record(
-    scheme=i8,
-    limiter=i8,
+    scheme=i8,  # family of the scheme: UPWIND, LINEAR, MUSCL, WENO5 or SHORT
+    limiter=i8,  # MINMOD, VAN_LEER, MONOTONIZED_CENTRAL or FLAT, or the code of a limiter of a user
     degree=i8,  # degree of the polynomials next to an end
     # 1: friction of a cell from the waves that enter it, as by the method of characteristics
     from_arriving=i8,
     w0=f8,  # weights of cells i-3 .. i+2 in the value at face i, for forward waves
-    w1=f8,
-    w2=f8,
-    w3=f8,
-    w4=f8,
-    w5=f8,
+    w1=f8,  # of cell i-2
+    w2=f8,  # of cell i-1
+    w3=f8,  # of cell i
+    w4=f8,  # of cell i+1
+    w5=f8,  # of cell i+2
     # Linear schemes: weights in the difference F[i] - F[i+1], nearest cell first.
     inside="(6,)f8",  # of cells i-3 .. i+2
     # of the datum and five cells, for the three cells at the end where the wave enters
@@ -62,20 +62,20 @@ SETTINGS = record(
     start=f8,  # start of the run [s]
     # 1 if a feature reads values that only the solved nodes determine, before rates are computed
     reads_solved=i8,
-    gravity=f8,
+    gravity=f8,  # [m/s2]
     datum=f8,  # elevation of zero height in energy studies [m]
     swept=i8,  # 1 if a feature changes volumes of nodes
     vapor=f8,  # vapour pressure [Pa]
     unmarked=f8,  # pressure below which a node stands for a flow that a patch does not have [Pa]
     rate=f8,  # greatest constant wave rate, speed / dx [1/s]
     stop_below=i8,  # 1: a pressure below vapour pressure ends the run
-    law=i8,
+    law=i8,  # density law: LAW_LINEAR, LAW_LOG, LAW_TABLE or LAW_MIXTURE
     beta=f8,  # bulk modulus of the fluid [Pa]
     reference=f8,  # pressure at which the density is rho [Pa]
     table=i8,  # offset of the density table in `floats`, its length and pressure step
-    table_size=i8,
-    table_start=f8,
-    table_step=f8,
+    table_size=i8,  # number of values of the density table
+    table_start=f8,  # first pressure of the density table [Pa]
+    table_step=f8,  # step of its pressures [Pa]
     floor=f8,  # mixture: pressure below that of the gas, vapour pressure or 0 [Pa]
     gas=f8,  # gas volume over liquid volume, times pressure to the power gas_power [Pa^gas_power]
     gas_power=f8,  # 1 / (gas exponent)
@@ -87,21 +87,22 @@ SETTINGS = record(
 PIPE = record(  # columns read for waves come first, in as few cache lines as possible
     y=i8,  # offset of the forward wave in y; the backward wave follows it
     cell=i8,  # offset of its cells in per-cell arrays
-    from_node=i8,
-    to_node=i8,
+    from_node=i8,  # row of the node at its start
+    to_node=i8,  # row of the node at its end
     admittance=f8,  # area / speed [kg/s per Pa]
     end_admittance=f8,  # that at its end nodes: less where a feature couples them at once
     flow=f8,  # mass flow of the profile [kg/s]
     drag=f8,  # balances the pressure gradient of the profile; its friction if steady [kg/s2]
+    # law of its friction, FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH or FRICTION_HAZEN
     friction=i8,
     loss=f8,  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
     rough=f8,  # dM/dt = -rough f(Re) |M| M  [1/kg]
     cells=i8,  # 0 if a feature computes its waves
-    dx=f8,
+    dx=f8,  # length of a cell [m]
     speed=f8,  # wave speed [m/s]
     rate_factor=f8,  # factor on speed / dx for the ends of a short pipe
-    area=f8,
-    diameter=f8,
+    area=f8,  # area of its bore [m2]
+    diameter=f8,  # of its bore [m]
     roughness=f8,  # relative roughness
     reynolds=f8,  # Reynolds number per mass flow [s/kg]
     noise=f8,  # square of a negligible flow [kg2/s2]
@@ -121,9 +122,9 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
     # offset in `profile` of mass per length at centres; with scalars under the linear law too
     center=i8,
     from_base=f8,  # laws log and table: flow into the node, computed for the profile [kg/s]
-    to_base=f8,
+    to_base=f8,  # likewise at `to` [kg/s]
     from_mass=f8,  # mass per length at the end, computed for the profile [kg/m]
-    to_mass=f8,
+    to_mass=f8,  # likewise at `to` [kg/m]
     forcing=i8,  # of its first cell among the forcings of stretches, see `LAYOUT`; -1 for none
     # of its fluid at the start, to which `reynolds` belongs; 0 if friction does not follow it [K]
     temperature=f8,
@@ -135,18 +136,18 @@ PIPE = record(  # columns read for waves come first, in as few cache lines as po
 )
 
 COUPLING = record(  # flow at once between two nodes, in addition to that of restrictions
-    from_node=i8,
-    to_node=i8,
+    from_node=i8,  # row of the node that the flow leaves
+    to_node=i8,  # row of the node that it enters
     conductance=f8,  # flow per pressure [kg/s per Pa]
 )
 
 NODE = record(
-    kind=i8,
+    kind=i8,  # FIXED, TANK, CHAMBER, JUNCTION, MOVING, VESSEL or PATCH
     y=i8,  # offset of the stored mass in y
     schedule=i8,  # pressure [Pa] of a fixed node, mass demand [kg/s] of a junction; -1 for none
     solve=i8,  # ALONE, SINGLE or CLUSTER
     pressure=f8,  # of the profile [Pa]
-    elevation=f8,
+    elevation=f8,  # above datum [m]
     demand=f8,  # of the profile [kg/s]
     inflow=f8,  # link flows of the profile into it minus demand, rounding set to zero [kg/s]
     admittance=f8,  # sum of area / speed of its pipe ends [kg/s per Pa]
@@ -161,7 +162,7 @@ NODE = record(
     row=i8,  # row in its cluster; number of a tank or moving chamber
     # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
     gates=i8,
-    gate_count=i8,
+    gate_count=i8,  # number of these valves
     columns=i8,  # number of these columns
     head_given=i8,  # laws log and table: 1 if the schedule is a head [m]
     density=f8,  # density in a tank [kg/m3]
@@ -169,12 +170,13 @@ NODE = record(
 )
 
 VALVE = record(
-    from_node=i8,
-    to_node=i8,
-    schedule=i8,
+    from_node=i8,  # row of the node at its start
+    to_node=i8,  # row of the node at its end
+    schedule=i8,  # schedule of its opening [-], or of the setting of its device; -1 for none
     characteristic=i8,  # 0 linear, 1 equal-percentage, else table
+    # offset in `floats` of the table of its characteristic: openings, then relative areas
     table=i8,
-    table_size=i8,
+    table_size=i8,  # number of these openings
     solve=i8,  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
     # 1: in a cluster with quasi-steady pipes; the other links at its junctions limit its rate
     chained=i8,
@@ -210,18 +212,18 @@ TO_HELD, FROM_HELD, FLOW_HELD = range(3)
 NOT_HELD = 1e300  # in out[drive] of such a valve: it holds nothing at present
 
 COLUMN = record(
-    y=i8,
-    from_node=i8,
-    to_node=i8,
-    area=f8,
-    length=f8,
-    friction=i8,
-    loss=f8,
-    rough=f8,
-    roughness=f8,
-    reynolds=f8,
-    flow=f8,
-    drag=f8,
+    y=i8,  # offset in y of its mass flow, as deviation from `flow` [kg/s]
+    from_node=i8,  # row of the node at its start
+    to_node=i8,  # row of the node at its end
+    area=f8,  # area of its bore [m2]
+    length=f8,  # [m]
+    friction=i8,  # law of its friction, as in PIPE
+    loss=f8,  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
+    rough=f8,  # dM/dt = -rough f(Re) |M| M [1/kg]
+    roughness=f8,  # relative roughness, below 0 for swamee-jain
+    reynolds=f8,  # Reynolds number per mass flow [s/kg]
+    flow=f8,  # mass flow of the profile [kg/s]
+    drag=f8,  # friction term of the profile [kg/s2]
     offset=f8,  # driving pressure of the profile not balanced by friction [Pa]
     base=f8,  # laws log and table: driving pressure of the profile [Pa]
     forcing=i8,  # of its first stretch among the forcings of stretches, see `LAYOUT`; -1 for none
@@ -232,13 +234,13 @@ DEVICE = record(
     hooks=i8,  # row of `hooks`, the functions of its law
     mode=i8,  # kind of device within its law, if several kinds share a law
     y=i8,  # offset in y of its states; -1 for none
-    states=i8,
+    states=i8,  # number of its states
     valve=i8,  # restriction that it opens and closes, the first of several; -1 for none
     node=i8,  # vessel whose pressure it computes, or sensed node; -1 for none
     second=i8,  # second sensed node; -1 for none
     # weights of the pressures at both sensed nodes in the pressure that lifts its valve
     node_weight=f8,
-    second_weight=f8,
+    second_weight=f8,  # weight of the pressure at `second`
     event=i8,  # its first event function
     data=i8,  # offset of its numbers in `floats`
     schedule=i8,  # -1 for none
@@ -250,7 +252,7 @@ DEVICE = record(
 )
 
 SCHEDULE = record(
-    first=i8,
+    first=i8,  # its first row in `pieces`
     # number of its pieces; 0 for a schedule that follows a block of `controls`, -1 for a formula
     pieces=i8,
 )
@@ -262,12 +264,13 @@ PIECE_COLUMNS = 7
 
 
 CLUSTER_RECORD = record(
-    first_node=i8,
-    nodes=i8,
-    first_valve=i8,
-    valves=i8,
-    first_couple=i8,
-    couples=i8,
+    first_node=i8,  # offset in `integers` of the rows of its nodes
+    nodes=i8,  # number of its nodes
+    first_valve=i8,  # offset in `integers` of the rows of its valves
+    valves=i8,  # number of its valves
+    first_couple=i8,  # offset in `integers` of the rows of its couplings
+    couples=i8,  # number of its couplings
+    # offset in `floats` of the inverse of its admittances, if no valve joins it; else -1
     inverse=i8,
     # offset in `integers` of the places and the elimination of its sparse matrix; -1: a full matrix
     order=i8,
@@ -277,13 +280,13 @@ CLUSTER_RECORD = record(
 )
 
 LAYOUT = record(
-    # offsets in `out`: values of nodes, links and devices
-    pressure=i8,
-    supply=i8,
-    net=i8,
+    pressure=i8,  # offsets in `out`
+    supply=i8,  # flow into each node from outside, an entry of the ledger [kg/s]
+    net=i8,  # net mass flow into each node [kg/s]
+    # four waves of each pipe: into and out of it at `from`, out of and into it at `to` [kg/s]
     ends=i8,
-    valve=i8,
-    column=i8,
+    valve=i8,  # mass flow of each restriction [kg/s]
+    column=i8,  # mass flow of each rigid column [kg/s]
     # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
     valve_controlled=i8,
     stiffness=i8,  # of moving chambers: pressure per mass [Pa/kg]
@@ -321,8 +324,7 @@ LAYOUT = record(
     body=i8,  # data of frames that move, see `kernels.moving_frames`
     isolated=i8,  # codes of nodes, see `isolated_nodes`
     shaft=i8,  # speeds of shafts that laws of devices read before the nodes are solved [rad/s]
-    # sizes, and rows of other arrays than `out`
-    size=i8,
+    size=i8,  # size of `out`
     device_mark=i8,  # offset in `marks` of those of devices
     # number of rows of `power` that features fill, between those of networks and of devices
     feature_power=i8,
@@ -346,18 +348,18 @@ RATE_UNWANTED = -1.0
 NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
 
 PROBE = record(
-    kind=i8,
+    kind=i8,  # a code of the probe kinds below
     index=i8,  # of the node, pipe, valve, column, mass, push, piston or basin
     # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
     side=i8,
     cell=i8,  # first cell that is read; for a basin offset of the cell numbers in `integers`
     count=i8,  # number of these cells; of the edges of a spool valve
     weights=i8,  # offset of their weights in `floats`
-    scale=f8,
-    offset=f8,
+    scale=f8,  # value of the probe = scale times the value read + offset
+    offset=f8,  # in the unit of the probe, SI
     head=i8,  # laws log and table: 1 a head, 2 a velocity
     mass=f8,  # laws log and table: mass per length of the profile there [kg/m]
-    scalar=i8,
+    scalar=i8,  # number of the scalar of a probe of a scalar
     mark=i8,  # pipe to be marked when this pressure is below vapour pressure; -1: none
 )
 # probe kinds
@@ -406,28 +408,38 @@ RECORDS = {
 }
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
-Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
+Tables = namedtuple(
+    "Tables",
+    (
+        *RECORDS,
+        "integers",  # rows of other tables, and other numbers, at the offsets that rows state
+        "floats",  # numbers of laws, and tables of values, at the offsets that rows state
+        "profile",  # numbers of cells and faces of pipes in the steady start
+        "plane",  # numbers of cells and faces of basins
+        "pieces",  # pieces of schedules, see PIECE_COLUMNS, and rows of formulas
+    ),
+)
 RunArrays = namedtuple(
     "RunArrays",
     (
-        "clock",
-        "work",
-        "armed",
-        "marks",
-        "scratch",
-        "spare",
-        "seen",
-        "bands",
-        "joint",
-        "sums",
-        "envelope",
-        "extremes",
-        "applied",
-        "stack",
-        "maxima",
-        "accepted",
-        "features",
-        "memory",
+        "clock",  # end of the segment and the given step, see CLOCK
+        "work",  # work array of features, at offsets that they reserve
+        "armed",  # flag of each event: 1 while its condition holds
+        "marks",  # first times at which the model does not hold [s]; nan until then
+        "scratch",  # work array of the function that runs
+        "spare",  # second array like `out`
+        "seen",  # values that all functions but rates read in place of y, where the two differ; else empty
+        "bands",  # for each mesh the first row, or cell, that this thread computes, and the one after its last
+        "joint",  # exchange between threads, see `kernels.band_exchange`; empty for one thread
+        "sums",  # sums of the stages of a step, see `kernels.stage_sums`
+        "envelope",  # for each cell of pipes: least sum of both waves [kg/s], its time [s], greatest, its time
+        "extremes",  # for each probe: least value, its time [s], greatest value, its time
+        "applied",  # outputs of blocks after their limits
+        "stack",  # values of a formula while it is computed
+        "maxima",  # greatest values of cells of basins
+        "accepted",  # pressures and flows of accepted states, from which iterations at nodes start
+        "features",  # addresses of the tables of features
+        "memory",  # addresses of arrays of features that may grow
     ),
 )
 HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))

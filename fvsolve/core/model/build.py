@@ -402,7 +402,7 @@ def most_states(draft: ModelDraft) -> int:
     unsteady = [
         mesh.cells
         for mesh in draft.meshes
-        if draft.case.links[mesh.name].friction.model == "unsteady"
+        if draft.case.conduits[mesh.name].friction.model == "unsteady"
     ]
     return draft.size + MAX_TERMS * sum(unsteady)
 

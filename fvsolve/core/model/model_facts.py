@@ -59,7 +59,7 @@ def pipe_facts(model, nodes: dict[str, Any]) -> dict[str, Any]:
             row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
         )
         law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
-        loss, link = drag(*law) / row["area"] * mesh.length, model.case.links[mesh.name]
+        loss, link = drag(*law) / row["area"] * mesh.length, model.case.conduits[mesh.name]
         # without the minor loss [Pa]
         wall_loss = abs(loss) - link.minor_loss * rho * velocity**2 / 2.0
         # in its liquid and wall; under the density law `mixture` the harmonic mean along the pipe at the start [m/s]

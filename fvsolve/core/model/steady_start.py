@@ -275,7 +275,7 @@ class SteadyStart:
         i, j = int(row["from_node"]), int(row["to_node"])
         if self.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        link = self.case.links[name]
+        link = self.case.conduits[name]
         if link.initial_flow is not None:
             given = link.initial_flow * self.draft.fluid.density
             return Edge(i, j, None, given, drop=lambda flow: friction_drop(law, flow))
@@ -349,7 +349,8 @@ class SteadyStart:
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
             free = (
-                row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
+                row["friction"] == rec.FRICTION_NONE
+                and self.case.conduits[name].initial_flow is None
             )
             if (
                 free
@@ -407,7 +408,7 @@ class SteadyStart:
         swinging = [
             name
             for name, row in free
-            if self.case.links[name].initial_flow is None
+            if self.case.conduits[name].initial_flow is None
             and abs(fixed[row["from_node"]] - fixed[row["to_node"]]) > 1e-6 * PRESSURE_SCALE
         ]
         for name in swinging:
@@ -448,7 +449,7 @@ class SteadyStart:
         for name, row, flow in rows:
             if (
                 row["friction"] != rec.FRICTION_ROUGH
-                or self.case.links[name].friction.model != "steady"
+                or self.case.conduits[name].friction.model != "steady"
             ):
                 continue
             reynolds = row["reynolds"] * abs(flow)

@@ -17,19 +17,19 @@ from fvsolve.jit import COMPILING, Intrinsic
 SLOT = 4
 
 BASIN = record(
-    kind=i8,  # code of its physics, see `basin_patches`
+    kind=i8,  # code of its physics, see `basins.basin_patches`
     deep=i8,  # 1: its first quantity is a depth above that in `plan`, which carries scalars
     # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
     given=i8,
-    scheme=i8,
+    scheme=i8,  # family of its scheme, as in SETTINGS
     limiter=i8,  # on rectangles
     # offset in `plane` of depths of kerbs: of rows of a grid, or of cells, see `free_surface.surface_mesh`
     kerbs=i8,
     wide=f8,  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
-    steepest=f8,  # bound of gradients in cells of meshes, see `cell_sides.gradient_share`
+    steepest=f8,  # bound of gradients in cells of meshes, see `basins.cell_sides.gradient_share`
     n=i8,  # number of cells
     nx=i8,  # columns and rows of a rectangle; 0 for other meshes
-    ny=i8,
+    ny=i8,  # see `nx`
     faces=i8,  # number of faces of a mesh, the last ones on the boundary
     outer=i8,  # number of faces on the boundary
     y=i8,  # first state; quantities follow each other, a row of cells each
@@ -65,7 +65,7 @@ BASIN = record(
     unsplit=f8,  # rate of its cells for the step limit over the rate from the kernels
     rest=f8,  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
     wall=i8,  # first of its moving walls
-    # number of its moving walls; with any, its states are contents, see `moving_walls`
+    # number of its moving walls; with any, its states are contents, see `basins.moving_walls`
     walls=i8,
     drawn=i8,  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
     stretch=i8,  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
@@ -75,7 +75,7 @@ BASIN = record(
     body=i8,  # body that carries it; -1 for none
     # 1 if its load acts on that body: forces move the body, or the joint load is an output
     loads_body=i8,
-    frame=i8,  # offset in `plane` of the position and motion of its axes; see `basin_frames`
+    frame=i8,  # offset in `plane` of the position and motion of its axes; see `basins.basin_frames`
     corners=i8,  # number of corners of a mesh
     # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
     places=i8,
@@ -117,8 +117,8 @@ GN = 14  # index of g_n among the numbers of a frame, see `basin_frames`
 NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT = range(4)
 NO_DRAG, MANNING, DARCY = 0, 1, 2
 PATCHES = record(
-    basin=i8,
-    node=i8,
+    basin=i8,  # row of its basin
+    node=i8,  # row of the node that it gives its pressure
     first=i8,  # offset of its cells in `integers`
     count=i8,  # number of its cells
     sizes=i8,  # offset in `plane` of the present area of these [m2] and length of its faces [m]
@@ -155,7 +155,7 @@ PATCHES = record(
 NO_CLOSURE, STAGE, DISCHARGE, RATING, CRITICAL, NORMAL_SLOPE, LINKED, INTERIOR = range(8)
 
 WALL = record(
-    basin=i8,
+    basin=i8,  # row of its basin
     node=i8,  # node of its patch
     y=i8,  # offset of its travel since the start [m]
     mass=i8,  # row of the force on what moves with it, among the net forces in `out`; -1 for none

@@ -348,7 +348,7 @@ def compressor_rate(tables, device):
 @njit
 def move(t, y, dydt, out, tables, device):
     """Write to `dydt` the rate of the gas that the compressor adds."""
-    if dydt.size > 0 and device["states"] > 0:
+    if device["states"] > 0:
         dydt[device["y"]] = compressor_rate(tables, device)
 
 

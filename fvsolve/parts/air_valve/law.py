@@ -203,8 +203,7 @@ def move(t, y, dydt, out, tables, device):
     flow, rate, _ = air_rate(y, tables, device)
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
-    if dydt.size > 0:
-        dydt[device["y"]] = flow
+    dydt[device["y"]] = flow
 
 
 @njit

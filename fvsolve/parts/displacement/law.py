@@ -169,7 +169,7 @@ def move(t, y, dydt, out, tables, device):
     k = device["valve"]
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], machine_rate(t, y, out, tables, device))
-    if dydt.size == 0 or device["y"] < 0:
+    if device["y"] < 0:
         return
     target = schedule_value(tables, tables.valves[k]["schedule"], t)
     if floats[at + RANGE] > 0.0:

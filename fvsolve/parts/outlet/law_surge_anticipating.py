@@ -46,8 +46,6 @@ def set(t, y, out, tables, device):
 @njit
 def move(t, y, dydt, out, tables, device):
     """Write the rates of the opening and of the time spent fully open to `dydt`."""
-    if dydt.size == 0:
-        return
     floats = tables.floats
     at = device["data"] + device["mode"]
     o = device["y"]

@@ -308,7 +308,7 @@ def move(t, y, dydt, out, tables, device):
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     first = 0 if mode == HELD_SPEED else 1
-    if dydt.size > 0 and device["states"] > first:
+    if device["states"] > first:
         per, e, q = electric_energy(out, tables, device)
         price = schedule_value(
             tables, int(floats[at + int(floats[at + ENERGY]) + law_energy.PRICE]), t
@@ -317,14 +317,11 @@ def move(t, y, dydt, out, tables, device):
     if mode == HELD_SPEED:
         return
     if mode == TRIPPING and not tripped(t, tables, device):
-        if dydt.size > 0:
-            dydt[device["y"]] = 0.0
+        dydt[device["y"]] = 0.0
         return
     torque = pump_torque(out, tables, device)
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], shaft_rate(out, tables, device, torque))
-    if dydt.size == 0:
-        return
     push = -torque
     if mode == TORQUE_DRIVEN:
         push = (

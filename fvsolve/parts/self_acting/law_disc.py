@@ -136,8 +136,6 @@ def move(t, y, dydt, out, tables, device):
     )
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], own if stopped else disc_rate_limit(y, out, tables, device, own))
-    if dydt.size == 0:
-        return
     if device["states"] == 1:
         dydt[o] = 0.0 if stopped else drive / time
     else:

@@ -101,8 +101,6 @@ def move(t, y, dydt, out, tables, device):
     """Write the rate of the opening to `dydt`, 0 at full opening and on the seat; raise out[RATE] to the rate limit."""
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
-    if dydt.size == 0:
-        return
     armed, at = tables.armed, device["event"]
     rate = regulator_error(t, out, tables, device) / tables.floats[device["data"] + TIME]
     dydt[device["y"]] = 0.0 if armed[at + 2] > 0.0 or armed[at + 4] > 0.0 else rate

@@ -40,8 +40,7 @@ def set(t, y, out, tables, device):
 @njit
 def move(t, y, dydt, out, tables, device):
     """Write zero rates to `dydt`: the states of the valve change by events only."""
-    if dydt.size > 0:
-        dydt[device["y"]] = dydt[device["y"] + 1] = 0.0
+    dydt[device["y"]] = dydt[device["y"] + 1] = 0.0
 
 
 @njit

@@ -108,8 +108,6 @@ def move(t, y, dydt, out, tables, device):
     w, damping = floats[data + ANGULAR_FREQUENCY], floats[data + DAMPING]
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], w * max(1.0, 2.0 * damping))
-    if dydt.size == 0:
-        return
     if armed[at + UPPER] > 0.0 or armed[at + LOWER] > 0.0:
         dydt[o], dydt[o + 1] = 0.0, 0.0
         return

@@ -319,13 +319,10 @@ def move(t, y, dydt, out, tables, device):
     if floats[at + MODE] == HELD_SPEED:
         return
     if generator_holds_speed(t, tables, device):
-        if dydt.size > 0:
-            dydt[device["y"]] = 0.0
+        dydt[device["y"]] = 0.0
         return
     if out[RATE] != RATE_UNWANTED:
         out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
-    if dydt.size == 0:
-        return
     torque = turbine_torque(out, tables, device)
     if floats[at + MODE] == TORQUE_DRIVEN:
         torque = (

@@ -20,14 +20,14 @@ CONTROL = record(
     data=i8,  # offset of the numbers of its law in `floats`
     # offset in `integers` of its inputs: number of a sensor, or -1 - number of another block
     inputs=i8,
-    input_count=i8,
+    input_count=i8,  # number of its inputs
     starts=i8,  # offset in `floats` of the values of its inputs at the start
     setpoint=i8,  # schedule of its setpoint; -1 for none
-    setpoint_start=f8,
+    setpoint_start=f8,  # value of the setpoint at the start
     at_once=i8,  # 1 if its output depends on the present values of its inputs
     late=i8,  # 1 if its output is computed after the nodes are solved, 0 if before
     least=f8,  # limits of its output
-    greatest=f8,
+    greatest=f8,  # see `least`
     flag=i8,  # first of four event flags of its limits; -1 for none
     # Offset in `discrete` of numbers that change at events and samples only, -1 for none. Of a block that acts at
     # samples: its output, the number of its next sample, then numbers of its law.
@@ -41,8 +41,8 @@ CONTROL = record(
     # Offset in `integers` of the blocks on which the input of a delay depends, not through other delays: first those on
     # whose present outputs it depends, `source_count`, then `later_count` that it follows through states.
     sources=i8,
-    source_count=i8,
-    later_count=i8,
+    source_count=i8,  # see `sources`
+    later_count=i8,  # see `sources`
 )
 
 DRIVEN = record(  # row of a table that a block drives before the nodes are solved

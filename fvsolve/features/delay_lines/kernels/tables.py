@@ -9,9 +9,9 @@ from fvsolve.jit import COMPILING, Intrinsic
 
 SLOT = 0
 DELAY = record(  # delay line: stretches of equal travel time, friction in the middle of each
-    pipe=i8,
+    pipe=i8,  # row of its pipe
     stretch=i8,  # first stretch
-    stretches=i8,
+    stretches=i8,  # number of its stretches
     tau=f8,  # travel time of a stretch [s]
     hold=f8,  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
     now=f8,  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
@@ -29,7 +29,7 @@ LINE_SETTINGS = record(
     jumps=f8,  # least jump that is stored as a jump, as fraction of the greatest wave
     # offset in `floats` of the weights b of the method, followed by its c; number of stages
     weights=i8,
-    stages=i8,
+    stages=i8,  # number of stages of the method
 )
 # node_ends : for each node the place of its first end, then that behind the last one; then the ends, 2 line + side
 # line_of : row of `delays` for each pipe, or -1; past, sharp : written by a run

@@ -22,7 +22,7 @@ BODY = record(  # its axes have their origin at its joint
     at="(3,)f8",  # position of the joint in the axes of the parent [m]
     attitude="(9,)f8",  # rotation matrix of the joint axes in the axes of the parent, by rows
     axis="(3,)f8",  # axis of the joint, in the joint axes and in its own
-    mass=f8,
+    mass=f8,  # [kg]
     centre="(3,)f8",  # centre of mass [m]
     inertia="(9,)f8",  # about the centre of mass [kg m2]
     damping=f8,  # damping of its joint [N m s] or [N s/m]
@@ -47,19 +47,19 @@ POINT = record(
 )
 
 LINE = record(  # line of action of a force element on points of bodies
-    push=i8,
+    push=i8,  # number of its force in out[push]
     from_point=i8,  # -1 for none
-    to_point=i8,
+    to_point=i8,  # -1 for none
     # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
     acts=i8,
-    direction="(3,)f8",
+    direction="(3,)f8",  # unit vector of that direction or axis
     length=f8,  # length at the start [m]
 )
 ALONG, TOWARD, ABOUT = 0, 1, 2
 
 PIN = record(
-    from_point=i8,
-    to_point=i8,
+    from_point=i8,  # row of `points`
+    to_point=i8,  # row of `points`
     rows=i8,  # number of constrained directions
     directions="(9,)f8",  # in the axes of the body of `from`
     pull=f8,  # rate of stabilisation (Baumgarte) [1/s]
@@ -68,12 +68,12 @@ PIN = record(
 )
 
 BUSHING = record(
-    from_point=i8,
-    to_point=i8,
-    stiffness=f8,
-    damping=f8,
-    turn_stiffness=f8,
-    turn_damping=f8,
+    from_point=i8,  # row of `points`
+    to_point=i8,  # row of `points`
+    stiffness=f8,  # [N/m]
+    damping=f8,  # [N s/m]
+    turn_stiffness=f8,  # [N m/rad]
+    turn_damping=f8,  # [N m s/rad]
     # rotation matrix of the body of `to` in the axes of that of `from` at the start
     attitude="(9,)f8",
     energy=f8,  # energy stored at the start [J]
@@ -81,7 +81,7 @@ BUSHING = record(
 
 # moving stretch of a pipe or column, or content of a node, on a body and in its axes
 MOVING_SEGMENT = record(
-    body=i8,
+    body=i8,  # row of the body that carries it
     start="(3,)f8",  # its start [m]; position of a node
     end="(3,)f8",  # its end [m]; the level of a tank rises along z
     swept="(3,)f8",  # integral of r x dr along it [m2]
@@ -104,44 +104,44 @@ MASS = record(
 
 # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
 BRACE = record(
-    from_mass=i8,
-    to_mass=i8,
+    from_mass=i8,  # row of the mass or frame at its start
+    to_mass=i8,  # row of the mass or frame at its end
     schedule=i8,  # -1 for none
     given=f8,  # value of the schedule at the start [N]
-    stiffness=f8,
-    damping=f8,
+    stiffness=f8,  # [N/m]
+    damping=f8,  # [N s/m]
     speed=f8,  # v_to - v_from at the start [m/s]
     force=f8,  # push at the start [N]
     line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 
 STOP = record(
-    from_mass=i8,
-    to_mass=i8,
-    stiffness=f8,
-    damping=f8,
+    from_mass=i8,  # row of the mass or frame at its start
+    to_mass=i8,  # row of the mass or frame at its end
+    stiffness=f8,  # of the contact [N/m]
+    damping=f8,  # of the contact [N s/m]
     below=f8,  # free travel at the start before it pushes forward, infinite for none [m]
     above=f8,  # free travel at the start before it pushes back [m]
-    force=f8,
+    force=f8,  # push at the start [N]
     line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 
 PISTON = record(
     case=i8,  # masses
-    rod=i8,
+    rod=i8,  # row of the mass of its rod
     a=i8,  # nodes
-    b=i8,
-    area_a=f8,
-    area_b=f8,
+    b=i8,  # row of the node of its chamber B
+    area_a=f8,  # area of the piston in chamber A [m2]
+    area_b=f8,  # likewise in B [m2]
     sweep_a=f8,  # mass in A per travel at the density of the start, not part of the excess [kg/m]
     sweep_b=f8,  # likewise in B, negative
     position=f8,  # x at the start [m]
-    stroke=f8,
+    stroke=f8,  # [m]
     leakage=f8,  # [m3/s/Pa]
     leak=f8,  # mass flow from A to B in the profile [kg/s]
-    damping=f8,
-    speed=f8,
-    force=f8,
+    damping=f8,  # [N s/m]
+    speed=f8,  # v_rod - v_case at the start [m/s]
+    force=f8,  # force of the piston at the start [N]
     line=i8,  # row of `lines` if it joins points of bodies; -1 on the axis of masses
 )
 

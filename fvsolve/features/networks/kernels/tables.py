@@ -12,16 +12,18 @@ NETWORK_INPUT = record(  # source of a network of potential and flow, see `netwo
     kind=i8,  # a code of sources of `parts.law_elements`
     index=i8,  # schedule, device, mass, switch, element or heat exchanger
     side=i8,  # of a device: quantity that is read
-    sign=f8,
+    sign=f8,  # factor of the value that is read
     start=f8,  # value at the start
 )
-NETWORK_RATE = record(y=i8)  # state whose rate is the value of the row of the same number
+NETWORK_RATE = record(
+    y=i8,  # state whose rate is the value of the row of the same number
+)
 NETWORK_ELEMENT = record(  # element of a network with power
     drop=i8,  # row of its difference of potentials
     flow=i8,  # row of its flow
     category=i8,  # NOT_BOOKED, STORED, DISSIPATED or SUPPLIED
     thermal=i8,  # 1 if its flow is a heat flow: then its power is `weight` times the flow
-    weight=f8,
+    weight=f8,  # of a thermal element: 1 or -1 if it has only a start or an end, else 0
     capacity=f8,  # of a store of potential, else 0
     inertance=f8,  # of a store of flow, else 0
     start=f8,  # potential or flow that it stores at the start

@@ -18,7 +18,7 @@ SCALAR = record(
     places=i8,  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
     # offset in `floats` of the wall mass of each pipe, and of a 0 for places without walls [kg/m]
     wall_masses=i8,
-    diffusivity=f8,
+    diffusivity=f8,  # along pipes and in cells [m2/s]
     decay=f8,  # [1/s]
     ambient=f8,  # value to which it decays
     loss=i8,  # first of its rows in the ledger of decay
@@ -27,26 +27,26 @@ SCALAR = record(
     losses=i8,
     initial=f8,  # inflow value if no other is given
     least=f8,  # bounds of all possible values
-    greatest=f8,
+    greatest=f8,  # see `least`
     molar=f8,  # amount of substance per volume of the value 1 [mol/m3]; 1 if it is no amount
     specific_heat=f8,  # of a temperature that heat changes [J/kg/K]; 0 for other scalars
     zero=f8,  # absolute temperature at which its value is 0 [K]
     # numbers a and b of Walther's equation of the viscosity, see `viscosity`; b is 0 without it
     walther_a=f8,
-    walther_b=f8,
+    walther_b=f8,  # see `walther_a`
     # 1 if the heat of friction has a row in the ledger for each cell, 0 for a row for each pipe
     by_cell=i8,
 )
 
 HEAT_SOURCE = record(  # restriction whose dissipated power heats the fluid where its flow leaves
-    valve=i8,
+    valve=i8,  # row of the restriction
     device=i8,  # device whose further dissipation is included; -1 for none
 )
 
 EXCHANGER = record(  # heat exchanger between a fluid place and a thermal node of a network
-    node=i8,
+    node=i8,  # row of its place in the fluid
     conductance=f8,  # [W/K]
-    effectiveness=f8,
+    effectiveness=f8,  # heat out of the fluid over m cp (T - T_to), m the mixed inflow [-]
     slowness=f8,  # 1 / heat capacity of the thermal node, 0 for an ambient [K/J]
 )
 
@@ -60,7 +60,7 @@ REACTION = record(
     extents=i8,  # number of these rows: 1, or a row for each place, see SCALAR
     limits=i8,  # 1 if its rate limits steps
     forward=f8,  # constants of mass action [(mol/m3)^(1 - order)/s]
-    reverse=f8,
+    reverse=f8,  # of the reverse reaction, in the unit of its order
     thermal=f8,  # R T [J/mol]
 )
 FORWARD_ORDER, REVERSE_ORDER, CHANGE = 0, 1, 2
