@@ -43,7 +43,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1736, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (35533, 176),
+    "fvsolve/features": (35538, 177),
     "fvsolve/parts": (24182, 134),
     "fvsolve/report": (6340, 21),
     "fvsolve/studies": (20727, 67),
