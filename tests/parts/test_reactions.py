@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.core.step_limits.step_notices import step_limits
-from fvsolve.features.scalars.kernels.tables import scalar_tables
+from fvsolve.features.scalars.own_tables import scalar_tables
 
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p", "auto")
 GAS = 8.31446261815324  # [J/mol/K]

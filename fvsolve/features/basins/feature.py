@@ -13,7 +13,7 @@ from fvsolve.core.assembly.features import Feature, FeatureRun
 from fvsolve.core.assembly.model_draft import aligned_zeros
 from fvsolve.features.basins import lower
 from fvsolve.features.basins.tables import DISCHARGE, EMPTY, STAGE, BasinTables
-from fvsolve.features.scalars.kernels.tables import scalar_tables
+from fvsolve.features.scalars.own_tables import scalar_tables
 
 # functions of the loads on bodies of water at rest, and of water at rest on moving walls
 LOADS_AT_REST = ("basin_frames: set_frames", "frame_forces: add_frame_forces")

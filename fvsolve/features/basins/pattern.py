@@ -9,7 +9,7 @@ from fvsolve.core.model.jacobian_pattern import Pairs
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.features.basins import lower_pattern as pattern
 from fvsolve.features.basins import tables as records
-from fvsolve.features.scalars.kernels.tables import scalar_tables
+from fvsolve.features.scalars.own_tables import scalar_tables
 
 
 class BasinPattern(FeaturePattern):

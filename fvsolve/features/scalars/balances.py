@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.features.scalars.kernels.tables import CHANGE, scalar_tables
+from fvsolve.features.scalars.kernels.tables import CHANGE
 from fvsolve.features.scalars.lower import STORES, wall_masses
+from fvsolve.features.scalars.own_tables import scalar_tables
 from fvsolve.features.scalars.reactions import reacting
 from fvsolve.parts.heat import exchanger_names
 

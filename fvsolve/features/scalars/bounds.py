@@ -3,8 +3,8 @@
 import numpy as np
 
 from fvsolve.core.model.state_bounds import NO_STATE, bound_rows
-from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import STORES, wall_masses
+from fvsolve.features.scalars.own_tables import scalar_tables
 
 
 def scalar_bounds(model, q: int):

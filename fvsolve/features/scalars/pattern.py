@@ -10,8 +10,8 @@ from fvsolve.core.kernels.pipe_energy import MAX_WIDTH
 from fvsolve.core.model.jacobian_pattern import Pairs, ends_of
 from fvsolve.core.model.state_pairs import pairs_of, unique_states
 from fvsolve.core.steady import union
-from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import STORES
+from fvsolve.features.scalars.own_tables import scalar_tables
 from fvsolve.features.scalars.reactions import names_read
 from fvsolve.parts import law_elements as codes
 

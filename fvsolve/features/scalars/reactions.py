@@ -12,7 +12,8 @@ from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.kernels.formula_programs import INPUT
 from fvsolve.core.steppers.tableau import AUTO, METHODS
 from fvsolve.errors import listing
-from fvsolve.features.scalars.kernels.tables import REACTION, scalar_tables
+from fvsolve.features.scalars.kernels.tables import REACTION
+from fvsolve.features.scalars.own_tables import scalar_tables
 from fvsolve.parts.carried_scalar import molar_factor
 from fvsolve.parts.formula import means, samples
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from fvsolve.core.kernels import dtypes as rec
 from fvsolve.core.model.energy_norm import SCALAR_WEIGHT
-from fvsolve.features.scalars.kernels.tables import scalar_tables
 from fvsolve.features.scalars.lower import typical_value
+from fvsolve.features.scalars.own_tables import scalar_tables
 
 
 def weigh_scalars(model, weights: np.ndarray) -> None:

@@ -5,7 +5,6 @@ from collections import namedtuple
 
 import numpy as np
 
-from fvsolve.core.assembly.features import with_slot
 from fvsolve.core.kernels import table_handle
 from fvsolve.core.kernels.dtypes import f8, i8, record
 from fvsolve.jit import COMPILING, Intrinsic
@@ -74,12 +73,6 @@ RECORDS = {
 }
 ScalarTables = namedtuple("ScalarTables", tuple(RECORDS))
 EMPTY = ScalarTables(*(np.zeros(0, kind) for kind in RECORDS.values()))
-
-
-def scalar_tables(owner) -> ScalarTables:
-    """Tables of the scalars of a draft or a model; without rows if its case has none."""
-    feature = with_slot(owner.features, SLOT)
-    return EMPTY if feature is None else feature.tables()
 
 
 @functools.cache
