@@ -44,13 +44,8 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1736, 7),
     "fvsolve/exchange": (1, 1),
-<<<<<<< HEAD
-    "fvsolve/features": (35642, 178),
+    "fvsolve/features": (35647, 179),
     "fvsolve/parts": (24210, 134),
-=======
-    "fvsolve/features": (35538, 177),
-    "fvsolve/parts": (24182, 134),
->>>>>>> 8b9abe3446622ab61dfc5e218690d908fb40943d
     "fvsolve/report": (6340, 21),
     "fvsolve/studies": (20727, 67),
     "fvsolve/core/assembly": (2855, 11),
