@@ -32,10 +32,13 @@ def moved(table: dict, keys: tuple, to) -> dict:
 def form(model) -> tuple:
     """Sizes, names and integers of a model."""
     motion = motion_of(model)
-    of_motion = {} if motion is None else motion.tables()._asdict()
+    all_tables = model.tables._asdict()
+    with model.run_data() as data:
+        for own in filter(None, data.feature_tables()):
+            all_tables |= own._asdict()
     tables = {
         name: (table.shape, *(table[column].tobytes() for column in whole_columns(table)))
-        for name, table in {**model.tables._asdict(), **of_motion}.items()
+        for name, table in all_tables.items()
     }
     tables["integers"] = model.tables.integers.tobytes()
     if (network := network_of(model)) is not None:

@@ -42,6 +42,10 @@ def model_bytes(model) -> dict[str, bytes]:
     for own in model.features:
         found = {name: value for name, value in vars(own).items() if isinstance(value, np.ndarray)}
         tables |= {f"{own.slot}.{name}": value.tobytes() for name, value in found.items()}
+    with model.run_data() as data:
+        for slot, own in enumerate(data.feature_tables()):
+            found = own._asdict() if own else {}
+            tables |= {f"table {slot}.{name}": table.tobytes() for name, table in found.items()}
     arrays = {
         "scale": model.scale,
         "start": model.start,
