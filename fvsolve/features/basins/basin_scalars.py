@@ -23,7 +23,7 @@ from fvsolve.features.basins.boundary_cells import (
 )
 from fvsolve.features.basins.cell_sides import deviations_of
 from fvsolve.features.basins.tables import INTERIOR, NO_CLOSURE, open_basins
-from fvsolve.features.scalars.kernels.scalar_transport import change_rate, record_loss
+from fvsolve.features.scalars.kernels.scalar_transport import change_rate
 from fvsolve.jit import njit
 
 DRY_WEIGHT = 1e-12  # weight of a dry cell in the value at a patch [m]
@@ -381,11 +381,19 @@ def add_decay(tables, basin, q, per, s, rate, out):
     decay = scalar["decay"]
     ambient = scalar["ambient"]
     area = tables.plane[basin["area"] : basin["area"] + s.size]
+    losses = out[tables.layout[0]["loss"] + scalar["loss"] :]
+    # The ledger has a single entry for all cells, or an entry for each.
+    has_single, first = scalar["losses"] == 1, basin["lost"]
+    total = losses[0]
     for i in range(s.size):
         cell_depth = depth[i] if depth.size > 0 else 1.0
-        record_loss(
-            out, tables, q, basin["lost"] + i, per * decay * area[i] * (s[i] - cell_depth * ambient)
-        )
+        lost = per * decay * area[i] * (s[i] - cell_depth * ambient)
+        if has_single:
+            total -= lost
+        else:
+            losses[first + i] = -lost
+    if has_single:
+        losses[0] = total
     advection.add_decay(decay, ambient, depth, s, rate)
 
 

@@ -531,6 +531,16 @@ def subtract_decay(decay, ambient, s, m, wall, c, ds):
 
 
 @njit
+def record_losses(rate, ambient, s, m, wall, c, losses):
+    """Write minus the decay in each cell [kg/s] to `losses`.
+
+    rate : decay times length of a cell [m/s]; other arguments as for `subtract_decay`
+    """
+    for i in range(s.size):
+        losses[i] = -(rate * ((s[i] - wall * c[i]) - ambient * m[i]))
+
+
+@njit
 def extremes(m, flow):
     """(least mass per length of cells [kg/m], greatest |mass flow| of faces [kg/s]); m, flow : in cells, at faces."""
     least, most = m[0], abs(flow[m.size])
@@ -598,9 +608,8 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
             else 0.0
         )
         if scalar["losses"] > 1:
-            for i in range(n):
-                fades = dx * scalar["decay"] * ((s[i] - wall * c[i]) - scalar["ambient"] * m[i])
-                record_loss(out, tables, q, pipe["cell"] + i, fades)
+            losses = out[layout["loss"] + scalar["loss"] + pipe["cell"] :]
+            record_losses(dx * scalar["decay"], scalar["ambient"], s, m, wall, c, losses)
         else:
             record_loss(out, tables, q, 0, dx * lost)
         rate = (
