@@ -45,7 +45,7 @@ def scalar_stride(tables):
     return tables.scalars[1]["y"] - tables.scalars[0]["y"] if tables.scalars.size > 1 else 0
 
 
-@njit
+@njit(forceinline=True)
 def read_amounts(tables, y, first, stride, mass, p):
     """Write the values of all scalars at a place to `stack`, those of amounts in mol/m3.
 
@@ -68,7 +68,7 @@ def power_of(c, order):
     return c * abs(c) if order == 2.0 else max(c, 0.0) ** order
 
 
-@njit
+@njit(forceinline=True)
 def rates_both_ways(tables, k):
     """(forward rate, reverse rate) of reaction k at the amounts in `stack` [mol/m3/s]; by a formula (rate, 0)."""
     reaction, floats = tables.reactions[k], tables.floats
@@ -121,7 +121,7 @@ def greatest_rate(tables):
     return bound
 
 
-@njit
+@njit(forceinline=True)
 def react(y, dydt, out, tables, first, stride, mass, p, present, weight, entry):
     """Add the changes by all reactions at a place to its rates.
 
