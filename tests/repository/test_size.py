@@ -44,7 +44,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/data": (12, 1),
     "fvsolve/exact": (1736, 7),
     "fvsolve/exchange": (1, 1),
-    "fvsolve/features": (35647, 179),
+    "fvsolve/features": (35664, 179),
     "fvsolve/parts": (24210, 134),
     "fvsolve/report": (6340, 21),
     "fvsolve/studies": (20727, 67),
