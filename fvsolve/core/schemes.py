@@ -141,7 +141,9 @@ SCHEMES = {
             shorter="muscl",
             plane="weno5",
             branches=(
-                ("upwind5", UPWIND5), ("stencil behind", fractions(6, 2, -7, 11, 0, 0)), ("upwind3", UPWIND3),
+                ("upwind5", UPWIND5),
+                ("stencil behind", fractions(6, 2, -7, 11, 0, 0)),
+                ("upwind3", UPWIND3),
                 ("stencil ahead", fractions(6, 0, 0, 2, 5, -1)),
             ),
         ),
@@ -150,11 +152,13 @@ SCHEMES = {
             weights=fractions(2, 0, -1, 3, 0, 0),
             own_end_factors=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01),
         ),
-        Scheme("fromm", weights=fractions(4, 0, -1, 4, 1, 0), own_end_factors=(1.0, 1.46, 1.19, 1.08)),
+        Scheme(
+            "fromm", weights=fractions(4, 0, -1, 4, 1, 0), own_end_factors=(1.0, 1.46, 1.19, 1.08)
+        ),
         Scheme("central", weights=fractions(2, 0, 0, 1, 1, 0)),
         Scheme("upwind3", weights=UPWIND3, own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.03)),
     )
-}  # fmt: skip
+}
 LINEAR = dict(
     sorted(
         ((name, scheme) for name, scheme in SCHEMES.items() if not scheme.limited),

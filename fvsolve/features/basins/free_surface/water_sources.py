@@ -261,8 +261,12 @@ def sum_of_products(a, b):
     """Sum of the products of the entries of two arrays, in four partial sums, which the processor adds side by side."""
     sums, last = (0.0, 0.0, 0.0, 0.0), a.size // 4 * 4
     for i in range(0, last, 4):
-        sums = (sums[0] + a[i] * b[i], sums[1] + a[i + 1] * b[i + 1], sums[2] + a[i + 2] * b[i + 2],
-                sums[3] + a[i + 3] * b[i + 3])  # fmt: skip
+        sums = (
+            sums[0] + a[i] * b[i],
+            sums[1] + a[i + 1] * b[i + 1],
+            sums[2] + a[i + 2] * b[i + 2],
+            sums[3] + a[i + 3] * b[i + 3],
+        )
     total = (sums[0] + sums[1]) + (sums[2] + sums[3])
     for i in range(last, a.size):
         total += a[i] * b[i]

@@ -565,10 +565,11 @@ def pipe_scalar_rates(y, dydt, out, tables, p):
     base = tables.profile[pipe["center"] :]
     r = y[o : o + n]
     l = y[o + n : o + 2 * n]
-    m, flow, c, d, f = (
-        scratch[:n], scratch[n : 2 * n + 1], scratch[2 * n + 1 : 3 * n + 1], scratch[3 * n + 1 : 4 * n + 1],
-        scratch[4 * n + 1 : 5 * n + 2],
-    )  # fmt: skip
+    m = scratch[:n]
+    flow = scratch[n : 2 * n + 1]
+    c = scratch[2 * n + 1 : 3 * n + 1]
+    d = scratch[3 * n + 1 : 4 * n + 1]
+    f = scratch[4 * n + 1 : 5 * n + 2]
     cell_masses(base, 1.0 / pipe["speed"], r, l, m)
     # The flows of the solved nodes, by which scalars at nodes are balanced too.
     first, last = end_flow(out, tables, p, 0), end_flow(out, tables, p, 1)
