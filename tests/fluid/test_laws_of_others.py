@@ -172,6 +172,15 @@ def test_a_formula_that_contradicts_the_fluid_or_itself_is_refused(law, text):
     assert caught.value.key == "law" and text in str(caught.value)
 
 
+@pytest.mark.parametrize("pressure", [20.0, 3e8])
+def test_a_reference_outside_the_usual_pressures_lies_within_the_table(pressure):
+    given = {"density": DENSITY, "bulk_modulus": MODULUS}
+    table = properties("user", 293.15, pressure, "tait", **given).table
+    assert table.pressure[0] <= pressure <= table.pressure[-1] / 2.0
+    found = np.interp(pressure, table.pressure, table.log_density)
+    assert found == pytest.approx(np.log(DENSITY), rel=1e-6)
+
+
 def test_a_class_that_is_no_density_law_is_refused(file_of_laws):
     with pytest.raises(FvsolveError) as caught:
         law_named("stranger")

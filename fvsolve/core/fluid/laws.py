@@ -417,8 +417,8 @@ class TableLaw(TabulatedLaw, name="table"):
 class SampledLaw(TabulatedLaw):
     """Base of a density law of another package: a formula of the density over pressure, which becomes a table.
 
-    lowest, highest : pressures between which the formula is sampled [Pa]; from the vapour pressure and up to twice the
-    reference pressure at least. Beyond both ends ln rho is linear in pressure.
+    lowest, highest : pressures between which the formula is sampled [Pa], not below the vapour pressure. The reference
+    pressure and its double always lie between them. Beyond both ends ln rho is linear in pressure.
     """
 
     lowest: ClassVar[float] = 100.0
@@ -450,7 +450,8 @@ class SampledLaw(TabulatedLaw):
             text = f"its bulk modulus is {1.0 / slope:g} Pa at the reference pressure"
             expected = f"expected that of the fluid, {fluid.bulk_modulus:g} Pa"
             raise FluidError("law", f'"{cls.name}": {text}; {expected}')
-        span = max(cls.lowest, fluid.vapor_pressure), max(cls.highest, 2.0 * fluid.pressure)
+        least = max(min(cls.lowest, fluid.pressure), fluid.vapor_pressure)
+        span = least, max(cls.highest, 2.0 * fluid.pressure)
         values, slopes = sample(grid := np.linspace(*span, 1025))
         # Simpson's rule over pairs of intervals
         rise = (slopes[:-2:2] + 4.0 * slopes[1::2] + slopes[2::2]) * (grid[1] - grid[0]) / 3.0
