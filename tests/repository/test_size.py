@@ -70,7 +70,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/epanet": (2266, 6),
     "tests/exact": (721, 3),
     "tests/features": (1395, 4),
-    "tests/fluid": (1543, 5),
+    "tests/fluid": (1544, 5),
     "tests/fmi": (453, 2),
     "tests/invariance": (3037, 13),
     "tests/kernels": (1625, 8),
