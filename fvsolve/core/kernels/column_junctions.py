@@ -60,6 +60,13 @@ def is_column_junction(tables, out, i):
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
 
 
+@njit
+def is_shut(tables, out, i):
+    """True if node i joins rigid columns, and otherwise only closed valves."""
+    node = tables.nodes[i]
+    return node["gates"] >= 0 and node["columns"] > 0 and gate_area(tables, out, i)[0] == 0.0
+
+
 @njit(forceinline=True)
 def forcing_of(tables, out, column):
     """Forcing of a column, the change since the start of the work that a feature does on it [J/kg].
@@ -97,10 +104,22 @@ def pressure_at(tables, out, i, extra, solved):
 
 
 @njit
+def zero_flow_pressure(tables, out, x, index, solved):
+    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
+    valve = tables.valves[index]
+    side = 1.0 if valve["from_node"] == x else -1.0
+    other = pressure_at(
+        tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved
+    )
+    return other - side * valve["drop"]
+
+
+@njit
 def has_pressure_reference(tables, out, i, k, seen):
     """True if rigid columns other than k join junction i, also through column junctions, to a node of another kind.
 
-    Columns that valves control are left out. seen : receives 1 for the nodes that these columns join
+    Columns that valves control are left out, and ends with closed valves set no pressure.
+    seen : receives 1 for the nodes that these columns join
     """
     columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
     # Junctions reached so far are marked; each turn adds those behind a further column.
@@ -114,7 +133,7 @@ def has_pressure_reference(tables, out, i, k, seen):
             if j == k or out[controlled + j] != 0.0 or seen[a] == seen[b]:
                 continue
             other = b if seen[a] > 0.0 else a
-            if not is_column_junction(tables, out, other):
+            if not is_shut(tables, out, other):
                 return True
             seen[other], changed = 1.0, True
     return False

@@ -25,9 +25,9 @@ from math import sqrt
 
 from fvsolve.core.kernels import column_junctions as junctions
 from fvsolve.core.kernels.calls import call_lead
-from fvsolve.core.kernels.density import enthalpy, pressure_of_enthalpy
 from fvsolve.core.kernels.devices import LEAD
 from fvsolve.core.kernels.dtypes import CLOSING, NOT_CONVERGED, RATE, RATE_UNWANTED, STATUS
+from fvsolve.core.kernels.isolated_columns import pressure_across, settle_isolated_columns
 from fvsolve.core.kernels.node_clusters import has_converged
 from fvsolve.core.kernels.restrictions import (
     conductance,
@@ -89,10 +89,15 @@ def area_rate_known(tables, out, i):
 def find_control_end(tables, out, k):
     """End of rigid column k at which valves control its flow: 1 for `to`, -1 for `from`, 0 for none.
 
-    If the far end is a column junction, it must have a pressure reference besides this column
-    (`has_pressure_reference`).
+    Closed valves always control it: the flow is zero. If valves are only nearly closed and the far end is a column
+    junction, this must have a pressure reference besides the column (`has_pressure_reference`).
     """
     column, marks = tables.columns[k], tables.scratch[: tables.nodes.size]
+    # A closed end is taken first: valves at the other end cannot make a flow.
+    for side in (1, -1):
+        near = column["to_node"] if side > 0 else column["from_node"]
+        if junctions.is_shut(tables, out, near) and is_controlled(tables, out, near):
+            return side
     for side in (1, -1):
         near, far = column["to_node"], column["from_node"]
         if side < 0:
@@ -130,10 +135,7 @@ def stationary_pressure(y, tables, out, k, end, solved):
     column = tables.columns[k]
     p, softness = junctions.far_end_pressure(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
-    # At rest there is no friction: the pressure loss of the profile is added back.
-    return p + end * (
-        junctions.driving_offset(tables, out, column) + column["drag"] * inertia
-    ), inertia + softness
+    return pressure_across(tables, out, k, end, p, False), inertia + softness
 
 
 @njit
@@ -247,7 +249,7 @@ def gate_flow(t, tables, out, x, p, solved):
     flow, rate, rise = 0.0, 0.0, 0.0
     for e in range(tables.nodes[x]["gate_count"]):
         k = tables.integers[tables.nodes[x]["gates"] + e]
-        drop = p - zero_flow_pressure(tables, out, x, k, solved)
+        drop = p - junctions.zero_flow_pressure(tables, out, x, k, solved)
         root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
         # Near a kink t is not the present time, to which conductances in `out` belong: both are evaluated.
         later = sqrt(conductance_at(t + RATE_INTERVAL, tables, out, k))
@@ -260,22 +262,11 @@ def gate_flow(t, tables, out, x, p, solved):
 
 
 @njit
-def zero_flow_pressure(tables, out, x, index, solved):
-    """Pressure change of node x since the start [Pa] at which there is no flow through its valve `index`."""
-    valve = tables.valves[index]
-    side = 1.0 if valve["from_node"] == x else -1.0
-    other = junctions.pressure_at(
-        tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved
-    )
-    return other - side * valve["drop"]
-
-
-@njit
 def zero_flow_range(tables, out, x, solved):
     """(least, greatest) result of `zero_flow_pressure` for all valves of node x [Pa]."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
-        level = zero_flow_pressure(
+        level = junctions.zero_flow_pressure(
             tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved
         )
         least, most = min(least, level), max(most, level)
@@ -457,6 +448,7 @@ def column_pressures(t, y, dydt, out, handle):
     """
     tables = open_tables(handle)
     pressure = tables.layout[0]["pressure"]
+    settle_isolated_columns(tables, out, False)
     junction_pressures(t, y, tables, out)
     for k in range(tables.columns.size):
         end = control_end(tables, out, k)
@@ -598,10 +590,8 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
     L, area A and flow M, is then subtracted; for a valve near its seat `apply_seating_drop` subtracts it.
     """
     tables = open_tables(handle)
-    st = tables.settings[0]
-    nodes = tables.nodes
-    floats = tables.floats
     pressure = tables.layout[0]["pressure"]
+    settle_isolated_columns(tables, out, True)
     junction_pressures_barotropic(t, y, tables, out)
     for k in range(tables.columns.size):
         column, end = tables.columns[k], control_end(tables, out, k)
@@ -610,12 +600,7 @@ def column_pressures_barotropic(t, y, dydt, out, handle):
         i, controlled = column["from_node"], column["to_node"]
         if end == -1:
             i, controlled = controlled, i
-        rise = st["gravity"] * (nodes[controlled]["elevation"] - nodes[i]["elevation"])
-        rise -= end * junctions.forcing_of(tables, out, column)
-        h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
-        out[pressure + controlled] = (
-            pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
-        )
+        out[pressure + controlled] = pressure_across(tables, out, k, end, out[pressure + i], True)
         if seating_valve(tables, controlled) >= 0:
             apply_seating_drop(t, y, tables, out, k, controlled, seating_valve(tables, controlled))
         elif junctions.gate_area(tables, out, controlled)[0] > 0.0:
