@@ -11,9 +11,10 @@ from reference import governor
 from reference.folders import CASES
 from reference.level_control import METHODS, SECTION, SUPPLY, final, orifice_flow, pi, tower
 from reference.resumed_runs import killed_and_resumed, same_files
-from reference.scenes import GRAVITY, WATER, lake, pipe, reservoir, scene, valve
+from reference.scenes import GRAVITY, WATER, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.core.assembly.schedule_tables import period_of
@@ -330,6 +331,57 @@ def test_a_balanced_start_finds_the_opening_that_the_flow_needs():
     model = fvsolve.build(fvsolve.load(tower({"control": "hold"}, 0.5, controls={"hold": pi(4.0)})))
     assert blocks_of(model)[0]["start"] == pytest.approx(0.25, rel=1e-14)  # sqrt(4 / 16) / 2
     assert model.steady["moving"] == []
+
+
+RELIEF = {
+    "inside": ("(p - 3e5) / 5e5", {}),
+    "shut": ("(p - 6e5) / 5e5", {}),
+    "shut, steep": ("(p - 6e5) / 5e4", {"links.relief.area": 0.02}),
+    "open": ("(p - 1e5) / 5e4", {}),
+    "filtered": ("(p - 6e5) / 5e5", {"controls.copy.filter": 0.1}),
+}
+
+
+@pytest.mark.parametrize("relief", RELIEF)
+def test_a_block_before_one_at_its_limit_starts_with_its_input(relief):
+    """Valves in series and a relief valve, whose opening in [0, 1] follows a copy of a pressure by a formula.
+
+    The pressure is the root of the balance of flows. The step beyond the limit had moved the copy too, for the whole
+    run and without a note.
+    """
+    formula, changes = RELIEF[relief]
+    links = {
+        "main": valve("high", "gate", 1e-3),
+        "outlet": valve("gate", "low", 1e-3),
+        "relief": valve("gate", "low", 5e-4, {"control": "command"}),
+    }
+    nodes = {"high": reservoir(1.0e6), "low": reservoir(1e5), "gate": junction()}
+    probes = ["gate.pressure", "controls.copy.output", "controls.command.output"]
+    case = scene(nodes, links, 1.0, {"step": 0.05, "method": "rk4"}, probes, 0.1)
+    case["controls"] = {
+        "copy": {"type": "function", "inputs": {"x": "gate.pressure"}, "formula": "x"},
+        "command": {
+            "type": "function",
+            "inputs": {"p": "controls.copy"},
+            "formula": formula,
+            "limits": [0, 1],
+            "period": 0.1,
+        },
+    }
+    result = fvsolve.run(case, changes)
+    opened = changes.get("links.relief.area", 5e-4)
+
+    def opening(p):
+        return min(max(eval(formula, {"p": p}), 0.0), 1.0)
+
+    def surplus(p):
+        return 1e-3 * math.sqrt(1.0e6 - p) - (1e-3 + opened * opening(p)) * math.sqrt(p - 1e5)
+
+    pressure = brentq(surplus, 1.0001e5, 0.9999e6, xtol=1e-9)
+    for row in (0, -1):
+        assert result["gate.pressure"][row] == pytest.approx(pressure, rel=1e-9)
+        assert result["controls.copy.output"][row] == pytest.approx(pressure, rel=1e-9)
+        assert result["controls.command.output"][row] == pytest.approx(opening(pressure), abs=1e-8)
 
 
 def test_outputs_that_follow_from_levels_and_setpoints_need_no_search(monkeypatch):

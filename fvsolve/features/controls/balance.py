@@ -25,6 +25,8 @@ ROUNDING = 1e-8
 BESIDE = 1e-7  # distance of the residuals of the last step, relative to the range
 # residual of an integrating block at its limit that stops it, over its change with the outputs
 STOPPED = 1e-6
+# error of the output of a block without states above which its start is refused, relative to its range
+UNBALANCED = 1e-6
 BALANCED = 4e-16  # change of an output in the last iteration, relative to its range: rounding
 
 
@@ -195,6 +197,7 @@ class Balance:
         if self.free and not self.infinite(starts):
             lost = self.iterate(outputs)
             starts = self.settled(outputs, self.starts(outputs)[0])
+            lost = lost or self.unbalanced(starts)
             if lost and not self.infinite(starts):
                 self.refuse(lost, starts)
         self.refuse_infinite(starts)
@@ -274,13 +277,9 @@ class Balance:
                 return self.free
             if residual[~acts].any():  # no output changes it
                 return self.blocks_of_rows((residual != 0.0) & ~acts)
-            step, _, rank, _ = np.linalg.lstsq(
-                matrix[acts] / size[acts, None], -residual[acts] / size[acts], RANK
-            )
             before = outputs.copy()
-            change = step * self.range[self.free]
-            outputs[self.free] = np.clip(
-                outputs[self.free] + change, self.low[self.free], self.high[self.free]
+            rank = self.step(
+                outputs, matrix[acts] / size[acts, None], residual[acts] / size[acts], acts
             )
             moved = float(np.max(np.abs(outputs - before) / self.range))
             rounding, size_before = 0.5 * size_before < moved < ROUNDING, moved
@@ -295,6 +294,49 @@ class Balance:
                     return self.free
                 by_rates = True
         return self.free
+
+    def step(
+        self, outputs: np.ndarray, matrix: np.ndarray, residual: np.ndarray, acts: np.ndarray
+    ) -> int:
+        """Take a Newton step in `outputs`, in which blocks stop at their limits; returns the rank of the matrix.
+
+        The residual of a block at its limit need not be zero. The step of the other blocks counts with this limit, not
+        with the output beyond it.
+        matrix, residual : slopes times the ranges, and residuals, of the rows `acts`
+        """
+        rows = np.flatnonzero(acts)
+        at_limit = np.zeros(len(self.free), bool)
+        change = np.zeros(len(self.free))
+        first_rank = -1
+        while True:
+            # The first rows are those of the blocks themselves, in their order.
+            own = np.append(at_limit, np.zeros(acts.size - at_limit.size, bool))
+            kept = ~own[rows]
+            right = -residual - matrix[:, at_limit] @ change[at_limit]
+            change[~at_limit], _, rank, _ = np.linalg.lstsq(
+                matrix[kept][:, ~at_limit], right[kept], RANK
+            )
+            first_rank = rank if first_rank < 0 else first_rank
+            moved = outputs[self.free] + change * self.range[self.free]
+            limited = np.clip(moved, self.low[self.free], self.high[self.free])
+            beyond = (limited != moved) & ~at_limit
+            if not beyond.any():
+                outputs[self.free] = limited
+                return first_rank
+            change[beyond] = ((limited - outputs[self.free]) / self.range[self.free])[beyond]
+            at_limit |= beyond
+
+    def unbalanced(self, starts: list[BlockStart]) -> list[int]:
+        """Numbers of the blocks without states whose output is not the one that their inputs give within its limits."""
+        found = []
+        for k in self.free:
+            control = starts[k].block.control
+            if control_rows_of(type(control)).is_static(control):
+                value = self.residual(starts[k]) + starts[k].output
+                error = abs(min(max(value, self.low[k]), self.high[k]) - starts[k].output)
+                if error > UNBALANCED * (self.range[k] + abs(starts[k].output)):
+                    found.append(k)
+        return found
 
     def blocks_of_rows(self, chosen: np.ndarray) -> list[int]:
         """Numbers of the blocks of chosen rows of the residuals : bool[rows]."""
