@@ -170,6 +170,40 @@ def test_given_steps_end_at_samples(method):
     assert run.ok and run["tower.level"][-1] == pytest.approx(close, abs=1e-7)
 
 
+@pytest.mark.in_turn
+@pytest.mark.parametrize("kink", [0.7, 0.3], ids=["beside", "at a sample"])
+@pytest.mark.parametrize("every", [0.1, 0.05, 0.02])
+@pytest.mark.parametrize(
+    "numerics",
+    [
+        {"method": "ssp-rk3", "step": 0.01},
+        {"method": "radau-iia-5", "step": 0.01},
+        {"method": "rodas-5p", "step": 0.02},
+        {"method": "dormand-prince", "rtol": 1e-7},
+    ],
+    ids=["ssp-rk3", "radau-iia-5", "rodas-5p", "dormand-prince"],
+)
+def test_a_row_at_the_time_of_a_sample_shows_the_output_before_it(numerics, every, kink):
+    """The sample at 3 h and the row at 3 h may differ by rounding: 0.3 is 30 steps of 0.01, but not 3 times 0.1.
+
+    The output at a row is the time of the last sample; the schedule has a kink at a row of this kind, where a segment
+    of the run ends.
+    """
+    case = {
+        "controls": {
+            "clock": {"type": "function", "inputs": {"x": "controls.ramp"}, "formula": "x + t"},
+            "ramp": {"type": "function", "inputs": {}, "formula": f"0.0*max(t, {kink})"},
+        },
+        "numerics": {"end": 2.0} | numerics,
+        "output": {"every": every, "probes": ["controls.clock.output"]},
+    }
+    case["controls"]["clock"]["period"] = 0.1
+    result = fvsolve.run(case)
+    rows = np.arange(round(0.1 / every), len(result.t), round(0.1 / every))
+    assert len(rows) == 20
+    assert result["controls.clock.output"][rows] == pytest.approx(result.t[rows] - 0.1, abs=1e-12)
+
+
 def test_a_killed_and_resumed_run_with_samples_and_relays_is_the_unbroken_run(tmp_path):
     relay = {
         "type": "relay",

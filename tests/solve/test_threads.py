@@ -229,7 +229,11 @@ def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
     timer.join()
     assert found.reason.startswith("interrupted")
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    assert not [one for one in threading.enumerate() if one.name.startswith("band")]
+    # They return by themselves, on a busy machine a little later than the run.
+    for thread in threading.enumerate():
+        if thread.name.startswith("band"):
+            thread.join(10.0)
+            assert not thread.is_alive()
 
 
 NETWORK = scene(

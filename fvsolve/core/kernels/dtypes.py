@@ -341,7 +341,9 @@ RATE, STATUS, WHERE, CLOSING, ARRIVES, LONGEST = 0, 1, 2, 3, 4, 5  # first entri
 FIRM, FIRM_SLOPE = 6, 1e-9
 # 1 in NEARBY before a call at a state that differs from the last accepted one by an increment of a difference quotient.
 NEARBY = 7
-OUT_HEAD = 8
+# Time up to which output rows show the present state, although a jump arrives now [s]; NEVER without such a jump.
+LAST_ROW = 8
+OUT_HEAD = 9
 # RATE before a call if the rate that limits the step is not needed, which holds at all stages of a step but the first.
 # Functions that spend time on this rate leave the value; others raise it as always.
 RATE_UNWANTED = -1.0

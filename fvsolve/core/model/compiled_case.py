@@ -279,7 +279,7 @@ class CompiledCase:
     def new_out(self) -> np.ndarray:
         """New array for the values that the right-hand side writes in addition to dydt."""
         out = np.zeros(int(self.layout["size"]))
-        out[rec.ARRIVES] = rec.NEVER
+        out[rec.ARRIVES] = out[rec.LAST_ROW] = rec.NEVER
         return out
 
     def checked(self, t: Any, y: Any) -> tuple[float, np.ndarray]:

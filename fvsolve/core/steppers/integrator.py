@@ -71,7 +71,7 @@ class Integrator:
             np.zeros(rec.OUT_HEAD),
             np.zeros(0),
         )
-        self.out[rec.JUMP_TIME] = rec.NO_JUMP
+        self.out[rec.JUMP_TIME] = self.out[rec.LAST_ROW] = rec.NO_JUMP
         self.armed = self.no_floats
         self.prepare_events(0)
         self.returns = np.zeros((2, 0))

@@ -211,8 +211,8 @@ def compute_row(handle, r, t_old, due, now, old):
 
 
 @njit
-def emit(handle, r):
-    """Write the output rows due up to the present time; returns a code of `loop_records`.
+def emit(handle, r, last):
+    """Write the output rows due up to the time `last` [s]; returns a code of `loop_records`.
 
     DONE : all rows are written; FIELD : a field frame is due, its state is in y_out; ROWS_FULL : `rows` has no space
     Rows from control["stop_at"] on are not written.
@@ -228,7 +228,7 @@ def emit(handle, r):
     while True:
         row, field = row_due(r), field_due(r)
         due = min(row, field)
-        if due > t or due >= stop_at:
+        if due > last or due >= stop_at:
             return rec.DONE
         if row <= due and progress["rows"] == rows.shape[0]:
             return rec.ROWS_FULL

@@ -416,8 +416,10 @@ def finish_last_step(handle, r):
     control = r.control[0]
     out = r.out
     # Rows within the step belong to the equations before the switch.
-    if progress["has_last_step"] == 1 and next_due(r) <= state["t"]:
-        status = emit(handle, r)
+    # The times of a row and of a jump may differ by rounding: a row at the time of a jump is that before it.
+    last_row = max(state["t"], out[rec.LAST_ROW])
+    if progress["has_last_step"] == 1 and next_due(r) <= last_row:
+        status = emit(handle, r, last_row)
         if status != rec.DONE:
             return status
     # the rhs has switched: discard the step size and the Jacobian

@@ -12,7 +12,7 @@ from math import inf, nan
 from fvsolve.core.kernels import calls
 from fvsolve.core.kernels.barotropic_nodes import head_pressure
 from fvsolve.core.kernels.devices import SET
-from fvsolve.core.kernels.dtypes import ARRIVED, ARRIVES, FIXED, NEVER, STATUS
+from fvsolve.core.kernels.dtypes import ARRIVED, ARRIVES, FIXED, LAST_ROW, NEVER, STATUS
 from fvsolve.core.kernels.formula_programs import is_low
 from fvsolve.core.kernels.restrictions import valve_conductance
 from fvsolve.core.kernels.schedule_pieces import schedule_value
@@ -261,8 +261,14 @@ def next_sample(tables, control):
 @njit(forceinline=True)
 def is_due(t, tables, control):
     """True if a block acts at a sample at the time t, but for rounding."""
-    rounding = SAMPLE_ROUNDING * (abs(t) + control["period"])
-    return control["period"] > 0.0 and next_sample(tables, control) - t <= rounding
+    later = t + sample_rounding(t, control)
+    return control["period"] > 0.0 and next_sample(tables, control) <= later
+
+
+@njit(forceinline=True)
+def sample_rounding(t, control):
+    """Greatest difference of the times of a sample and of a state or row by rounding [s]."""
+    return SAMPLE_ROUNDING * (abs(t) + control["period"])
 
 
 @njit
@@ -324,8 +330,12 @@ def record_controls(t, y, out, handle, values):
     record_inputs(t, out, tables)
     arrives = out[ARRIVES] if tables.settings[0]["arrivals"] == 1 else NEVER
     ends = t >= tables.clock[0]["limit"]
+    out[LAST_ROW] = NEVER
     for k in range(tables.controls.size):
         control = tables.controls[k]
+        # Output rows at the time of a sample are those before it.
+        if is_due(t, tables, control):
+            out[LAST_ROW] = max(out[LAST_ROW], t + sample_rounding(t, control))
         if control["period"] > 0.0 and not (ends and is_due(t, tables, control)):
             time = t if is_due(t, tables, control) else next_sample(tables, control)
             arrives = time if arrives == NEVER else min(arrives, time)
