@@ -59,6 +59,11 @@ def recording(cache):
             CALLED.update(calls.get(arguments, ()))
             return result
 
+        def cache_clear():
+            calls.clear()
+            cached.cache_clear()
+
+        called.cache_clear = cache_clear
         return called if function.__module__.startswith("fvsolve.") else cache(function)
 
     return decorator

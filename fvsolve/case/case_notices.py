@@ -48,6 +48,7 @@ def range_notices(case: Any) -> list[Notice]:
         for group in ("nodes", "links", "scalars")
         for name, part in getattr(case, group).items()
     }
+    parts |= {("controls", name): block.control for name, block in case.controls.items()}
     result = [
         _notice((), (key,), case, *odd)
         for key, value in TOP.items()
@@ -204,16 +205,27 @@ def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, te
 
 
 def end_notices(case: Any) -> list[Notice]:
-    """Notices of each schedule that still changes after the end of the run, and of each trip after it."""
+    """Notices of each schedule that still changes after the end of the run, of each trip, and of samples after it."""
     end, result = case.numerics.end, []
-    for group in ("nodes", "links"):
-        for name, part in getattr(case, group).items():
+    controls = {name: block.control for name, block in case.controls.items()}
+    for group, parts in (("nodes", case.nodes), ("links", case.links), ("controls", controls)):
+        for name, part in parts.items():
             for key, time in starts_after_end(part, end):
                 place = f"{group}.{name}"
                 late, last = (case.amount(t, "time", 6) for t in (time, end))
                 verb = "occurs at" if key == "trip" else "continues to"
                 text = f"{place}.{key}: {verb} {late}, after the end of the run at {last}"
                 result.append(Notice("end", place, text, key, time, end))
+    span = end - case.numerics.start
+    for name, control in controls.items():
+        if control.period is not None and control.offset + control.period > span:
+            place, (period, whole) = (
+                f"controls.{name}",
+                (case.amount(t, "time", 6) for t in (control.period, span)),
+            )
+            samples = "no sample" if control.offset > span else "one sample"
+            text = f"{place}.period: {period} gives {samples} in a run of {whole}"
+            result.append(Notice("end", place, text, "period", control.period, span))
     return result
 
 

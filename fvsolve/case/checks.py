@@ -95,6 +95,8 @@ def part_faults(
     for group, members in groups.items():
         for name, part in members.items():
             for keys, text in part.faults(name, around):
+                # a single key, as a part of another package may give it
+                keys = (keys,) if isinstance(keys, str) else keys
                 yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text
 
 

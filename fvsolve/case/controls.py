@@ -236,6 +236,8 @@ class Blocks:
                 (),
                 f"passes on {first}, but drives {other}; expected keys of the unit of its input",
             )
+        if self.kind(name).same_unit:
+            yield from self.unlike_inputs(name)
         stated, initial = self.valid_key(name, "limits"), self.valid_key(name, "initial")
         low, high = self.driven_range(name)
         least_open = any(r.open and r.least == low for _, r in self.setting.driven.get(name, ()))
@@ -273,6 +275,19 @@ class Blocks:
         elif initial is not None and not limits[0] <= initial <= limits[1]:
             text = f"{show(self.given[name]['initial'])} is outside the limits {show(list(limits))}"
             yield ("initial",), f"{text}; expected a value within them"
+
+    def unlike_inputs(self, name: str) -> Iterator[tuple[tuple, str]]:
+        """Yield a fault (keys in the block, text) for each input that has another unit than the first one."""
+        known = {
+            keys: item.dimension if isinstance(item, Probe) else self.outputs.get(item, UNKNOWN)
+            for keys, item in self.inputs[name].items()
+            if item is not None
+        }
+        known = {keys: dimension for keys, dimension in known.items() if dimension != UNKNOWN}
+        for keys, dimension in known.items():
+            if pair := unlike([next(iter(known.values())), dimension]):
+                first, other = (DIMENSIONS[item].words for item in pair)
+                yield keys, f"is {other}, but the first input is {first}; expected one unit"
 
 
 def unlike(dimensions: list[str]) -> tuple[str, str] | None:

@@ -1,5 +1,6 @@
 """Messages about errors in modules of other packages: package, file, line, fault and remedy."""
 
+import inspect
 import os
 import re
 import sys
@@ -11,6 +12,7 @@ from fvsolve.errors import did_you_mean
 # Error messages of numba: place of a fault, of records without a column, and lines that only repeat.
 PLACE = re.compile(r'(?:\bat|File) "?([^"\s]+\.py)"?(?:, line | \()(\d+)')
 NO_COLUMN = re.compile(r"Field '(\w+)' was not found in record with fields \(([^)]*)\)")
+UNDEFINED = re.compile(r"name '(\w+)' is not defined")
 NO_FIELD = re.compile(r"no field of name (\w+)")  # of numpy
 PLAIN = re.compile(r"\x1b\[[0-9;]*m")
 REPEATED = re.compile(r"(Failed in|During|File|Rejected|-+$|- )")
@@ -19,7 +21,7 @@ REPEATED = re.compile(r"(Failed in|During|File|Rejected|-+$|- )")
 def outside_fault(error: BaseException) -> str:
     """Text about an error in a module of another package; "" if only code of fvsolve and of libraries failed."""
     if type(error).__module__.partition(".")[0] == "numba":
-        found = _compiled_place(str(error))
+        found = _compiled_place(str(error)) or _function_place(error.__traceback__, str(error))
     else:
         found = _traceback_place(error.__traceback__)
     if found is None:
@@ -50,6 +52,29 @@ def _compiled_place(text: str) -> tuple[str, str, int, FrameType | None] | None:
             if own and os.path.abspath(own) == path and (source := source_of(name)):
                 return source, path, int(line), None
     return None
+
+
+def _function_place(
+    trace: TracebackType | None, text: str
+) -> tuple[str, str, int, FrameType | None] | None:
+    """Source, file and line of the function of another package that was compiled last; None for other functions.
+
+    Of an undefined name numba tells no place: the line is the first one of the function with this name.
+    """
+    found = None
+    while trace is not None:
+        own = getattr(trace.tb_frame.f_locals.get("self"), "py_func", None)
+        if source := source_of(getattr(own, "__module__", "")):
+            found = source, own
+        trace = trace.tb_next
+    if found is None:
+        return None
+    source, own = found
+    lines, first = inspect.getsourcelines(own)
+    name = UNDEFINED.search(text)
+    pattern = re.compile(rf"\b{name[1]}\b") if name else None
+    line = next((k for k, row in enumerate(lines) if pattern and pattern.search(row)), 0)
+    return source, own.__code__.co_filename, first + line, None
 
 
 def fault_text(error: BaseException, frame: FrameType | None) -> str:

@@ -181,6 +181,10 @@ class Control(Table):
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
+        if not cls.__module__.startswith("fvsolve."):
+            from fvsolve.core.assembly.lowering_checks import check_methods
+
+            check_methods(cls)
         if kind:
             cls.kind = kind
             cls.kinds.declare(kind, cls, "a control of type")

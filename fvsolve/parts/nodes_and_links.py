@@ -33,9 +33,10 @@ class Part(Table):
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if not cls.__module__.startswith("fvsolve."):
-            from fvsolve.core.assembly.lowering_checks import check_dimensions
+            from fvsolve.core.assembly.lowering_checks import check_dimensions, check_methods
 
             check_dimensions(cls)
+            check_methods(cls)
         if kind:
             cls.kind = kind
             cls.kinds.declare(kind, cls, f"a {cls.noun} of type")

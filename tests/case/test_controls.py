@@ -365,6 +365,24 @@ def test_a_line_of_a_block_has_its_filter_and_samples():
     assert "pi of tower.level, filter 3 s, samples every 2 s from 1 s on, setpoint" in text
 
 
+def test_a_line_of_a_block_has_its_inputs_in_the_order_of_its_keys():
+    function = {"type": "function", "formula": "b + a", "inputs": {"b": "tower.level", "a": "outlet.flow"}}  # fmt: skip
+    model = fvsolve.build(fvsolve.load("tank-level-pi", {"controls.sum": function}))
+    assert any("function of tower.level, outlet.flow" in text for text in model.checks["texts"])
+
+
+def test_a_block_that_samples_once_in_a_run_and_a_setpoint_that_continues_get_notes():
+    late = {"time": ["0 s", "9 h"], "value": ["4.5 m", "5 m"]}
+    changes = {"controls.level.period": "8 h", "controls.level.setpoint": late}
+    notes = [str(note) for note in fvsolve.build(fvsolve.load("tank-level-pi", changes)).warnings]
+    assert any(
+        "controls.level.period: 28800 s gives one sample in a run of" in note for note in notes
+    )
+    assert any(
+        "controls.level.setpoint: continues to 32400 s, after the end" in note for note in notes
+    )
+
+
 def test_without_controls_the_message_names_their_absence():
     text = 'links.inlet.opening.control: no control named "level"; [controls] has none'
     assert only_fault({"controls": GONE}) == text

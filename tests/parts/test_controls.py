@@ -343,7 +343,7 @@ RELIEF = {
 
 
 @pytest.mark.parametrize("relief", RELIEF)
-def test_a_block_before_one_at_its_limit_starts_with_its_input(relief):
+def test_a_block_before_a_limited_block_starts_with_the_input(relief):
     """Valves in series and a relief valve, whose opening in [0, 1] follows a copy of a pressure by a formula.
 
     The pressure is the root of the balance of flows. The step beyond the limit had moved the copy too, for the whole

@@ -67,6 +67,11 @@ def test_the_commands_of_the_page_print_its_text(commands, output, home):
     assert lines_not_printed(home, commands, output) == []
 
 
+def test_the_test_of_the_page_passes(home):
+    done = python(home, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_watch.py")
+    assert "1 passed" in done.stdout
+
+
 @pytest.fixture(scope="module")
 def rows(home) -> dict[str, np.ndarray]:
     """Times, level, greatest level and mean flow of the case : method -> float64[4, rows]."""

@@ -5,11 +5,13 @@ package. Hypothesis draws equal inputs whatever modules are loaded, and tries fa
 """
 
 import ast
+import functools
 import importlib.util
 import sys
 from collections import Counter
 from pathlib import Path
 
+import choose_quick_tests
 import drawn_faults
 import hypothesis_profiles
 import planted_faults
@@ -55,6 +57,20 @@ def test_a_listed_test_that_is_not_there_is_named():
         | {"unknown": ["tests/a.py::test_gone"]}
     )
     assert tally.missing() == ["tests/durations.json: tests/a.py::test_gone is not a test"]
+
+
+def test_a_recorded_cache_counts_its_results_as_calls_and_can_be_cleared():
+    def doubled(x):
+        choose_quick_tests.CALLED.add("a compiled function")
+        return [2 * x]
+
+    doubled.__module__ = "fvsolve.somewhere"
+    cached = choose_quick_tests.recording(functools.cache)(doubled)
+    first = cached(2)
+    choose_quick_tests.CALLED.clear()
+    assert cached(2) is first and choose_quick_tests.CALLED == {"a compiled function"}
+    cached.cache_clear()
+    assert cached(2) == first and cached(2) is not first
 
 
 @pytest.mark.in_turn

@@ -1,9 +1,12 @@
 """Checks of parts of other packages, of their conversions and laws: some faults would give wrong numbers."""
 
+import ast
+import difflib
 import inspect
 import math
 import sys
-from collections.abc import Iterator
+import textwrap
+from collections.abc import Iterator, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -17,6 +20,8 @@ from fvsolve.units import DIMENSIONS
 
 # module of the methods that a conversion inherits if it has none of its own
 INHERITED = "fvsolve.core.assembly.lowering"
+# least likeness of a name to that of a method of fvsolve for which it counts as misspelt: a missing letter, not a word
+NEAR = 0.85
 
 
 def checked(part: type, lowering: Any) -> Any:
@@ -27,7 +32,7 @@ def checked(part: type, lowering: Any) -> Any:
     own = own_quantities(part)
     if lowering.is_device and not lowering.quantities and hasattr(lowering.law, "value"):
         lowering = lowering.varied(quantities=own)
-    faults = [*_faults_of_kind(part, lowering)]
+    faults = [*faults_of_kind(part, lowering), *faults_of_methods(type(lowering))]
     if not faults:
         inherits = type(lowering).of.__module__ == INHERITED
         if lowering.is_device and lowering.law is None and inherits:
@@ -35,8 +40,60 @@ def checked(part: type, lowering: Any) -> Any:
         faults += _faults_of_quantities(part, lowering, own)
         faults += faults_of_law(lowering.law)
     if faults:
-        raise FvsolveError(f"{_source(part)}: {'; '.join(faults)}")
+        raise FvsolveError(f"{source_of_part(part)}: {'; '.join(faults)}")
     return lowering
+
+
+def check_methods(part: type) -> None:
+    """Raise FvsolveError for a method of a class of parts or blocks with other arguments than fvsolve gives it."""
+    if faults := [*faults_of_methods(part)]:
+        raise FvsolveError(f"{source_of_part(part)}: {'; '.join(faults)}")
+
+
+def faults_of_methods(own: type) -> Iterator[str]:
+    """Yield a fault for each method of a class of another package that fvsolve would not call, or not with success.
+
+    Its name is nearly that of a method of fvsolve, or it has other arguments than this method.
+    """
+    inner = [base for base in own.__mro__ if base.__module__.startswith("fvsolve.")]
+    methods = {
+        name: found
+        for base in reversed(inner)
+        for name, found in vars(base).items()
+        if not name.startswith("_") and inspect.isfunction(found)
+    }
+    attributes = {name for base in inner for name in vars(base)}
+    for cls in own.__mro__:
+        if cls in inner or source_of(cls.__module__) == "":
+            continue
+        for name, found in vars(cls).items():
+            if name.startswith("_") or not inspect.isfunction(found):
+                continue
+            near = difflib.get_close_matches(name, methods, 1, NEAR)
+            if name not in attributes and near:
+                text = f'fvsolve calls no method "{name}"; did you mean "{near[0]}"?'
+                yield f"{place_of(found)}: {text}"
+            expected = inspect.signature(methods[name]) if name in methods else None
+            if expected and not _accepts(found, expected):
+                given = f"{name}{inspect.signature(found)}"
+                yield f"{place_of(found)}: {given}; expected {name}{_bare(expected)}"
+
+
+def _accepts(method: Any, expected: inspect.Signature) -> bool:
+    """True if a method can be called with as many positional arguments as one with the signature `expected`."""
+    count = len(expected.parameters)
+    if any(item.kind is item.KEYWORD_ONLY for item in expected.parameters.values()):
+        return True
+    try:
+        inspect.signature(method).bind(*range(count))
+    except TypeError:
+        return False
+    return True
+
+
+def _bare(signature: inspect.Signature) -> str:
+    """Text of the names of the arguments of a signature."""
+    return f"({', '.join(signature.parameters)})"
 
 
 def own_quantities(part: Any) -> tuple[str, ...]:
@@ -60,7 +117,7 @@ def check_dimensions(part: Any) -> None:
             )
 
 
-def _faults_of_kind(part: Any, lowering: Any) -> Iterator[str]:
+def faults_of_kind(part: Any, lowering: Any) -> Iterator[str]:
     """Yield a fault if the module `lower` beside a part declares no conversion of its kind."""
     module = f"{part.__module__.rpartition('.')[0]}.lower"
     kinds = type(lowering).kinds
@@ -95,21 +152,22 @@ def _faults_of_quantities(part: Any, lowering: Any, own: tuple[str, ...]) -> Ite
             )
 
 
-def faults_of_law(law: ModuleType | None) -> Iterator[str]:
+def faults_of_law(law: ModuleType | None, hooks: Mapping[str, Any] = HOOKS) -> Iterator[str]:
     """Yield a fault for each unknown public function of the law of another package, and for each that is not compiled.
 
-    Under another name a function would never be called, and a state would keep its value.
+    Under another name a function would never be called, and a state would keep its value; without a result it would
+    give 0. hooks : functions of such a law -> types of their arguments, type of their result, empty for none
     """
     if law is None or law.__name__.startswith("fvsolve."):
         return
     for name, found in vars(law).items():
         own = callable(found) and getattr(found, "__module__", "") == law.__name__
-        if own and not (name.startswith("_") or name in HOOKS or isinstance(found, type)):
+        if own and not (name.startswith("_") or name in hooks or isinstance(found, type)):
             yield (
-                f'{place_of(found)}: unknown function "{name}" of a law; expected one of {", ".join(HOOKS)}, '
-                f'or a name that begins with "_"{did_you_mean(name, HOOKS)}'
+                f'{place_of(found)}: unknown function "{name}" of a law; expected one of {", ".join(hooks)}, '
+                f'or a name that begins with "_"{did_you_mean(name, hooks)}'
             )
-    for name in HOOKS:
+    for name in hooks:
         found = getattr(law, name, None)
         if callable(found) and COMPILING and not hasattr(found, "address"):
             decorator = "numba.njit" if hasattr(found, "py_func") else "no decorator"
@@ -117,6 +175,22 @@ def faults_of_law(law: ModuleType | None) -> Iterator[str]:
                 f'{place_of(found)}: the function "{name}" has {decorator}; '
                 "expected the decorator `njit` of `fvsolve.jit`"
             )
+        elif callable(found) and hooks[name][1] and not _has_result(found):
+            yield f'{place_of(found)}: the function "{name}" returns nothing; expected its result'
+
+
+def _has_result(found: Any) -> bool:
+    """True if a function has a statement that returns something, or if its source is unknown."""
+    found = inspect.unwrap(getattr(found, "py_func", found))
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(found)))
+    except (OSError, TypeError, SyntaxError):
+        return True
+    returned = [node.value for node in ast.walk(tree) if isinstance(node, ast.Return)]
+    return any(
+        value is not None and not (isinstance(value, ast.Constant) and value.value is None)
+        for value in returned
+    )
 
 
 def check_states(name: str, part: Any, device: Any, states: tuple[str, ...], scales) -> None:
@@ -127,14 +201,14 @@ def check_states(name: str, part: Any, device: Any, states: tuple[str, ...], sca
         isinstance(scale, (int, float, np.number)) and 0.0 < scale < math.inf for scale in scales
     )
     if outside and (faults := [*faults_of_law(device.law)]):
-        raise FvsolveError(f"{_source(type(part))}: {'; '.join(faults)}")
+        raise FvsolveError(f"{source_of_part(type(part))}: {'; '.join(faults)}")
     if not valid or (states and outside and not moves):
         raise FvsolveError(fault_of_states(name, part, device, states, scales))
 
 
 def fault_of_states(name: str, part: Any, device: Any, states: tuple[str, ...], scales: Any) -> str:
     """Text about states of a device without a rate, or without a scale above 0 for each of them."""
-    head = f"{_source(type(part))}, in {name}: {place_of(type(device))}"
+    head = f"{source_of_part(type(part))}, in {name}: {place_of(type(device))}"
     if len(scales) != len(states):
         given = (
             f"`scales` gives {len(scales)} numbers for the states {_quoted(states) or 'of none'}"
@@ -168,7 +242,7 @@ def place_of(found: Any) -> str:
         return f"{found.__module__}.{found.__qualname__}"
 
 
-def _source(part: type) -> str:
+def source_of_part(part: type) -> str:
     return source_of(part.__module__) or f"the part {part.__module__}"
 
 

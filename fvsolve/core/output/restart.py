@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import inspect
 import json
 import math
 import sys
@@ -90,7 +91,23 @@ def versions(case) -> dict[str, str]:
         program_versions()
         | {"fluid": case.properties.source}
         | ({"limiter": own.digest} if own else {})
+        | digests_of_others(case)
     )
+
+
+def digests_of_others(case) -> dict[str, str]:
+    """Digest of the files of each part and block of another package : "part KIND" -> digest; a law may have changed."""
+    members = [*case.nodes.values(), *case.links.values()]
+    members += [block.control for block in case.controls.values()]
+    kinds = {type(part) for part in members if not type(part).__module__.startswith("fvsolve.")}
+    found = {}
+    for kind in kinds:
+        folder = Path(inspect.getfile(kind)).parent
+        digest = hashlib.sha256()
+        for path in sorted(folder.glob("*.py")):
+            digest.update(path.name.encode() + path.read_bytes())
+        found[f"part {kind.kind}"] = digest.hexdigest()[:16]
+    return found
 
 
 def program_versions() -> dict[str, str]:

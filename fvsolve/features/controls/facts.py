@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fvsolve.errors import listing
 from fvsolve.parts.schedule import BLOCK_PREFIX
 
 KEYS = ("filter", "period", "offset")  # of all blocks, in SI
+MOST_INPUTS = 8  # in a line on a block
 
 
 def block_facts(feature, model) -> dict[str, dict[str, Any]]:
@@ -41,7 +41,10 @@ def block_text(case, name: str, facts: dict[str, Any]) -> str:
     def amount(value: float, dimension: str) -> str:
         return case.amount(value, dimension).removesuffix(" -")
 
-    reads = f" of {listing(facts['inputs'], 8)}" if facts["inputs"] else ""
+    # in the order of the keys, which is that of the inputs of the law
+    inputs = facts["inputs"]
+    more = f", ... ({len(inputs)} in all)" if len(inputs) > MOST_INPUTS else ""
+    reads = f" of {', '.join(inputs[:MOST_INPUTS])}{more}" if inputs else ""
     words = [f"{facts['type']}{reads}"]
     if facts["filter"] is not None:
         words.append(f"filter {amount(facts['filter'], 'time')}")

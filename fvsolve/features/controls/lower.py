@@ -62,6 +62,10 @@ def lower_controls(draft, own) -> None:
 def fill_block(draft, own, name: str, block: Block, sensors: list[str], row) -> None:
     """Fill the row of a block, except what depends on the start; sensors : texts of the probes of all sensors."""
     control, rows = block.control, control_rows_of(type(block.control))
+    if not type(control).__module__.startswith("fvsolve."):
+        from fvsolve.features.controls.row_checks import check_block
+
+        check_block(name, control, rows)
     filters = len(block.inputs) if control.filter is not None else 0
     small = [small_change(dimension) for dimension in block.dimensions]
     if all(map(math.isfinite, block.limits)):

@@ -134,6 +134,15 @@ class StaticRows(ControlRows):
 
 @functools.cache
 def control_rows_of(control: type) -> ControlRows:
-    """Conversion of a type of block, from the module `lower` in the package of its declaration."""
-    import_module(f"{control.__module__.rpartition('.')[0]}.lower")
-    return ControlRows.kinds[control.kind]
+    """Conversion of a type of block, from the module `lower` in the package of its declaration.
+
+    Raises FvsolveError for a faulty conversion or law of another package.
+    """
+    package = control.__module__.rpartition(".")[0]
+    import_module(f"{package}.lower")
+    if package.startswith("fvsolve."):
+        return ControlRows.kinds[control.kind]
+    from fvsolve.features.controls.row_checks import checked
+
+    own = ControlRows.kinds.get(control.kind)
+    return checked(control, own or StaticRows(), StaticRows, ControlRows)

@@ -556,9 +556,11 @@ def checked_slope(
     if np.any(kink & (greatest * widths[1] > KINK_ROUNDING * np.abs(base) + LEAST_KINK)):
         stopped = outputs_at_limits(point)
         reason = f"; at a limit: {at_limits(point, stopped)}" if stopped else ""
+        before = point.model.case.controls[name].blocks_passed
+        kinks = f", its own or those of {listing(before)}, which it reads" if before else ""
         raise FvsolveError(
             f"controls.{name} cannot be linearised at {point.when}: the slopes of its sample for a rise "
-            f"and a fall differ{reason}; {ANOTHER_POINT}"
+            f"and a fall differ{kinks}{reason}; {ANOTHER_POINT}"
         )
     coarse, fine = 0.5 * (rise + fall)
     return (4.0 * fine - coarse) / 3.0
