@@ -1,6 +1,6 @@
 """Choose the quick tests: record the cost of each test, and write the other tests to `tests/durations.json`.
 
-    python tests/choose_quick_tests.py [--seconds 415] [--recording FOLDER]
+    python tests/choose_quick_tests.py [--seconds 480] [--recording FOLDER]
 
 The cost of a test is its own processor time and its share of compilation: the time to compile a function, divided by
 the number of quick tests that call it. The most expensive tests are removed until the others take the given time. A
@@ -248,8 +248,8 @@ def main() -> None:
     parser.add_argument(
         "--seconds",
         type=float,
-        default=415.0,
-        help="processor time of the quick tests (default 415)",
+        default=480.0,
+        help="processor time of the quick tests (default 480)",
     )
     parser.add_argument(
         "--recording", type=Path, metavar="FOLDER", help="read a recording, or write one here"

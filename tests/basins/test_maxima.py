@@ -211,6 +211,29 @@ def test_a_resumed_run_has_the_same_files_of_greatest_values(tmp_path, monkeypat
     assert (tmp_path / "run" / "run_up-shore.png").is_file()
 
 
+@pytest.mark.parametrize("order", [("plain", "bowl", "other"), ("other", "plain", "bowl")])
+def test_each_of_several_basins_has_the_greatest_values_of_a_case_of_its_own(order):
+    """Two basins record them, one does not; basins without links do not depend on each other."""
+    alone = bowl(12)
+    alone["output"].pop("run_up")
+    alone["numerics"] = {"end": 1.0, "scheme": "muscl", "method": "ssp-rk2", "step": 5e-3}
+    basin = alone["nodes"]["bowl"]
+    other = basin | {"start": {"level": f"{0.5 * ETA * DEEP}*x", "u": 0.0, "v": 0.0}}
+    found = {}
+    for name, node in (("bowl", basin), ("other", other)):
+        case = alone | {"nodes": {name: node}}
+        case["output"] = alone["output"] | {"maxima": [name]}
+        found[name] = fvsolve.run(case).maxima[name]
+    nodes = {"plain": other, "bowl": basin, "other": other}
+    together = alone | {"nodes": {name: nodes[name] for name in order}}
+    together["output"] = alone["output"] | {"maxima": ["bowl", "other"]}
+    run = fvsolve.run(together)
+    assert sorted(run.maxima) == ["bowl", "other"]
+    for name, expected in found.items():
+        for quantity, values in expected.items():
+            assert np.array_equal(run.maxima[name][quantity], values, equal_nan=True), quantity
+
+
 def test_greatest_values_change_no_bit_of_a_run_and_are_in_the_last_frame(tmp_path):
     with_maxima, without = slope(), slope()
     del without["output"]["run_up"]

@@ -123,7 +123,8 @@ def test_its_pole_is_that_of_its_law(home):
     command(home, "linearise", "mill.toml", "--out", "linear")
     case = fvsolve.load({**tomllib.loads(BLOCKS["mill.toml"]), "links": {"wheel": VALVE}})
     weight = case.properties.density * case.gravity
-    (pole,) = np.linalg.eigvals(np.load(home / "linear" / "linear.npz")["A"])
+    with np.load(home / "linear" / "linear.npz") as file:
+        (pole,) = np.linalg.eigvals(file["A"])
     assert pole == pytest.approx(
         -weight / np.sqrt(RESISTANCE**2 + 4.0 * LOSS * weight * LEVEL) / AREA, rel=1e-6
     )

@@ -177,10 +177,9 @@ import json""",
     found = ranks(3, sys.executable, "-c", stopping, json.dumps({"run": case}), tmp_path)
     assert found.returncode == 0, found.stderr
     said = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert (
-        said["reason"].startswith("interrupted")
-        and 0.0 < np.load(tmp_path / "run" / "restart.npz")["t"] < 0.15
-    )
+    assert said["reason"].startswith("interrupted")
+    with np.load(tmp_path / "run" / "restart.npz") as file:
+        assert 0.0 < file["t"] < 0.15
     found = ranks(
         2,
         sys.executable,

@@ -85,6 +85,29 @@ def test_with_no_event_only_the_steady_throughput_is_booked(law):
         assert found.supplied["lake"][-1] == pytest.approx(3.0 * q * RHO * GRAVITY * head, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", ["log", "table"])
+def test_a_jet_into_a_vessel_loses_its_kinetic_energy(law):
+    """A steady pipe ends in a lake 1 m below: the head is lost by friction and by the jet, M v^2 / 2 of its flow M."""
+    friction = {"model": "quasi-steady", "roughness": 1e-3}
+    links = {"main": pipe("up", "low", 20.0, 0.1, 1000.0, 10, friction=friction)}
+    numerics = {"rtol": 1e-9, "method": "dormand-prince"}
+    case = scene({"up": lake(2.0), "low": lake(1.0)}, links, 2.0, numerics, ["main.flow@1"], 1.0)
+    case["fluid"] = (
+        {**WATER, "law": law}
+        if law != "table"
+        else {"name": "Water", "temperature": 293.15, "law": law}
+    )
+    found, run = energy(case), fvsolve.run(case)
+    flow, rho = run["main.flow@1"][-1], fvsolve.load(case).properties.density
+    jet = 2.0 * 0.5 * rho * flow**3 / area(0.1) ** 2
+    # the density under the pressure of 1 m of water exceeds that of reference by 5e-6
+    assert found.dissipated["main jet"][-1] == pytest.approx(jet, rel=2e-5)
+    supplied = sum(values[-1] for values in found.supplied.values())
+    lost = sum(values[-1] for values in found.dissipated.values())
+    assert supplied == pytest.approx(2.0 * rho * GRAVITY * flow, rel=2e-5)
+    assert lost == pytest.approx(supplied, rel=1e-9)
+
+
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_heights_count_from_the_lowest_node_and_lifting_a_scene_changes_nothing(law):
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.8}

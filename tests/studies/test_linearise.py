@@ -453,7 +453,8 @@ def test_the_command_writes_matrices_with_names_and_a_single_json_object(
         and found["inputs"] == ["hole.opening"]
         and found["poles"][0]["real"] < 0.0
     )
-    kept = np.load(tmp_path / "runs" / "chamber-and-orifice.linearise" / "linear.npz")
+    with np.load(tmp_path / "runs" / "chamber-and-orifice.linearise" / "linear.npz") as file:
+        kept = dict(file)
     assert kept["A"].tolist() == found["A"] and kept["states"].tolist() == found["states"]
     table = (tmp_path / "runs" / "chamber-and-orifice.linearise" / "B.csv").read_text().splitlines()
     assert table[0] == ",hole.opening" and float(table[1].split(",")[1]) == found["B"][0][0]
