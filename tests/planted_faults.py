@@ -201,8 +201,8 @@ FAULTS = [
     ),
     Fault(
         "features/controls/balance.py",
-        "-residual[acts] / size[acts], RANK",
-        "residual[acts] / size[acts], RANK",
+        "right = -residual - matrix",
+        "right = residual - matrix",
     ),
     Fault(
         "features/delay_lines/lower.py",
