@@ -219,10 +219,8 @@ def end_notices(case: Any) -> list[Notice]:
     span = end - case.numerics.start
     for name, control in controls.items():
         if control.period is not None and control.offset + control.period > span:
-            place, (period, whole) = (
-                f"controls.{name}",
-                (case.amount(t, "time", 6) for t in (control.period, span)),
-            )
+            place = f"controls.{name}"
+            period, whole = (case.amount(t, "time", 6) for t in (control.period, span))
             samples = "no sample" if control.offset > span else "one sample"
             text = f"{place}.period: {period} gives {samples} in a run of {whole}"
             result.append(Notice("end", place, text, "period", control.period, span))

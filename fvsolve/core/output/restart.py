@@ -2,7 +2,6 @@
 
 import functools
 import hashlib
-import inspect
 import json
 import math
 import sys
@@ -102,9 +101,12 @@ def digests_of_others(case) -> dict[str, str]:
     kinds = {type(part) for part in members if not type(part).__module__.startswith("fvsolve.")}
     found = {}
     for kind in kinds:
-        folder = Path(inspect.getfile(kind)).parent
+        file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+        # A class that is defined in a notebook has no file.
+        if file is None:
+            continue
         digest = hashlib.sha256()
-        for path in sorted(folder.glob("*.py")):
+        for path in sorted(Path(file).parent.glob("*.py")):
             digest.update(path.name.encode() + path.read_bytes())
         found[f"part {kind.kind}"] = digest.hexdigest()[:16]
     return found

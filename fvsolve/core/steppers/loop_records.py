@@ -100,16 +100,8 @@ LEAST_STEP = 4e-16  # least step, relative to the time
 # Entries of `out` that the loop reads; LONGEST_STEP limits the next step under error control [s], 0 for no limit.
 # NEARBY : 1 before a call at a state next to the last accepted one, see `newton.renew_at_start`
 # LAST_ROW : time up to which output rows show the present state, although a jump arrives now [s]
-RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP, NEARBY, LAST_ROW = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    7,
-    8,
-)
+RATE, STATUS, PLACE, CLOSING_RATE, JUMP_TIME, LONGEST_STEP = range(6)
+NEARBY, LAST_ROW = 7, 8
 OUT_HEAD = 9
 NO_JUMP = -1e300  # in JUMP_TIME and LAST_ROW: no jump will arrive
 # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
