@@ -290,6 +290,29 @@ def test_a_probe_reads_the_same_from_both_ends_of_a_line(share):
         )
 
 
+@pytest.mark.parametrize("numerics", METHODS.items(), ids=METHODS)
+def test_extremes_along_a_line_reach_as_far_as_a_pulse_has_come(numerics):
+    """A pulse of 10 ms from t = 0.1 s on has come 400 m far at 0.5 s: places beyond have not seen it."""
+    method, settings = numerics
+    demand = {"time": [0.0, 0.1, 0.11], "value": [0.0, -0.05, 0.0], "kind": "step"}
+    found = fvsolve.run(
+        scene(
+            {"a": junction(demand), "lake": lake(50.0)},
+            {"one": line("a", "lake", 1000.0, cells=20)},
+            0.5,
+            {"pipe_model": "delay-line", "method": method, **settings},
+            ["one.head@0.3", "one.head@0.8"],
+        )
+    )
+    along = found.envelope["one"]
+    passed = along["distance"] < SPEED * 0.4
+    rise = SPEED * 0.05 / (np.pi / 4 * 0.3**2) / GRAVITY
+    assert along["max_head"] == pytest.approx(np.where(passed, 50.0 + rise, 50.0), rel=1e-9)
+    times = np.where(passed, 0.1 + along["distance"] / SPEED, 0.0)
+    assert along["t_max"] == pytest.approx(times, abs=1e-9)
+    assert found.extremes["one.head@0.8"].maximum == pytest.approx(50.0, rel=1e-12)
+
+
 def test_pulses_that_cross_between_two_places_of_a_line():
     """The envelope contains the sum of two pulses that cross inside a line with two stored places."""
 

@@ -127,10 +127,9 @@ def test_the_command_prints_values_with_their_sigma(measured, fvs):
     assert code == 0 and "links.valve.area" in out and "rms of gate.pressure" in out
 
 
-def test_a_value_at_an_end_of_its_range_is_named(measured):
-    found = calibrate(
-        compared(line(LEAK, SPEED, 20, MODEL)), {"links.valve.area": [0.0009, 0.0012]}
-    )
+@pytest.mark.parametrize("ends", [[0.0009, 0.0012], [0.0003, 0.0005]], ids=["lower", "upper"])
+def test_a_value_at_an_end_of_its_range_is_named(ends, measured):
+    found = calibrate(compared(line(LEAK, SPEED, 20, MODEL)), {"links.valve.area": ends})
     assert found.doubts == ["links.valve.area lies at an end of its range; try a wider range"]
 
 
