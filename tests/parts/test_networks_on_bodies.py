@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 import pytest
 from reference.refusals import messages_of
-from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, pipe, scene
 from reference.u_tubes import BORE, DEPTH, HALF, LEVEL, LOSS, ROLL, TANK, hull, u_tube
 from scipy.integrate import simpson, solve_ivp
 
@@ -475,10 +475,16 @@ def test_the_energy_of_a_u_tube_that_rolls_is_the_work_of_its_drive_less_frictio
     assert found.supplied["hull"][-1] == pytest.approx(work, rel=1e-6)
 
 
+@pytest.mark.parametrize("other", [False, True], ids=["alone", "with a riser"])
 @pytest.mark.parametrize("law", ["linear", "log"])
-def test_the_energy_of_a_pipe_between_tanks_that_roll_closes_but_for_its_cells(law):
+def test_the_energy_of_a_pipe_between_tanks_that_roll_closes_but_for_its_cells(law, other):
+    """The riser, a pipe with a dead end, is listed first and is steep."""
     found, case = [], u_tube(minor_loss=0.0)
     case["links"]["duct"] |= {"type": "pipe", "wave_speed": 300.0}
+    if other:
+        case["nodes"]["tip"] = {"type": "junction", "on": "hull", "at": [0, -6.0, 3.0]}
+        riser = pipe("starboard", "tip", np.hypot(6.0 - HALF, 3.0 + DEPTH), 0.2, 300.0, 10)
+        case["links"] = {"riser": riser, **case["links"]}
     case["fluid"] = {**WATER, "law": law}
     for cells in (10, 20):
         case["links"]["duct"]["cells"] = cells

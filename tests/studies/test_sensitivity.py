@@ -83,6 +83,19 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     assert found.mu_star == approx([rise * 0.0015 * 400.0, rise * 1100.0 * 0.001], rel=0.1)
 
 
+def test_its_line_names_the_key_with_the_greatest_total_index():
+    for strongest in range(3):
+        totals = [0.1, 0.2, 0.3]
+        totals[strongest] = 0.9
+        found = Sensitivity(
+            ("a.x", "b.y", "c.z"), "max(gate.pressure) [Pa]", 8, *[[0.0] * 3] * 2, totals, *[[0.0] * 3] * 5
+        )  # fmt: skip
+        name = ("a.x", "b.y", "c.z")[strongest]
+        assert found.summary_line() == (
+            f"of max(gate.pressure) [Pa] to 3 keys, 8 runs: greatest for {name}"
+        )
+
+
 def test_no_label_of_its_picture_covers_another_or_leaves_it():
     """Long keys with equal ends, and numbers of six digits."""
     from fvsolve.report.draw.object_pictures import sensitivity_figure
