@@ -345,6 +345,34 @@ def test_a_tank_that_joins_a_patch_on_a_side_that_stretches_follows_the_depth_an
 # equivalent cases ----------
 
 
+TURNS = {"east": "south", "north": "east", "west": "north", "south": "west"}  # wall -> gate
+
+
+def test_a_rotated_flume_fills_a_tank_through_its_gate_alike():
+    """The gate lies on a side that stretches, along x and along y."""
+    found = []
+    for side, gate in TURNS.items():
+        sign = 1.0 if side in ("west", "south") else -1.0
+        patches = {
+            "lid": {
+                "side": side,
+                "travel": {"start": 0.0, "duration": 4.0, "value": [0.0, 0.8 * sign]},
+            },
+            "gate": {"side": gate},
+        }
+        nodes = {
+            "b": flume(patches, 20, 4, side=side),
+            "t": {"type": "tank", "area": 0.5, "level": 0.5},
+        }
+        links = {"v": {"type": "valve", "from": "b.gate", "to": "t", "area": 0.05}}
+        numerics = {"scheme": "muscl", "method": "ssp-rk2", "step": 0.01}
+        case = scene(nodes, links, 5.0, numerics, ["t.level", "b.gate.pressure"], every=0.5)
+        result = run(case)
+        found.append(np.column_stack([result["t.level"], result["b.gate.pressure"] / 1e4]))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-11)
+
+
 @pytest.mark.parametrize("scheme", ["upwind", "muscl", "upwind5", "weno5"])
 def test_a_rotated_or_mirrored_flume_has_the_same_results_to_the_bit(scheme):
     found = []
