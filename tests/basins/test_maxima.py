@@ -213,21 +213,26 @@ def test_a_resumed_run_has_the_same_files_of_greatest_values(tmp_path, monkeypat
 
 @pytest.mark.parametrize("order", [("plain", "bowl", "other"), ("other", "plain", "bowl")])
 def test_each_of_several_basins_has_the_greatest_values_of_a_case_of_its_own(order):
-    """Two basins record them, one does not; basins without links do not depend on each other."""
+    """Two basins record them, one does not; basins without links do not depend on each other, nor do probes."""
     alone = bowl(12)
     alone["output"].pop("run_up")
     alone["numerics"] = {"end": 1.0, "scheme": "muscl", "method": "ssp-rk2", "step": 5e-3}
     basin = alone["nodes"]["bowl"]
     other = basin | {"start": {"level": f"{0.5 * ETA * DEEP}*x", "u": 0.0, "v": 0.0}}
-    found = {}
+    other["cells"] = [14, 10]
+    found, points = {}, {}
     for name, node in (("bowl", basin), ("other", other)):
         case = alone | {"nodes": {name: node}}
-        case["output"] = alone["output"] | {"maxima": [name]}
-        found[name] = fvsolve.run(case).maxima[name]
+        probe = f"{name}.depth@1.9,2.3"
+        case["output"] = alone["output"] | {"maxima": [name], "probes": [probe]}
+        result = fvsolve.run(case)
+        found[name], points[probe] = result.maxima[name], result[probe]
     nodes = {"plain": other, "bowl": basin, "other": other}
     together = alone | {"nodes": {name: nodes[name] for name in order}}
-    together["output"] = alone["output"] | {"maxima": ["bowl", "other"]}
+    together["output"] = alone["output"] | {"maxima": ["bowl", "other"], "probes": [*points]}
     run = fvsolve.run(together)
+    for probe, values in points.items():
+        assert np.array_equal(run[probe], values)
     assert sorted(run.maxima) == ["bowl", "other"]
     for name, expected in found.items():
         for quantity, values in expected.items():

@@ -496,6 +496,14 @@ def test_rows_at_an_additive_floor_are_marked_and_do_not_bend_the_order(p, floor
         assert all(found.marks[i] != "" for i in np.flatnonzero(hidden))
 
 
+def test_rows_at_the_floor_before_failed_rows_are_at_the_floor():
+    """Failed rows decide nothing: what is at the floor up to the last finite row stays there."""
+    e = 5.0 * H**2
+    e[4], e[5:] = e[4] / 50.0, np.nan
+    found = fit(H, e, floor=e[4])
+    assert found.marks == ("", "", "", "", "floor", "failed", "failed")
+
+
 @pytest.mark.parametrize("p", [1, 2, 4])
 def test_a_stated_floor_takes_rows_out(p):
     e = 5.0 * H**p
