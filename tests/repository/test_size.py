@@ -85,7 +85,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/solve": (3750, 14),
     "tests/step_limits": (1314, 4),
     "tests/steppers": (3387, 17),
-    "tests/studies": (11273, 27),
+    "tests/studies": (11283, 27),
     "tests/units": (453, 1),
     "tests/validation": (376, 1),
 }

@@ -275,6 +275,16 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
     assert found.stored["pond"][-1] == pytest.approx(RHO * GRAVITY * moment, rel=1e-9)
 
 
+def test_a_tank_that_widens_above_a_level_stores_the_moment_of_its_areas():
+    """A prism of 1 m2 up to 1 m, then a cone with the area 1 + 2 s at s above: 2 m3 fill it from 0.5 m on."""
+    shape = {"level": [0.0, 1.0, 2.0], "area": [1.0, 1.0, 3.0]}
+    nodes = {"spring": {"type": "inflow", "flow": 0.05}, "pond": tank(shape, 0.5)}
+    found = energy(scene(nodes, {"sluice": valve("spring", "pond", 0.05)}, 40.0, TIGHT))
+    s = 0.5 * (math.sqrt(7.0) - 1.0)  # 0.5 + s + s^2 = 2
+    moment = 0.5 * (1.0 - 0.5**2) + s + 1.5 * s**2 + 2.0 / 3.0 * s**3
+    assert found.stored["pond"][-1] == pytest.approx(RHO * GRAVITY * moment, rel=1e-9)
+
+
 def test_a_leak_planted_in_the_ledger_is_detected(monkeypatch):
     """The energy of a valve that is missing in the accounts is the remainder."""
     from fvsolve.core.model import energy_accounts
