@@ -64,7 +64,12 @@ def is_column_junction(tables, out, i):
 def is_shut(tables, out, i):
     """True if node i joins rigid columns, and otherwise only closed valves."""
     node = tables.nodes[i]
-    return node["gates"] >= 0 and node["columns"] > 0 and gate_area(tables, out, i)[0] == 0.0
+    if node["gates"] < 0 or node["columns"] == 0:
+        return False
+    for e in range(node["gate_count"]):
+        if conductance(tables, out, tables.integers[node["gates"] + e]) > 0.0:
+            return False
+    return True
 
 
 @njit(forceinline=True)

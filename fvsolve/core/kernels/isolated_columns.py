@@ -125,8 +125,10 @@ def settle_isolated_columns(tables, out, barotropic):
     levels = tables.scratch[: nodes.size]
     isolated = 0
     for i in range(nodes.size):
+        if nodes[i]["gates"] < 0:
+            continue
         # The code of an earlier evaluation holds no longer.
-        if nodes[i]["gates"] >= 0 and out[layout["isolated"] + i] == UNDETERMINED:
+        if out[layout["isolated"] + i] == UNDETERMINED:
             out[layout["isolated"] + i] = JOINED
         if junctions.is_shut(tables, out, i) and find_group(
             tables, out, i, 0.0, levels, barotropic

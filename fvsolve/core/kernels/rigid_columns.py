@@ -96,7 +96,8 @@ def find_control_end(tables, out, k):
     # A closed end is taken first: valves at the other end cannot make a flow.
     for side in (1, -1):
         near = column["to_node"] if side > 0 else column["from_node"]
-        if junctions.is_shut(tables, out, near) and is_controlled(tables, out, near):
+        # With two columns and closed valves the node is a column junction, see `is_controlled`.
+        if tables.nodes[near]["columns"] == 1 and junctions.is_shut(tables, out, near):
             return side
     for side in (1, -1):
         near, far = column["to_node"], column["from_node"]
