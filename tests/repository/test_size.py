@@ -52,7 +52,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "fvsolve/studies": (20731, 67),
     "fvsolve/core/assembly": (2929, 11),
     "fvsolve/core/fluid": (1338, 6),
-    "fvsolve/core/kernels": (11587, 49),
+    "fvsolve/core/kernels": (11595, 49),
     "fvsolve/core/mesh": (1774, 6),
     "fvsolve/core/model": (4803, 19),
     "fvsolve/core/output": (3308, 15),
