@@ -342,8 +342,9 @@ RELIEF = {
 }
 
 
+@pytest.mark.parametrize("reversed_order", [False, True])
 @pytest.mark.parametrize("relief", RELIEF)
-def test_a_block_before_a_limited_block_starts_with_the_input(relief):
+def test_a_block_before_a_limited_block_starts_with_the_input(relief, reversed_order):
     """Valves in series and a relief valve, whose opening in [0, 1] follows a copy of a pressure by a formula.
 
     The pressure is the root of the balance of flows. The step beyond the limit had moved the copy too, for the whole
@@ -368,6 +369,8 @@ def test_a_block_before_a_limited_block_starts_with_the_input(relief):
             "period": 0.1,
         },
     }
+    if reversed_order:
+        case["controls"] = dict(reversed(case["controls"].items()))
     result = fvsolve.run(case, changes)
     opened = changes.get("links.relief.area", 5e-4)
 
