@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference import sampled_control
 from reference.delay_blocks import TAU, blocks, delayed_loop
 from reference.folders import CASES
 from reference.level_control import pi as pi_control
@@ -836,3 +837,17 @@ def test_the_response_command_names_input_and_output(fvs, tmp_path):
         found["real"][0] == pytest.approx(1.0, abs=1e-4) and len(list(tmp_path.glob("*.png"))) == 1
     )
     assert fvs("response", "tank-level-pi", "--input", "inlet.opening")[0] == 2
+
+
+def test_a_kink_before_a_sampled_block_is_named_with_the_block_before_it():
+    """The sample reads the magnitude of the output of the plant, which has a kink at rest."""
+    case = sampled_control.two_lags(2.0, 3.0)
+    case["controls"]["bend"] = {
+        "type": "function",
+        "inputs": {"x": "controls.plant"},
+        "formula": "abs(x)",
+    }
+    case["controls"]["loop"]["input"] = "controls.bend"
+    text = "controls.loop cannot be linearised at the start: the slopes of its sample .* or those of bend"
+    with pytest.raises(FvsolveError, match=text):
+        loop(case, "loop")
