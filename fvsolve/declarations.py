@@ -79,6 +79,7 @@ def member(module: ModuleType, attribute: str) -> Any:
 
 # group of entry points -> noun; complete, although the indices are made when their modules are imported
 GROUPS = {
+    "fvsolve.case_tables": "case table",
     "fvsolve.commands": "command",
     "fvsolve.exact_solutions": "exact solution",
     "fvsolve.features": "feature",

@@ -89,6 +89,8 @@ class Case(Displayable):
     # bodies and masses in equilibrium
     equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)
     validation: Any = None  # `Validation`, or None
+    # tables of other folders by name, see `declared_tables`
+    declared: dict[str, Any] = field(default_factory=dict)
 
     picture = "fvsolve.report.draw.object_pictures:case_figure"
 
@@ -462,17 +464,24 @@ class Case(Displayable):
             "energy": self.energy.table() if self.energy is not None else {},
             "exact": self.exact.table() if self.exact else {},
             "validation": self.raw.get("validation", {}),
+            **{name: item.table() for name, item in self.declared.items()},
         }
         return {key: value for key, value in result.items() if value not in ("", {})}
 
     @cached_property
     def identity_text(self) -> str:
         """JSON of `table` without the end time, `STEP_KEYS`, and the keys that change the report of a run only."""
-        table = {key: value for key, value in self.table().items() if key not in REPORT_KEYS}
+        table = {key: value for key, value in self.table().items() if key not in self.report_keys}
         table["numerics"] = {
             key: x for key, x in table["numerics"].items() if key not in ("end", *STEP_KEYS)
         }
         return json.dumps(table, sort_keys=True, default=str)
+
+    @property
+    def report_keys(self) -> set[str]:
+        """Names of the tables and texts of the case that change no number of a run, only its report."""
+        declared = {name for name, item in self.declared.items() if not item.changes_results}
+        return {*REPORT_KEYS, *declared}
 
     @cached_property
     def step_keys(self) -> dict[str, Any]:

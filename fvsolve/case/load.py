@@ -20,6 +20,7 @@ from fvsolve.case import (
 )
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.conduits import water_of_conduits
+from fvsolve.case.declared_tables import DECLARED, read_declared_tables
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
@@ -209,6 +210,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         waters, lines = water_of_conduits(parts.nodes, links, reading.setting.ambient, weight)
     energy = read_energy(reading, parts)
     named = reading.table("exact", ExactSpec) if "exact" in reading.raw.table else None
+    declared = read_declared_tables(reading, KEYS)
     reading.stop()
     setting, raw = reading.setting, reading.raw
     case = Case(
@@ -239,6 +241,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         copies=dict(setting.files),
         read=reading.read,
         validation=validation,
+        declared=declared,
     )
     return case if named is None else with_exact(reading, case)
 
@@ -277,9 +280,11 @@ def read_general(reading: Reading) -> dict[str, Any]:
         )
         reading.stop()
     for key in table:
-        if key not in KEYS:
+        if key not in KEYS and key not in DECLARED:
+            known = (*KEYS, *DECLARED)
             reading.fault(
-                (key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}"
+                (key,),
+                f"unknown key{did_you_mean(key, known) or '; keys are ' + ', '.join(known)}",
             )
     given = table.get("ambient_pressure", 101325.0)
     with reading.catch("ambient_pressure"):

@@ -7,6 +7,7 @@ from typing import Any
 
 from fvsolve.case import validation_table
 from fvsolve.case.claims import limit_keys
+from fvsolve.case.declared_tables import DECLARED
 from fvsolve.case.load import KEYS, TOP
 from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
@@ -69,6 +70,8 @@ def full_schema() -> dict[str, Any]:
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
     properties["validation"] = validation_table.schema()
+    for name in DECLARED:
+        properties[name] = _with_shared_definitions(DECLARED.load(name), definitions)
     properties["expect"] = properties["compare"] = {
         "type": "object",
         "additionalProperties": {"type": "object"},

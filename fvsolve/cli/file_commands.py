@@ -60,7 +60,7 @@ def plot(
         Option(
             metavar="NAME",
             help="route whose long section is drawn (default all routes, or "
-            "none with --probes or --phase)",
+            "none with --probes, --phase or --map)",
         ),
     ] = "",
     phase: Annotated[
@@ -71,14 +71,22 @@ def plot(
             "repeat the option for more (default none)",
         ),
     ] = [],  # noqa: B006
+    map: Annotated[
+        bool,
+        Option(
+            "--map",
+            help="maps of all basins: greatest depth, speed and depth times speed, time of arrival, "
+            "duration of flooding",
+        ),
+    ] = False,
     out: Annotated[
         Path | None, Option(metavar="DIR", help="folder of the pictures (default RUN)")
     ] = None,
 ) -> None:
-    """Draw long sections (heads, limits, devices), histories of probes and phase planes, without a browser."""
+    """Draw long sections (heads, limits, devices), histories of probes, phase planes and maps, without a browser."""
     from fvsolve.report.report_files import write_pictures
 
-    for path in write_pictures(directory, probes, route, phase, out):
+    for path in write_pictures(directory, probes, route, phase, out, map):
         print(path)
 
 

@@ -7,7 +7,7 @@ from fvsolve.errors import FvsolveError
 
 
 def import_library(name: str) -> Any:
-    """Import a module of the extra `report`: Jinja2, Plotly, XlsxWriter or rainflow.
+    """Import a module of the extra `report`: Jinja2, Plotly, markdown-it-py, XlsxWriter or rainflow.
 
     Raises FvsolveError with the command to install it if it is missing.
     """
@@ -15,5 +15,5 @@ def import_library(name: str) -> Any:
         return import_module(name)
     except ImportError:
         raise FvsolveError(
-            f'a report needs {name.partition(".")[0]}: pip install "fvsolve[report]"'
+            f'a report needs {name.partition(".")[0].replace("_it", "-it-py")}: pip install "fvsolve[report]"'
         ) from None

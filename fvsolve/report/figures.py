@@ -16,6 +16,7 @@ from fvsolve.report.draw.plot import MAX_NAME_LENGTH, probe_quantity, short_name
 from fvsolve.report.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
 from fvsolve.report.long_section import HeadAnimation, Section, head_window
+from fvsolve.report.tables import decimal_sign
 
 SHOWN_LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
 MAX_PROBES = 48  # greatest number of probes of a report; history.csv has all
@@ -222,7 +223,7 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
                 "marker": {"size": 4, "color": colour},
             }
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
-    layout = _layout(
+    layout = chart_layout(
         f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", HISTORY_HEIGHT
     )
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
@@ -259,7 +260,7 @@ def _line(
     }
 
 
-def _layout(y: str, x: str, height: int) -> dict[str, Any]:
+def chart_layout(y: str, x: str, height: int) -> dict[str, Any]:
     axis = {
         "showline": True,
         "linecolor": MUTED,
@@ -281,7 +282,7 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
         "plot_bgcolor": BACKGROUND,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "font": {"family": FONT, "size": 12, "color": INK},
-        "separators": ".\u202f",
+        "separators": f"{decimal_sign()}\u202f",
         "hovermode": "x unified",
         "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}} | background,
         "dragmode": "zoom",
@@ -325,7 +326,7 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
     unit, along : units of head and chainage
     """
     first, seen = sections[0], head_window(sections, unit)
-    layout = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT)
+    layout = chart_layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT)
     names = _place_names(first)
     letters = max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
     layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters

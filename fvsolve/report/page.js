@@ -4,6 +4,8 @@
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   const ids = Object.keys(figures), histories = ids.filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
+  const { decimal } = document.documentElement.dataset;
+  const numberText = (value) => Number(value.toPrecision(4)).toString().replace(".", decimal);
   const WIDE = 680;  // width of a printed page [px]
 
   // On touch screens a chart is zoomed by its buttons; on a narrow page names that would overlap are left out.
@@ -11,7 +13,8 @@
   if (touched) config.displayModeBar = true;
   for (const [id, { layout }] of Object.entries(figures)) {
     if (touched) layout.dragmode = false;
-    if (!layout.annotations) continue;
+    if (figures[id].map) layout.height = mapHeight(figures[id], chart(id).clientWidth);
+    if (!layout.annotations || figures[id].map) continue;
     const pixel = (layout.xaxis.range[1] - layout.xaxis.range[0]) / (Math.min(chart(id).clientWidth, WIDE) - 76);
     const begin = ({ x, xanchor, text }) => x - (xanchor === "right" ? 4.3 * pixel * text.length : 0);
     const kept = layout.annotations.filter((name) => name.showarrow);
@@ -26,6 +29,7 @@
     : `<svg width="30" height="8"><line x2="30" y1="4" y2="4" stroke="${line.color}" stroke-width="${line.width}"`
       + ` stroke-dasharray="${line.dash === "solid" ? "" : line.dash.replaceAll("px", "")}"/></svg>`;
   const legend = (id) => {
+    if (figures[id].map) return;  // a map has classes
     const box = chart(id).previousElementSibling, traces = chart(id).data;
     box.replaceChildren(...traces.flatMap((trace) => {
       if (trace.showlegend === false || trace.visible === false) return [];
@@ -60,11 +64,20 @@
   if (screen.matches) for (const one of Object.values(figures)) paint(one, light);
 
   const drawn = ids.map((id) => {
+    if (figures[id].map) return Plotly.newPlot(chart(id), figures[id].data, figures[id].layout, { ...config, scrollZoom: true });
     chart(id).insertAdjacentHTML("beforebegin", '<div class="legend"></div>');
     return Plotly.newPlot(chart(id), figures[id].data, figures[id].layout, config);
   });
   ids.forEach(legend);
   screen.addEventListener("change", () => repaint(screen.matches));
+
+  let width = innerWidth;
+  addEventListener("resize", () => {
+    if (innerWidth === width) return;
+    width = innerWidth;
+    for (const id of ids.filter((id) => figures[id].map))
+      Plotly.relayout(chart(id), { height: heights[id] = mapHeight(figures[id], chart(id).clientWidth) });
+  });
 
   // All histories have the same time axis: a zoom in a chart applies to all.
   let following = false;
@@ -80,16 +93,27 @@
     });
   }
 
-  for (const player of document.querySelectorAll(".player")) {
-    const id = player.dataset.for;
-    const { trace, times, heads } = figures[id].moving;
+  // Players: a slider with a button. All of them show the same time, or their nearest time to it.
+  const players = [];
+  const addPlayer = (player, seconds, show, first = true) => {
     const [button, slider, output] = player.children;
-    const pause = Math.max(40, Math.min(400, 8000 / times.length));
+    const pause = Math.max(40, Math.min(400, 8000 / seconds.length));
     let timer = null;
-    const show = (k) => {
+    const to = (k) => {
       slider.value = k;
-      output.textContent = `t = ${Number(times[k].toPrecision(4))} s`;
-      Plotly.restyle(chart(id), { y: [heads[k]] }, [trace]);
+      output.textContent = show(k);
+    };
+    const own = {
+      follow: (time) => {
+        let k = 0;
+        while (k < seconds.length - 1 && Math.abs(seconds[k + 1] - time) <= Math.abs(seconds[k] - time)) k++;
+        if (k !== Number(slider.value)) to(k);
+      },
+    };
+    players.push(own);
+    const move = (k) => {
+      to(k);
+      for (const other of players) if (other !== own) other.follow(seconds[k]);
     };
     const stop = () => {
       clearInterval(timer);
@@ -98,16 +122,24 @@
     };
     button.addEventListener("click", () => {
       if (timer !== null) return stop();
-      if (Number(slider.value) >= times.length - 1) show(0);
+      if (Number(slider.value) >= seconds.length - 1) move(0);
       button.textContent = "Pause";
       timer = setInterval(() => {
-        show(Number(slider.value) + 1);
-        if (Number(slider.value) >= times.length - 1) stop();
+        move(Number(slider.value) + 1);
+        if (Number(slider.value) >= seconds.length - 1) stop();
       }, pause);
     });
-    slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
-    show(0);
+    slider.addEventListener("input", () => { stop(); move(Number(slider.value)); });
+    if (first) to(0);
+  };
+  for (const player of document.querySelectorAll(".player[data-for]")) {
+    const id = player.dataset.for, { trace, times, heads } = figures[id].moving;
+    addPlayer(player, times, (k) => {
+      Plotly.restyle(chart(id), { y: [heads[k]] }, [trace]);
+      return `t = ${numberText(times[k])} s`;
+    });
   }
+  const maps = typeof drawMaps === "function" ? Promise.all(drawn).then(() => drawMaps({ figures, chart, addPlayer, numberText })) : [];
 
   // Printed pages have light colours and their own sizes [px], without the animated line; other content follows the figures.
   // A section fills the rest of its page, or starts on the next page if the rest is too small.
@@ -131,7 +163,7 @@
         page += PAGE * Math.floor((box(first).top - page) / PAGE);
         spare = 60;
       }
-      const rest = box(figure).bottom - box(first).top, is_section = id.id.startsWith("section-");
+      const rest = box(figure).bottom - box(first).top, is_section = !id.id.startsWith("history-");
       const used = box(first).top - page, least = !is_section ? HISTORY : used > WELL * PAGE ? GOOD : LEAST;
       let room = PAGE - rest - spare - used;
       if (room < least) {
@@ -164,5 +196,5 @@
     }
     if (screen.matches) repaint(true);
   });
-  Promise.all(drawn).then(() => { document.documentElement.dataset.drawn = drawn.length; });
+  Promise.all([...drawn, maps]).then(() => { document.documentElement.dataset.drawn = drawn.length; });
 })();

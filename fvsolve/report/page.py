@@ -26,6 +26,9 @@ from fvsolve.report.long_section import (
     section_of,
     section_paths,
 )
+from fvsolve.report.maps.flood_map import flood_map, mapped_basins
+from fvsolve.report.maps.map_figure import map_figure
+from fvsolve.report.report_table import picture_address, report_table
 from fvsolve.report.tables import ERROR_HEADER, Sentence, in_unit, open_reason, value_text
 from fvsolve.units import span
 
@@ -40,8 +43,16 @@ MAX_FAILED_ROWS = 200  # greatest number of rows of limits that fail or are open
 CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
 
 
+DECIMAL_SIGNS = {"point": ".", "comma": ","}
+
+
 def page(result, ways: list[SectionPath]) -> str:
     """HTML text of the report of a run; ways : paths of its long sections."""
+    with tables.with_decimal_sign(DECIMAL_SIGNS[report_table(result.case).decimal]):
+        return _page(result, ways)
+
+
+def _page(result, ways: list[SectionPath]) -> str:
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = tables.extremes_of_probes(result)
@@ -50,6 +61,7 @@ def page(result, ways: list[SectionPath]) -> str:
         told[MAX_WARNINGS:] = [f"{len(told) - MAX_WARNINGS} more in summary.json"]
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
     filled = {
+        **_words(result),
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]),
         "run": result.summary,
@@ -59,6 +71,7 @@ def page(result, ways: list[SectionPath]) -> str:
         "words": tables.top_sentences(result),
         "limits": tables.verdict_table(result),
         "worst": tables.extremes_of_pipes(result, ways) or probes,
+        "maps": _maps(result, figures),
         "sections": _sections(result, sections, figures),
         "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
@@ -83,6 +96,8 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
         "css": "page.css",
         "js": "page.js",
     }
+    if any("map" in figure for figure in figures.values()):
+        files["map_js"] = "maps/map.js"
     texts = {
         key: (TEMPLATE_FOLDER / file).read_text(encoding="utf-8") for key, file in files.items()
     }
@@ -103,11 +118,12 @@ def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> s
     return environment.from_string(texts["table"] + texts["page"]).render(
         filled,
         css=texts["css"],
-        script=texts["js"],
+        script=texts.get("map_js", "") + texts["js"],
         # so that the page needs no network
         library=import_library("plotly.offline").get_plotlyjs(),
         figures=script_json(figures),
         dark=json.dumps(plots.DARK_COLOURS),
+        decimal=tables.decimal_sign(),
         paper=f'"{"".join(letters)}"',
     )
 
@@ -146,6 +162,41 @@ def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[
     return entries
 
 
+def _words(result) -> dict[str, Any]:
+    """Values for the template from `[report]`: title block, logo, and texts as HTML."""
+    table = report_table(result.case)
+    markdown = import_library("markdown_it").MarkdownIt("commonmark", {"html": False})
+    markdown.enable("table")
+    return {
+        "facts": [(word, visible(text)) for word, text in table.facts],
+        "logo": picture_address(result.directory, table.logo),
+        "before": markdown.render(table.before),
+        "after": markdown.render(table.after),
+    }
+
+
+def _maps(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Values for the template on the map of each basin; its figure is added to `figures`."""
+    entries = []
+    for k, basin in enumerate(mapped_basins(result)):
+        plan = flood_map(result, basin)
+        if not plan.layers:
+            continue
+        figure = map_figure(plan, result.case)
+        figures[f"map-{k}"] = figure
+        frames = figure["map"].get("frames")
+        entries.append(
+            {
+                "id": f"map-{k}",
+                "name": visible(basin),
+                "frames": len(frames["data"]) if frames else 0,
+                "stopped": visible(plan.stopped),
+                "north": bool(plan.crs),
+            }
+        )
+    return entries
+
+
 def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Values for the template on each panel of histories; its figure is added to `figures`."""
     drawn = result.history_drawn()
@@ -161,7 +212,12 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
-    """HTML text of the report of a study."""
+    """HTML text of the report of a study, with the words of `[report]` of its first run."""
+    with tables.with_decimal_sign(DECIMAL_SIGNS[report_table(runs[0][1].case).decimal]):
+        return _study_page(study, runs)
+
+
+def _study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
     figures: dict[str, Any] = {}
     first = runs[0][1]
     events = [
@@ -173,6 +229,7 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
         for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))
     ]
     filled = {
+        **_words(first),
         "title": visible(study["title"] or study["study"]),
         "said": study,
         "case": visible(first.summary["case"]),

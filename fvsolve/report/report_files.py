@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -20,6 +21,7 @@ from fvsolve.display import save_if_path
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.report import import_library, page, tables
+from fvsolve.report.draw.map_picture import map_figure
 from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.report.long_section import (
     Section,
@@ -29,6 +31,7 @@ from fvsolve.report.long_section import (
     section_of,
     section_paths,
 )
+from fvsolve.report.maps.flood_map import flood_map, mapped_basins
 from fvsolve.report.tables import is_number
 from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
@@ -248,12 +251,14 @@ def write_pictures(
     route: str = "",
     phases: Sequence[str] = (),
     out: str | Path | None = None,
+    maps: bool = False,
 ) -> list[Path]:
     """Write pictures of a run into the folder `out` (default: the run directory); returns their paths.
 
     probes : names separated by commas, drawn in probes.png
-    route : name of a section; all sections are drawn if probes, route and phases are empty
+    route : name of a section; all sections are drawn if probes, route and phases are empty, and maps is False
     phases : pairs of probes "X:Y", drawn in phase.png
+    maps : True for maps of all basins, one for each quantity, in map-BASIN-QUANTITY.png
     Raises RunError if the directory holds no finished run, FvsolveError with all unknown names, or if there is nothing
     to draw.
     """
@@ -269,7 +274,9 @@ def write_pictures(
             faults += [_unknown_probe(result, name) for name in names if name not in result.units]
         else:
             faults.append(f"--phase {show(text)}: expected two probes, X:Y")
-    sections = _chosen_sections(section_paths(result), route, bool(picked or phases), faults)
+    sections = _chosen_sections(
+        section_paths(result), route, bool(picked or phases or maps), faults
+    )
     if faults:
         raise FvsolveError("\n".join(faults))
     title, drawn = result.summary["title"], {}
@@ -295,6 +302,8 @@ def write_pictures(
         drawn["phase.png"] = phase_figure(
             [[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title
         )
+    if maps:
+        drawn |= map_pictures(result)
     if not drawn:
         reason = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
         raise FvsolveError(
@@ -304,6 +313,24 @@ def write_pictures(
     for name, figure in drawn.items():
         save_if_path(figure, folder / name)
     return [folder / name for name in drawn]
+
+
+def map_pictures(result) -> dict[str, Any]:
+    """Figures of all maps of a run by the names of their files. Raises FvsolveError if there is nothing to draw."""
+    drawn = {}
+    for basin in mapped_basins(result):
+        plan = flood_map(result, basin)
+        for layer in plan.layers:
+            drawn[f"map-{basin}-{layer.key}.png"] = map_figure(plan, layer)
+    if not drawn:
+        basins = any(name not in result.case.links for name in result.case.meshes)
+        reason = (
+            "no greatest values and no frames were stored; set [output] maxima or fields, and run again"
+            if basins
+            else "the case has no basin"
+        )
+        raise FvsolveError(f"{result.directory}: there is no map to draw: {reason}")
+    return drawn
 
 
 def parse_probes(result, text: str, faults: list[str]) -> list[str]:

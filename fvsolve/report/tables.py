@@ -5,7 +5,9 @@ run are verdicts, extremes, method, ledgers, events and versions.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +31,25 @@ MAX_SHARED_DIGITS = 7
 ERROR_HEADER = "\u00b1"  # header of columns of errors, shown with two digits
 # Spaces: between thousands, as wide as a digit, as wide as a point.
 NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = "\u202f", "\u2007", "\u2008"
+
+
+# decimal sign of the numbers of a page, see `[report] decimal`
+_DECIMAL: ContextVar[str] = ContextVar("decimal sign", default=".")
+
+
+def decimal_sign() -> str:
+    """Decimal sign of the numbers of the page that is written."""
+    return _DECIMAL.get()
+
+
+@contextmanager
+def with_decimal_sign(sign: str) -> Iterator[None]:
+    """Write numbers with another decimal sign within a `with` block. sign : a point or a comma"""
+    token = _DECIMAL.set(sign)
+    try:
+        yield
+    finally:
+        _DECIMAL.reset(token)
 
 
 def in_unit(unit_column, value: float | None) -> float | None:
@@ -78,7 +99,7 @@ def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
     places = None if loose else decimal_places([value for value in values if is_number(value)])
     words = [value_text(value, places) for value in values]
     behind = [
-        text.partition(".")[1:]
+        text.partition(decimal_sign())[1:]
         for text, value in zip(words, values, strict=True)
         if is_number(value)
     ]
@@ -87,7 +108,7 @@ def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
         return words
     for k, value in enumerate(values):
         if is_number(value) or value is None:
-            _, point, rest = words[k].partition(".")
+            _, point, rest = words[k].partition(decimal_sign())
             words[k] += ("" if point else POINT_SPACE) + FIGURE_SPACE * (widest - len(rest))
     return words
 
@@ -127,7 +148,8 @@ def value_text(value: Any, places: int | None = None) -> str:
     text = _digits(value) if places is None else f"{value:,.{places}f}"
     text = text if text.strip("-0.,") else text.lstrip("-")  # no minus sign before zero
     text = text if abs(value) >= 1e4 else text.replace(",", "")
-    return text.replace(",", NARROW_SPACE).replace("-", "\u2212")
+    text = text.replace(",", NARROW_SPACE).replace("-", "\u2212")
+    return text.replace(".", decimal_sign())
 
 
 def _digits(value: float) -> str:
@@ -246,7 +268,8 @@ def parts(result) -> ResultTable:
     """Table of all parts but pipes and plain junctions: kind, connected nodes, elevation and keys."""
     case, rows = result.case, []
     height, stated = column("", "head", case), case.elevations_stated
-    for name, part in [*case.nodes.items(), *case.links.items()]:
+    nodes = [(name, node) for name, node in case.nodes.items() if not node.added]
+    for name, part in [*nodes, *case.links.items()]:
         if part.kind == "pipe" or (part.kind == "junction" and part.table().get("demand") == 0.0):
             continue  # pipes have their own table; a junction without demand only connects pipes
         joins = ", ".join(map(str, getattr(part, "ports", {}).values()))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from fvsolve.case.case import REPORT_KEYS, STEP_KEYS
+from fvsolve.case.case import STEP_KEYS
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.core.assembly.features import frames_of
 from fvsolve.core.output import csv_files
@@ -225,7 +225,7 @@ class RunDirectory:
             if self.model.case.output.grids:
                 from fvsolve.core.output.grid_files import write_grids
 
-                write_grids(self.folder, self.model, summary.t, summary.maxima)
+                write_grids(self.folder, self.model, summary)
             if summary.envelope:
                 case = self.model.case
                 envelope = csv_files.with_initial_heads(summary, self.model)
@@ -368,7 +368,9 @@ def _differences(path: Path, case) -> list[str]:
     before, after = (dict(_leaves(table)) for table in tables)
     keys = [key for key in before | after if before.get(key) != after.get(key)]
     keys = [
-        key for key in keys if key.partition(".")[0] not in REPORT_KEYS and key != "numerics.end"
+        key
+        for key in keys
+        if key.partition(".")[0] not in case.report_keys and key != "numerics.end"
     ]
     return [
         f"{key} {show(before.get(key, 'not stated'))} (now {show(after.get(key, 'not stated'))})"

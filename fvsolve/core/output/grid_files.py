@@ -25,14 +25,13 @@ MERCATOR = {  # parameter of Transverse_Mercator in the text of a CRS -> its nam
 BLOCK = 4096  # cells at once: limits the memory of pairs of cells and pixels
 
 
-def write_grids(
-    folder: Path, model: Any, t: float, maxima: dict[str, dict[str, np.ndarray]]
-) -> None:
-    """Write all grids of a case. t : end of the run [s]; maxima : basin -> quantity -> float64[n] in SI"""
+def write_grids(folder: Path, model: Any, summary: Any) -> None:
+    """Write all grids of a case. summary : `Summary` of the run, with its end and the greatest values of basins"""
+    t, maxima = summary.t, summary.maxima
     basins = {basin.name: basin for basin in model.meshed}
     for name, spec in model.case.output.grids.items():
         (folder / "grids").mkdir(exist_ok=True)
-        grid = PixelGrid(basins[spec.basin], spec)
+        grid = PixelGrid(basins[spec.basin], spec, end_text(summary))
         if spec.format == "netcdf":
             grid.write_netcdf(
                 folder / f"grids/{name}.nc", *grid.series(folder, t, maxima.get(spec.basin, {}))
@@ -43,15 +42,26 @@ def write_grids(
                 grid.write_geotiff(folder / f"grids/{name}-{key}.tif", key, values[key])
 
 
+def end_text(summary: Any) -> str:
+    """Sentence on the end of a run, for readers of a file without the run directory."""
+    text = f"The run finished at t = {summary.t:.6g} s."
+    if summary.reason != "finished":
+        text = f"The run stopped early at t = {summary.t:.6g} s: {summary.reason}."
+    if np.isfinite(summary.invalid_from):
+        text += f" Values are not valid from t = {summary.invalid_from:.6g} s on."
+    return text
+
+
 class PixelGrid:
     """Square pixels over a basin, each with the cell in which its centre lies.
 
     x : float64[nx], y : float64[ny]  centres of pixels, from west and from south [m]
     cell : int64[ny, nx]  number of the cell, -1 outside the mesh
+    end : sentence on the end of the run
     """
 
-    def __init__(self, basin: Any, spec: Any) -> None:
-        self.basin, self.spec = basin, spec
+    def __init__(self, basin: Any, spec: Any, end: str) -> None:
+        self.basin, self.spec, self.end = basin, spec, end
         low, (nx, ny) = basin.mesh.points.min(axis=0), pixel_counts(basin.mesh, spec.cell)
         self.x, self.y = (
             at + spec.cell * (np.arange(count) + 0.5)
@@ -117,6 +127,7 @@ class PixelGrid:
         }
         with replacing(path) as fresh, rasterio.open(fresh, "w", **keys) as file:
             file.write(self.values(cells)[::-1], 1)
+            file.update_tags(TITLE=self.basin.case.title or self.basin.case.name, RUN=self.end)
             file.set_band_description(1, key)
             file.set_band_unit(1, self.unit(key))
 
@@ -128,6 +139,7 @@ class PixelGrid:
 
         with replacing(path) as fresh, netcdf_file(fresh, "w", version=2) as file:
             file.Conventions, file.title = "CF-1.8", self.basin.case.title or self.basin.name
+            file.comment = self.end
             for axis, unit, word, at in (
                 ("time", "seconds since 1970-01-01 00:00:00", "time", np.array(times)),
                 ("y", "m", "projection_y_coordinate", self.north + self.y),
