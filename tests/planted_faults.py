@@ -105,6 +105,7 @@ FAULTS = [
     Fault(
         "core/steppers/numbers/polynomial.py", "x - ratio * y for x, y", "x + ratio * y for x, y"
     ),
+    Fault("report/maps/map_classes.py", '"right") - 1', '"left") - 1'),
     Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
     Fault(
         "studies/validation/row_verdicts.py",

@@ -210,7 +210,6 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         waters, lines = water_of_conduits(parts.nodes, links, reading.setting.ambient, weight)
     energy = read_energy(reading, parts)
     named = reading.table("exact", ExactSpec) if "exact" in reading.raw.table else None
-    declared = read_declared_tables(reading, KEYS)
     reading.stop()
     setting, raw = reading.setting, reading.raw
     case = Case(
@@ -241,7 +240,6 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
         copies=dict(setting.files),
         read=reading.read,
         validation=validation,
-        declared=declared,
     )
     return case if named is None else with_exact(reading, case)
 
@@ -299,6 +297,7 @@ def read_general(reading: Reading) -> dict[str, Any]:
             )
         reading.setting.ambient = ambient
     values = {key: default for key, (_, default) in TOP.items()}
+    values["declared"] = read_declared_tables(reading, KEYS)
     for key, value in TOP.items():
         with reading.catch():
             if key in table:

@@ -75,8 +75,8 @@ def plot(
         bool,
         Option(
             "--map",
-            help="maps of all basins: greatest depth, speed and depth times speed, time of arrival, "
-            "duration of flooding",
+            help="maps of basins (greatest depth, speed and depth times speed, time of arrival, duration of "
+            "flooding) and of the network (pressures and heads)",
         ),
     ] = False,
     out: Annotated[

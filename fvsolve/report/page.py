@@ -28,6 +28,8 @@ from fvsolve.report.long_section import (
 )
 from fvsolve.report.maps.flood_map import flood_map, mapped_basins
 from fvsolve.report.maps.map_figure import map_figure
+from fvsolve.report.maps.network_figure import network_figure
+from fvsolve.report.maps.network_map import network_map
 from fvsolve.report.report_table import picture_address, report_table
 from fvsolve.report.tables import ERROR_HEADER, Sentence, in_unit, open_reason, value_text
 from fvsolve.units import span
@@ -40,6 +42,12 @@ SERIES_POINTS = 400  # greatest number of points of a series
 # greatest numbers of probes and sections of an event, from its first run
 MAX_PROBES, MAX_SECTIONS = 6, 2
 MAX_FAILED_ROWS = 200  # greatest number of rows of limits that fail or are open
+OWN_SCALE = (
+    "Positions as stated; they do not agree with the lengths of pipes, so the plan has no scale."
+)
+DRAWN_LAYOUT = (
+    "Drawn layout: not all nodes state a position. Distances approximate the lengths of pipes."
+)
 CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
 
 
@@ -71,7 +79,7 @@ def _page(result, ways: list[SectionPath]) -> str:
         "words": tables.top_sentences(result),
         "limits": tables.verdict_table(result),
         "worst": tables.extremes_of_pipes(result, ways) or probes,
-        "maps": _maps(result, figures),
+        "maps": [*_maps(result, figures), *_network_plans(result, figures)],
         "sections": _sections(result, sections, figures),
         "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
@@ -192,9 +200,33 @@ def _maps(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
                 "frames": len(frames["data"]) if frames else 0,
                 "stopped": visible(plan.stopped),
                 "north": bool(plan.crs),
+                "scaled": True,
+                "kind": "raster",
+                "note": "",
             }
         )
     return entries
+
+
+def _network_plans(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Values for the template on the plan of the network, if any; its figure is added to `figures`."""
+    plan = network_map(result) if result.directory is not None else None
+    if plan is None:
+        return []
+    figures["map-network"] = network_figure(plan, result.case)
+    note = "" if plan.scaled else OWN_SCALE if plan.stated else DRAWN_LAYOUT
+    return [
+        {
+            "id": "map-network",
+            "name": "Network",
+            "frames": len(plan.frames),
+            "stopped": visible(plan.stopped),
+            "north": False,
+            "scaled": plan.scaled,
+            "kind": "lines",
+            "note": note,
+        }
+    ]
 
 
 def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:

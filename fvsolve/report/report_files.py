@@ -21,7 +21,7 @@ from fvsolve.display import save_if_path
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.report import import_library, page, tables
-from fvsolve.report.draw.map_picture import map_figure
+from fvsolve.report.draw.map_picture import map_figure, network_figure
 from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.report.long_section import (
     Section,
@@ -32,6 +32,8 @@ from fvsolve.report.long_section import (
     section_paths,
 )
 from fvsolve.report.maps.flood_map import flood_map, mapped_basins
+from fvsolve.report.maps.network_figure import extent_of
+from fvsolve.report.maps.network_map import network_map
 from fvsolve.report.tables import is_number
 from fvsolve.studies.scenarios import STUDY, open_study
 from fvsolve.units import show
@@ -322,12 +324,16 @@ def map_pictures(result) -> dict[str, Any]:
         plan = flood_map(result, basin)
         for layer in plan.layers:
             drawn[f"map-{basin}-{layer.key}.png"] = map_figure(plan, layer)
+    plan = network_map(result)
+    for layer in plan.layers if plan is not None else ():
+        key = layer.name.replace(" ", "-")
+        drawn[f"map-network-{key}.png"] = network_figure(plan, layer, extent_of(plan))
     if not drawn:
         basins = any(name not in result.case.links for name in result.case.meshes)
         reason = (
             "no greatest values and no frames were stored; set [output] maxima or fields, and run again"
             if basins
-            else "the case has no basin"
+            else "the case has neither a basin nor a network with branches"
         )
         raise FvsolveError(f"{result.directory}: there is no map to draw: {reason}")
     return drawn

@@ -35,7 +35,7 @@ MAX_TEXT = 200_000  # greatest number of letters of a text
 
 
 @dataclass(frozen=True)
-class Day(Value):
+class ReportDate(Value):
     """Value of a case file: a date of TOML, or text such as "March 2026"."""
 
     about: str = ""
@@ -54,7 +54,7 @@ class Day(Value):
 
 
 @dataclass(frozen=True)
-class Picture(Value):
+class Logo(Value):
     """Value of a case file: path of a picture; as read, the name of its copy in the run directory."""
 
     about: str = ""
@@ -115,10 +115,8 @@ class ReportTable(DeclaredTable):
     number: Annotated[str, Text("number of the project or report", VALUE)] = ""
     revision: Annotated[str, Text("revision of the report", VALUE)] = ""
     author: Annotated[str, Text("author of the report", VALUE)] = ""
-    date: Annotated[str, Day("date of the report")] = ""
-    logo: Annotated[str, Picture("picture at the top: .png, .jpg, .svg or .webp, at most 1 MB")] = (
-        ""
-    )
+    date: Annotated[str, ReportDate("date of the report")] = ""
+    logo: Annotated[str, Logo("picture at the top: .png, .jpg, .svg or .webp, at most 1 MB")] = ""
     before: Annotated[str, MarkdownText("text below the title, in Markdown")] = ""
     after: Annotated[str, MarkdownText("text at the end, in Markdown")] = ""
     decimal: Annotated[

@@ -7,79 +7,19 @@ import zlib
 
 import numpy as np
 import pytest
+from reference.flooded_valley import pool
 
 import fvsolve
 from fvsolve.core.output.grid_files import frame_field
 from fvsolve.core.output.node_places import node_places
 from fvsolve.report.maps.flood_map import basin_frames, flood_map
 from fvsolve.report.maps.map_classes import Classes, equal_classes, round_limit
-from fvsolve.report.maps.map_figure import LEVELS, levels_of, map_figure
+from fvsolve.report.maps.map_figure import map_figure
 from fvsolve.report.maps.map_shapes import shapes_of
+from fvsolve.report.maps.packed_levels import LEVELS, levels_of
 from fvsolve.report.report_files import write_pictures, write_report
 
 LIMITS = (0.01, 0.05, 0.1, 0.3, 0.5, 1.0, 2.0)
-
-
-def pool(**top) -> dict:
-    """Water of 1.2 m that is let go in a sloping valley of 24 m x 12 m."""
-    basin = {
-        "type": "basin",
-        "cells": [24, 12],
-        "size": ["24 m", "12 m"],
-        "elevation": "0 m",
-        "level": "0 m",
-        "bed": "0.05*x + 0.02*(y - 6)**2",
-        "manning": 0.03,
-        "start": {"level": "where(x < 6, 1.2, 0)"},
-        "patches": {
-            "east": {"side": "east"},
-            "gully": {"at": ["15.5 m", "6.5 m"], "area": "1 m2"},
-            "second": {"at": ["20.5 m", "6.5 m"], "area": "1 m2"},
-        },
-    }
-    manhole = {"type": "manhole", "crest": "5 m", "area": "0.3 m2", "perimeter": "2 m"}
-    shaft = {"type": "tank", "area": "1 m2", "elevation": "-3 m", "level": "0.4 m"}
-    conduit = {"type": "conduit", "diameter": "0.4 m", "manning": 0.013, "cells": 4}
-    case = {
-        "schema": 1,
-        "title": "Pool",
-        "fluid": {"name": "Water"},
-        "nodes": {
-            "valley": basin,
-            "upper": dict(shaft),
-            "lower": dict(shaft),
-            "river": {"type": "reservoir", "elevation": "-3 m", "head": "-2.6 m"},
-        },
-        "links": {
-            "lid": {**manhole, "from": "valley.gully", "to": "upper"},
-            "cover": {**manhole, "from": "valley.second", "to": "lower"},
-            "sewer": {
-                **conduit,
-                "from": "upper",
-                "to": "lower",
-                "length": "5 m",
-                "inverts": ["-3 m", "-3 m"],
-            },
-            "outfall": {
-                **conduit,
-                "from": "lower",
-                "to": "river",
-                "length": "8 m",
-                "inverts": ["-3 m", "-3 m"],
-            },
-        },
-        "numerics": {"end": "4 s"},
-        "output": {
-            "fields": 5,
-            "maxima": ["valley"],
-            "probes": ["valley.volume"],
-            "gauges": {"middle": {"basin": "valley", "at": ["12.5 m", "6.5 m"]}},
-            "sections": {
-                "line": {"basin": "valley", "from": ["12 m", "0 m"], "to": ["12 m", "12 m"]}
-            },
-        },
-    }
-    return case | top
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +52,7 @@ def test_a_class_contains_its_lower_limit(value, number):
 
 
 @pytest.mark.parametrize("greatest", [0.3, 2.0, 2.5, 40.0])
-def test_a_packed_level_keeps_the_class_and_the_value_to_a_part_of_its_class(greatest):
+def test_a_packed_level_has_the_class_and_nearly_the_value(greatest):
     classes = Classes(LIMITS, ("#000000",) * 7, "m")
     values = np.random.default_rng(5).uniform(0.0, greatest, 4000)
     values[:14] = [*LIMITS, *np.nextafter(LIMITS, 0.0)]
@@ -259,7 +199,7 @@ def test_places_do_not_depend_on_the_order_and_direction_of_links():
         assert second.at[name] == pytest.approx(place)
 
 
-def test_a_run_that_stopped_early_says_so_on_its_maps(tmp_path):
+def test_maps_of_a_run_that_stopped_early_state_the_stop(tmp_path):
     case = pool(numerics={"end": "4 s", "method": "euler", "step": "0.5 s"})
     result = fvsolve.run(case, out=tmp_path / "run", pictures=False)
     assert not result.ok and result.reason != "finished"
@@ -279,9 +219,17 @@ def test_plot_writes_a_map_of_each_quantity(flooded, fvs, tmp_path):
     assert all((tmp_path / f"map-valley-{key}.png").stat().st_size > 20_000 for key in keys)
 
 
+def test_a_new_run_deletes_the_maps_of_an_earlier_run(fvs, tmp_path):
+    fvsolve.run(pool(), out=tmp_path / "run", pictures=False)
+    assert fvs("plot", tmp_path / "run", "--map")[0] == 0
+    assert len([*(tmp_path / "run").glob("map-*.png")]) == 5
+    fvsolve.run(pool(), out=tmp_path / "run", pictures=False, force=True)
+    assert not [*(tmp_path / "run").glob("map-*.png")]
+
+
 def test_without_a_basin_there_is_no_map(tmp_path):
     result = fvsolve.run("two-tanks", out=tmp_path / "run", pictures=False)
-    with pytest.raises(fvsolve.FvsolveError, match="no map to draw: the case has no basin"):
+    with pytest.raises(fvsolve.FvsolveError, match="no map to draw: the case has neither a basin"):
         write_pictures(result.directory, maps=True)
     assert '"map-0"' not in write_report(result.directory)[0].read_text()
 

@@ -245,10 +245,11 @@ def test_unreadable_parts_and_limiters_cause_warnings_and_break_nothing(tmp_path
 def test_all_groups_of_entry_points_are_known_before_their_indices_are_imported():
     import fvsolve.case.sections as sections
     from fvsolve import cli, exact, studies
+    from fvsolve.case.declared_tables import DECLARED
     from fvsolve.core.assembly.features import FEATURES
     from fvsolve.parts import plugins
 
-    indices = cli.COMMANDS, exact.NAMES, FEATURES, sections.SINKS, studies.STUDIES
+    indices = cli.COMMANDS, DECLARED, exact.NAMES, FEATURES, sections.SINKS, studies.STUDIES
     groups = {index.group: index.noun for index in indices}
     groups |= {plugins.GROUP: "part", plugins.LIMITERS: "limiter"}
     known = ast.parse(inspect.getsource(declarations)).body

@@ -11,6 +11,7 @@ import pytest
 from reference.folders import CASES, DOCS, page
 
 import fvsolve
+from fvsolve.case.declared_tables import DECLARED
 from fvsolve.case.load import KEYS
 from fvsolve.errors import CaseError
 
@@ -62,8 +63,9 @@ def tables(text: str) -> list[dict]:
 
 def completed(table: dict) -> dict:
     """Case that contains a table; keys of a basin stand in a basin, and parts without a type get one."""
-    case = {key: value for key, value in table.items() if key in KEYS}
-    if rest := {key: value for key, value in table.items() if key not in KEYS}:
+    known = (*KEYS, *DECLARED)
+    case = {key: value for key, value in table.items() if key in known}
+    if rest := {key: value for key, value in table.items() if key not in known}:
         part = {"type": "basin", "size": [100, 100], "cells": [40, 40]}
         if "velocity" in rest:
             part |= {"physics": "transport"}

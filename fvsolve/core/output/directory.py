@@ -40,7 +40,8 @@ MAXIMA_FILES, RUN_UP_FILES = "maxima-*.vtu", "run_up-*.csv"
 RUN_UP_PICTURES = "run_up-*.png"
 # Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
 REPORT_FILES = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
-PICTURE_PATTERNS = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
+# of `fvsolve plot` and `fvsolve view`
+PICTURE_PATTERNS = ("section-*.png", "map-*.png", "view-*.png", "view-*.gif")
 
 
 def lock_folder(folder: Path, writer: str) -> FileLock:
@@ -426,7 +427,7 @@ def clear_reports(folder: Path) -> None:
 
 def _refuse_reserved_names(case) -> None:
     for name, path in case.copies.items():
-        patterns = MAXIMA_FILES, RUN_UP_FILES, RUN_UP_PICTURES
+        patterns = MAXIMA_FILES, RUN_UP_FILES, RUN_UP_PICTURES, *PICTURE_PATTERNS
         reserved = name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES)
         if reserved or any(fnmatch(name, pattern) for pattern in patterns):
             text = f"{path} has the name of a file that a run writes ({name})"

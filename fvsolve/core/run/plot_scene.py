@@ -16,6 +16,8 @@ DIMENSIONS = {
     "min_pressure": "pressure",
     "max_pressure": "pressure",
     "head": "head",
+    "min_head": "head",
+    "max_head": "head",
     "velocity": "velocity",
     "speed": "velocity",
     "flow": "flow",

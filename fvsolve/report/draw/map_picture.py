@@ -1,4 +1,4 @@
-"""Pictures of maps of basins: classes over the shaded bed, outlines, scale bar, north arrow, legend and coordinates."""
+"""Pictures of maps: basins with classes over the shaded bed and outlines, and plans of networks with coloured pipes."""
 
 import math
 
@@ -97,17 +97,7 @@ def _draw_points(axes, plan, kind: str) -> None:
             x, y, marker=marker, color=colour, markersize=size, markerfacecolor=face, zorder=3
         )
         if len(own) <= MAX_NAMES:
-            axes.annotate(
-                shape.name,
-                (x, y),
-                xytext=shift,
-                textcoords="offset points",
-                fontsize=7,
-                color="#111820",
-                ha="left" if shift[0] else "center",
-                zorder=4,
-                path_effects=_halo(),
-            )
+            _name_point(axes, shape.name, (x, y), shift)
 
 
 def _halo() -> list:
@@ -155,20 +145,12 @@ def _north(axes) -> None:
 
 def _legend(axes, plan, layer) -> None:
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
     classes = layer.classes
-    handles = [
-        Patch(
-            facecolor=colour,
-            edgecolor=style.MUTED,
-            linewidth=0.4,
-            label=f"{text} ({area})",
-        )
-        for colour, text, area in zip(
-            classes.colours, classes.texts, plan.area_texts(layer), strict=True
-        )
+    texts = [
+        f"{text} ({area})" for text, area in zip(classes.texts, plan.area_texts(layer), strict=True)
     ]
+    handles = _class_handles(classes, texts)
     kinds = dict.fromkeys(shape.kind for shape in plan.shapes)
     for kind in [kind for kind in LINES if kind in kinds and kind not in POINTS]:
         colour, width, dashes = LINES[kind]
@@ -192,9 +174,87 @@ def _legend(axes, plan, layer) -> None:
         handles.append(
             Line2D([], [], color=style.INK, linestyle=ASSUMED_DASHES, label="place not stated")
         )
-    axes.figure.legend(
+    _outside_legend(axes.figure, handles, f"{layer.name} [{classes.unit}]")
+
+
+@style.without_markup
+def network_figure(plan, layer, extent):
+    """Figure of a layer of the plan of a network.
+
+    plan : `NetworkMap` of `report.maps`; layer : `PlanLayer` of it
+    extent : least and greatest x, least and greatest y of the picture [m]
+    """
+    from matplotlib.collections import LineCollection
+
+    low_x, high_x, low_y, high_y = extent
+    wide = WIDTH - LEGEND_WIDTH - 0.9
+    height = wide * (high_y - low_y) / (high_x - low_x) + 1.2
+    figure = style.figure(min(max(height, LEAST_HEIGHT), MOST_HEIGHT))
+    axes = figure.subplots()
+    numbers = layer.classes.of(layer.values)
+    for k, colour in enumerate(layer.classes.colours):
+        axes.add_collection(
+            LineCollection(plan.ends[numbers == k], colors=colour, linewidths=2.6, zorder=2)
+        )
+    for name, points in plan.others.items():
+        axes.plot(*points.T, color=LINES["structure"][0], linewidth=1.2, zorder=1)
+        spot = points.mean(axis=0)
+        axes.plot(*spot, "s", color=LINES["structure"][0], markersize=4, zorder=3)
+        if len(plan.others) <= MAX_NAMES:
+            _name_point(axes, name, spot, (0, -11))
+    for name, spot in plan.nodes.items():
+        axes.plot(*spot, "o", color=style.INK, markersize=2.5, zorder=3)
+        if len(plan.nodes) <= MAX_NAMES:
+            _name_point(axes, name, spot, (0, 5))
+    worst = plan.ends[layer.worst].mean(axis=0)
+    axes.plot(*worst, "x", color=style.DOUBT, markersize=9, markeredgewidth=2.2, zorder=5)
+    axes.set_xlim(low_x, high_x)
+    axes.set_ylim(low_y, high_y)
+    axes.set_aspect("equal")
+    axes.tick_params(colors=style.MUTED, labelcolor=style.INK, labelsize=7.5, width=0.6, length=3)
+    axes.ticklabel_format(style="plain", useOffset=False)
+    if plan.scaled:
+        style.name_axes(axes, "x [m]", "y [m]")
+        _scale_bar(axes, extent)
+    elif not plan.stated:
+        axes.set_axis_off()
+    handles = _class_handles(layer.classes, layer.classes.texts)
+    _outside_legend(figure, handles, f"{layer.name} [{layer.classes.unit}]")
+    note = "" if plan.scaled else "positions as stated" if plan.stated else "drawn layout"
+    title = f"{plan.title}\n{layer.name} [{layer.classes.unit}]{f' ({note})' if note else ''}"
+    style.title(figure, title)
+    if plan.stopped:
+        axes.set_title(plan.stopped, fontsize=9, color=style.DOUBT, loc="left")
+    return figure
+
+
+def _name_point(axes, name: str, spot, shift: tuple[int, int]) -> None:
+    axes.annotate(
+        name,
+        tuple(spot),
+        xytext=shift,
+        textcoords="offset points",
+        fontsize=7,
+        color="#111820",
+        ha="left" if shift[0] else "center",
+        zorder=4,
+        path_effects=_halo(),
+    )
+
+
+def _class_handles(classes, texts: list[str]) -> list:
+    from matplotlib.patches import Patch
+
+    return [
+        Patch(facecolor=colour, edgecolor=style.MUTED, linewidth=0.4, label=text)
+        for colour, text in zip(classes.colours, texts, strict=True)
+    ]
+
+
+def _outside_legend(figure, handles: list, title: str) -> None:
+    figure.legend(
         handles=handles,
-        title=f"{layer.name} [{classes.unit}]",
+        title=title,
         title_fontsize=8,
         alignment="left",
         loc="outside right upper",

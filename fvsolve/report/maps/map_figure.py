@@ -1,7 +1,5 @@
 """Map of a basin as data for the page of a report: outlines for plotly.js, and packed rasters."""
 
-import base64
-import zlib
 from typing import Any
 
 import numpy as np
@@ -11,9 +9,16 @@ from fvsolve.report.figures import FONT, chart_layout, escape_markup
 from fvsolve.report.maps.flood_map import FloodMap, MapFrames, MapLayer, map_clock
 from fvsolve.report.maps.map_classes import Classes
 from fvsolve.report.maps.map_shapes import MapShape
+from fvsolve.report.maps.packed_levels import (
+    greatest_of,
+    legend_data,
+    levels_of,
+    packed,
+    packed_series,
+    scale_data,
+)
 from fvsolve.report.tables import decimal_sign
 
-LEVELS = 252  # number of levels of a packed value, divided among the classes
 MAX_FRAMES = 90  # of a map
 MAX_RAW = 24_000_000  # greatest number of bytes of the frames of a map in the browser
 MAX_PACKED = 5_000_000  # greatest number of bytes of the frames of a map in the page
@@ -43,7 +48,7 @@ CELL_HEIGHT = 240  # of the chart of a cell [px]
 MAX_NAMES = 40  # greatest number of names on a map
 
 
-def map_data(plan: FloodMap, case: Any) -> dict[str, Any]:
+def raster_data(plan: FloodMap, case: Any) -> dict[str, Any]:
     """Data of a map for the script of the page: rasters, layers, frames, and outlines as traces and layout."""
     low_x, high_x, low_y, high_y = plan.extent
     shade = np.where(np.isnan(plan.shade), 0.0, 1.0 + 254.0 * np.nan_to_num(plan.shade))
@@ -52,7 +57,7 @@ def map_data(plan: FloodMap, case: Any) -> dict[str, Any]:
         "width": plan.x.size,
         "height": plan.y.size,
         "extent": [low_x, high_x, low_y, high_y],
-        "shade": _packed(shade.astype(np.uint8)),
+        "shade": packed(shade.astype(np.uint8)[::-1]),
         "layers": [_layer(plan, layer) for layer in plan.layers],
         "clock": clock,
     }
@@ -67,87 +72,61 @@ def _layer(plan: FloodMap, layer: MapLayer) -> dict[str, Any]:
     return {
         "name": layer.name,
         "source": layer.source,
-        **_legend(layer.classes),
-        "areas": plan.area_texts(layer),
-        **_levels(layer.classes, float(np.nanmax(layer.values, initial=0.0))),
-        "data": _packed(_bytes_of(plan, layer.values, layer.classes)),
+        **legend_data(layer.classes),
+        "amounts": plan.area_texts(layer),
+        **scale_data(layer.classes, greatest_of(layer.values)),
+        "data": packed(_bytes_of(plan, layer.values, layer.classes)),
     }
-
-
-def _legend(classes: Classes) -> dict[str, Any]:
-    return {"texts": classes.texts, "colours": list(classes.colours), "unit": classes.unit}
-
-
-def _levels(classes: Classes, greatest: float) -> dict[str, Any]:
-    """Limits of the classes and the number of levels of each class, from which the script computes values."""
-    return {
-        "limits": [*classes.limits, max(greatest, classes.limits[-1])],
-        "each": LEVELS // len(classes.limits),
-    }
-
-
-def levels_of(values: np.ndarray, classes: Classes, greatest: float) -> np.ndarray:
-    """Levels of values : uint8, same shape; 0 for none, else 1 + k each + j for part j of class k.
-
-    Each class is divided into `each` = LEVELS // classes equal parts; the last one ends at `greatest`.
-    """
-    numbers = classes.of(values)
-    each = LEVELS // len(classes.limits)
-    low = np.array(classes.limits)
-    high = np.array([*classes.limits[1:], max(greatest, classes.limits[-1])])
-    width = np.maximum(high - low, 1e-300)
-    k = np.maximum(numbers, 0)
-    share = (np.nan_to_num(values) - low[k]) / width[k]
-    part = np.clip(np.floor(share * each), 0, each - 1)
-    return np.where(numbers >= 0, 1 + k * each + part, 0).astype(np.uint8)
 
 
 def _bytes_of(
     plan: FloodMap, values: np.ndarray, classes: Classes, greatest: float | None = None
 ) -> np.ndarray:
-    """Levels of the pixels of a field : uint8[ny, nx]. values : float64[cells]"""
-    most = float(np.nanmax(values, initial=0.0)) if greatest is None else greatest
+    """Levels of the pixels of a field from the northern row : uint8[ny, nx]. values : float64[cells]"""
+    most = greatest_of(values) if greatest is None else greatest
     levels = levels_of(values, classes, most)
-    return np.where(plan.cell >= 0, levels[plan.cell], 0).astype(np.uint8)
+    return np.where(plan.cell >= 0, levels[plan.cell], 0).astype(np.uint8)[::-1]
 
 
 def frames_data(plan: FloodMap, frames: MapFrames, per: float) -> dict[str, Any]:
     """Packed frames, thinned so that the page and the memory of the browser stay small. per : unit of times [s]"""
     count = max(min(MAX_FRAMES, MAX_RAW // plan.cell.size), 2)
     chosen = np.unique(np.linspace(0, len(frames.files) - 1, count).round().astype(int)).tolist()
-    greatest = max(float(np.nanmax(frames.values(k), initial=0.0)) for k in chosen)
+    greatest = max(greatest_of(frames.values(k)) for k in chosen)
     rasters = [_bytes_of(plan, frames.values(k), frames.classes, greatest) for k in chosen]
-    packed = _packed_series(rasters)
-    while sum(map(len, packed)) > MAX_PACKED and len(chosen) > 2:
+    texts = packed_series(rasters)
+    while sum(map(len, texts)) > MAX_PACKED and len(chosen) > 2:
         chosen, rasters = chosen[::2], rasters[::2]
-        packed = _packed_series(rasters)
+        texts = packed_series(rasters)
     return {
         "name": frames.name,
-        **_legend(frames.classes),
-        **_levels(frames.classes, greatest),
+        **legend_data(frames.classes),
+        **scale_data(frames.classes, greatest),
         "times": [frames.times[k] / per for k in chosen],
         "seconds": [frames.times[k] for k in chosen],
         "stored": len(frames.files),
-        "data": packed,
+        "data": texts,
     }
-
-
-def _packed_series(rasters: list[np.ndarray]) -> list[str]:
-    """Rasters, each but the first as its difference from the raster before (exclusive or)."""
-    pairs = zip([np.zeros_like(rasters[0]), *rasters[:-1]], rasters, strict=True)
-    return [_packed(before ^ own) for before, own in pairs]
-
-
-def _packed(raster: np.ndarray) -> str:
-    """Bytes of a raster from its northern row to its southern row, compressed by zlib, in base 64."""
-    return base64.b64encode(zlib.compress(raster[::-1].tobytes(), 9)).decode()
 
 
 def map_figure(plan: FloodMap, case: Any) -> dict[str, Any]:
     """Figure of a map for plotly.js: outlines, names, axes with equal scales; `map` holds the data for the script."""
-    traces = [*_lines(plan), *_points(plan), CHOSEN_CELL]
-    low_x, high_x, low_y, high_y = plan.extent
+    names = ("easting", "northing") if plan.crs else ("x", "y")
     crs = f" ({plan.crs})" if plan.crs else ""
+    labels = f"{names[0]} [m]{crs}", f"{names[1]} [m]"
+    layout = plan_layout(plan.extent, labels, plan.stopped)
+    traces = [*_lines(plan), *_points(plan), CHOSEN_CELL]
+    return {"data": traces, "layout": layout, "map": raster_data(plan, case)}
+
+
+def plan_layout(
+    extent: tuple[float, float, float, float], labels: tuple[str, str], stopped: str
+) -> dict[str, Any]:
+    """Layout of a figure in plan with equal scales of both axes.
+
+    extent : least and greatest x, least and greatest y; labels : of the axes; stopped : sentence above the map, or ""
+    """
+    low_x, high_x, low_y, high_y = extent
     axis = {
         "showgrid": False,
         "zeroline": False,
@@ -162,7 +141,6 @@ def map_figure(plan: FloodMap, case: Any) -> dict[str, Any]:
         "automargin": True,
         "nticks": 6,
     }
-    names = ("easting", "northing") if plan.crs else ("x", "y")
     layout: dict[str, Any] = {
         "margin": {"l": 70, "r": 12, "t": 28, "b": 48},
         "paper_bgcolor": "#ffffff",
@@ -174,17 +152,17 @@ def map_figure(plan: FloodMap, case: Any) -> dict[str, Any]:
         "showlegend": False,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "#6b7785", "activecolor": INK},
         "xaxis": axis
-        | {"title": {"text": f"{names[0]} [m]{crs}", "standoff": 6}, "range": [low_x, high_x]},
+        | {"title": {"text": escape_markup(labels[0]), "standoff": 6}, "range": [low_x, high_x]},
         "yaxis": axis
         | {
-            "title": {"text": f"{names[1]} [m]", "standoff": 6},
+            "title": {"text": escape_markup(labels[1]), "standoff": 6},
             "range": [low_y, high_y],
             "scaleanchor": "x",
             "constrain": "domain",
         },
     }
     layout["xaxis"]["constrain"] = "domain"
-    if plan.stopped:
+    if stopped:
         layout["annotations"] = [
             {
                 "xref": "paper",
@@ -194,11 +172,11 @@ def map_figure(plan: FloodMap, case: Any) -> dict[str, Any]:
                 "xanchor": "left",
                 "yanchor": "bottom",
                 "showarrow": False,
-                "text": escape_markup(plan.stopped),
+                "text": escape_markup(stopped),
                 "font": {"size": 12, "color": DOUBT},
             }
         ]
-    return {"data": traces, "layout": layout, "map": map_data(plan, case)}
+    return layout
 
 
 def _shifted(plan: FloodMap, shape: MapShape) -> tuple[list, list]:
