@@ -41,12 +41,24 @@ def report(
             "--xlsx", help="also write the tables as an Excel workbook in the folder of the report"
         ),
     ] = False,
+    pdf: Annotated[
+        bool,
+        Option(
+            "--pdf",
+            help="also print the page to a PDF on A4, by an installed Chromium, Chrome or Edge",
+        ),
+    ] = False,
 ) -> None:
-    """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
+    """Write an offline HTML page of a run or a study: verdicts, maps, long sections, histories, model, numerics."""
     from fvsolve.report.report_files import write_report
 
-    for path in write_report(directory, out, xlsx):
+    paths = write_report(directory, out, xlsx)
+    for path in paths:
         print(path)
+    if pdf:
+        from fvsolve.report.pdf_file import write_pdf
+
+        print(write_pdf(paths[0]))
 
 
 @command("plot", order=220)

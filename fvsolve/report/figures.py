@@ -7,15 +7,16 @@ pass through `escape_markup`.
 import base64
 import html
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fvsolve.errors import visible
-from fvsolve.report.draw.plot import MAX_NAME_LENGTH, probe_quantity, short_name, thin_series
+from fvsolve.report.draw.plot import name_lines, probe_quantity, thin_series
 from fvsolve.report.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
-from fvsolve.report.long_section import HeadAnimation, Section, head_window
+from fvsolve.report.long_section import HeadAnimation, Section, SectionDevice, head_window
 from fvsolve.report.tables import decimal_sign
 
 SHOWN_LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
@@ -190,7 +191,7 @@ def study_section_figure(
 
     several : list of (name of the run, section); unit, along : units of head and chainage
     """
-    first = max((section for _, section in several), key=lambda section: len(section.devices))
+    first = with_devices_of_all([section for _, section in several])
     k = first.drawn_indices()
     x = packed_array(first.chainage[k], "f4")
     data = [_line("pipe", x, packed_array(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
@@ -201,8 +202,22 @@ def study_section_figure(
         high, low = (packed_array(section.along[key][k], "f4") for key in ("max_head", "min_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
-    others = [section for _, section in several if section is not first]
-    return {"data": data, "layout": _section_layout([first, *others], unit, along)}
+    sections = [section for _, section in several]
+    return {"data": data, "layout": _section_layout([first, *sections], unit, along)}
+
+
+def with_devices_of_all(sections: Sequence[Section]) -> Section:
+    """The section with the most points, with the devices of all sections, such as those of protections in some runs."""
+    first = max(sections, key=lambda section: len(section.devices))
+    found: dict[tuple[str, float], list[str]] = {}
+    for section in [first, *sections]:
+        for device in section.devices:
+            parts = found.setdefault((device.place, round(device.chainage, 6)), [])
+            parts += [part for part in device.parts if part not in parts]
+    devices = [
+        SectionDevice(chainage, place, tuple(parts)) for (place, chainage), parts in found.items()
+    ]
+    return replace(first, devices=sorted(devices, key=lambda device: device.chainage))
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
@@ -328,8 +343,10 @@ def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str,
     first, seen = sections[0], head_window(sections, unit)
     layout = chart_layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT)
     names = _place_names(first)
-    letters = max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
-    layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters
+    sizes = [name_lines(device) for _, device, _ in first.labels()]
+    letters = max((len(line) for lines in sizes for line in lines), default=0)
+    most = max(map(len, sizes), default=1)
+    layout["margin"]["t"] = TOOLBAR_HEIGHT + 26 + 6 * letters + 12 * (most - 1)
     look = {"line": {"color": HAIR, "width": 1}, "layer": "below"}
     upright = {"type": "line", "xref": "x", "yref": "paper", "y0": 0, "y1": 1.015, **look}
     layout["shapes"] = [
@@ -382,7 +399,7 @@ def _place_names(section: Section) -> list[dict[str, Any]]:
             "textangle": -45,
             "xanchor": "right" if x > late else "left",
             "yanchor": "bottom",
-            "text": escape_markup(short_name(names)),
+            "text": "<br>".join(map(escape_markup, name_lines(names))),
             "hovertext": escape_markup(names),
             "font": {"size": 11, "color": INK if stands else MUTED},
         }

@@ -263,7 +263,21 @@ def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np
             )
             line = _as_head(result, "gauge_pressure", gauge, elevation)
             lines[f"{limit.name}, maximum"] = np.where(applies, line, np.nan)
-    return dict(list(lines.items())[:MAX_LIMIT_LINES])
+    return dict(list(_without_copies(lines).items())[:MAX_LIMIT_LINES])
+
+
+def _without_copies(lines: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Lines without those that equal an earlier line of which a longer or equal part applies, such as a class line."""
+    kept: dict[str, np.ndarray] = {}
+    for name, line in lines.items():
+        applies = np.isfinite(line)
+        if not any(
+            np.isfinite(other[applies]).all()
+            and np.allclose(line[applies], other[applies], rtol=1e-9, atol=1e-9)
+            for other in kept.values()
+        ):
+            kept[name] = line
+    return kept
 
 
 def _as_head(result, quantity: str, value, elevation: np.ndarray) -> np.ndarray:

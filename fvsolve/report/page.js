@@ -16,7 +16,7 @@
     if (figures[id].map) layout.height = mapHeight(figures[id], chart(id).clientWidth);
     if (!layout.annotations || figures[id].map) continue;
     const pixel = (layout.xaxis.range[1] - layout.xaxis.range[0]) / (Math.min(chart(id).clientWidth, WIDE) - 76);
-    const begin = ({ x, xanchor, text }) => x - (xanchor === "right" ? 4.3 * pixel * text.length : 0);
+    const begin = ({ x, xanchor, text }) => x - (xanchor === "right" ? 4.3 * pixel * Math.max(...text.split("<br>").map((line) => line.length)) : 0);
     const kept = layout.annotations.filter((name) => name.showarrow);
     for (const name of layout.annotations)
       if (!name.showarrow && kept.every((one) => one.showarrow || Math.abs(begin(one) - begin(name)) >= 24 * pixel)) kept.push(name);
@@ -143,7 +143,9 @@
 
   // Printed pages have light colours and their own sizes [px], without the animated line; other content follows the figures.
   // A section fills the rest of its page, or starts on the next page if the rest is too small.
-  const PAGE = 985, LEAST = 250, GOOD = 420, WELL = 0.6, MOST = 720, HISTORY = 200, TOOLS = 22;
+  // The curves of a section have a height of 70 mm or more.
+  const PAGE = 985, LEAST = 266, GOOD = 420, WELL = 0.6, MOST = 760, HISTORY = 200, TOOLS = 22;
+  const edges = (id) => figures[id].layout.margin.t - TOOLS + figures[id].layout.margin.b;
   const main = document.querySelector("main"), box = (node) => node.getBoundingClientRect();
   const paper = [...document.styleSheets].flatMap((one) => [...one.cssRules]).find((rule) => rule.conditionText === "print");
   const later = document.getElementById("later");
@@ -164,7 +166,7 @@
         spare = 60;
       }
       const rest = box(figure).bottom - box(first).top, is_section = !id.id.startsWith("history-");
-      const used = box(first).top - page, least = !is_section ? HISTORY : used > WELL * PAGE ? GOOD : LEAST;
+      const used = box(first).top - page, least = !is_section ? HISTORY : Math.max(LEAST + edges(id.id), used > WELL * PAGE ? GOOD : 0);
       let room = PAGE - rest - spare - used;
       if (room < least) {
         first.style.breakBefore = "page";

@@ -17,6 +17,7 @@ from fvsolve.errors import visible
 from fvsolve.report import figures as plots
 from fvsolve.report import import_library, tables
 from fvsolve.report.draw.plot import probe_quantity, thin_series
+from fvsolve.report.grouped_notices import grouped_texts
 from fvsolve.report.long_section import (
     MAX_BINS,
     Section,
@@ -64,7 +65,7 @@ def _page(result, ways: list[SectionPath]) -> str:
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = tables.extremes_of_probes(result)
-    told = [visible(notice.text) for notice in result.warnings if notice.ok]
+    told = [visible(text) for text in grouped_texts(item for item in result.warnings if item.ok)]
     if len(told) > MAX_WARNINGS:
         told[MAX_WARNINGS:] = [f"{len(told) - MAX_WARNINGS} more in summary.json"]
     places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
@@ -269,7 +270,7 @@ def _study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -
         "version": first.summary["versions"]["fvsolve"],
         "description": visible(first.case.description),
         "words": study_sentences(study, runs),
-        "matrix": [run_matrix(runs)],
+        "matrix": [run_matrix(runs), *filter(None, [extreme_pressures(runs)])],
         "events": events,
         "failing": failing_limits(runs),
         "changes": change_tables(study),
@@ -361,6 +362,26 @@ def run_matrix(runs: list) -> ResultTable:
     units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + with_error)]
     bad = frozenset(k for k, (_, result) in enumerate(runs) if run_state(result) == FAILS)
     return ResultTable.of("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
+
+
+def extreme_pressures(runs: list) -> ResultTable | None:
+    """Table of the greatest and least pressure over all pipes of each run, with pipe, distance and time.
+
+    It is None if no run has pipes with cells.
+    """
+    rows, columns = [], ()
+    for row, result in runs:
+        table = tables.extremes_of_pipes(result, [])
+        if table is None:
+            continue
+        columns = tuple(envelope_column(result, key).unit for key in ("distance", "t_max"))
+        for values in table.values[:2]:
+            rows.append([run_name(row), *values[:5], values[-1]])
+    if not rows:
+        return None
+    heads = ("run", "", "value", "unit", "pipe", "from its start", "time")
+    units = ("", "", "", "", "", *columns)
+    return ResultTable.of("Extreme pressures", heads, rows, units, mixed=frozenset({2}))
 
 
 def failing_limits(runs: list) -> ResultTable:
@@ -461,11 +482,14 @@ def event_figures(
 
 
 def warning_texts(runs: list) -> list[str]:
-    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs."""
+    """First `MAX_WARNINGS` texts of warnings of all runs, each once, with the names of the runs in which it occurs.
+
+    Warnings of a run that differ in their place and numbers alone are a single text.
+    """
     by_text: dict[str, list[str]] = {}
     for row, result in runs:
-        for item in result.warnings:
-            by_text.setdefault(item.text, []).append(run_name(row))
+        for text in grouped_texts(result.warnings):
+            by_text.setdefault(text, []).append(run_name(row))
     texts = [
         f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})"
         for text, names in by_text.items()

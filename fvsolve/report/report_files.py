@@ -182,8 +182,8 @@ def workbook_tables(result, sections: list[SectionPath]) -> list[ResultTable]:
 
 def study_tables(runs: list) -> list[ResultTable]:
     """Tables of a study with the long sections of all runs; runs : (row of study.json, `Result`) of each run."""
-    contents, failing = [page.run_matrix(runs)], page.failing_limits(runs)
-    contents += [failing] if failing else []
+    contents = [page.run_matrix(runs), page.extreme_pressures(runs), page.failing_limits(runs)]
+    contents = [table for table in contents if table]
     for row, result in runs:
         for way in section_paths(result):
             along = _section_table(result, section_of(result, way))

@@ -39,7 +39,14 @@ GRID_FILES = "grids/*.*"
 MAXIMA_FILES, RUN_UP_FILES = "maxima-*.vtu", "run_up-*.csv"
 RUN_UP_PICTURES = "run_up-*.png"
 # Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
-REPORT_FILES = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
+REPORT_FILES = (
+    "report.html",
+    "report.pdf",
+    "report.xlsx",
+    "section.png",
+    "probes.png",
+    "phase.png",
+)
 # of `fvsolve plot` and `fvsolve view`
 PICTURE_PATTERNS = ("section-*.png", "map-*.png", "view-*.png", "view-*.gif")
 

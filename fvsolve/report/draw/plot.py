@@ -35,7 +35,7 @@ LIMIT_LOOKS = {
         "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2)),
     },
 }
-MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
+LINE_LENGTH = 22  # letters of a line of a name over a chainage
 
 
 @dataclass
@@ -348,7 +348,7 @@ def mark_devices_and_limits(axes, section, window):
         axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
     for x, names, stands in section.labels():
         axes.annotate(
-            short_name(names),
+            "\n".join(name_lines(names)),
             (x, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 4),
@@ -449,6 +449,6 @@ def phase_figure(pairs, title=""):
     return figure
 
 
-def short_name(text: str) -> str:
-    """Name over a chainage; a text longer than `MAX_NAME_LENGTH` is cut."""
-    return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
+def name_lines(text: str) -> list[str]:
+    """Lines of a name over a chainage, of at most about `LINE_LENGTH` letters; no letter is left out."""
+    return textwrap.wrap(text, LINE_LENGTH, break_on_hyphens=True) or [text]
