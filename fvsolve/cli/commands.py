@@ -141,6 +141,14 @@ def check(
     case: SingleCase,
     set: Set = [],  # noqa: B006
     every: Annotated[bool, Option("--all", help="print all rows of long tables")] = False,
+    picture: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE",
+            help="picture of the case to draw (.png): scheme with sizes and levels, maps of basins, long "
+            "sections with the heads at the start",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Print the contents of a case as read, its initial state and its expected cost."""
@@ -153,6 +161,10 @@ def check(
     report_data = model.checks
     report_data["warnings"] += [notice.plain() for notice in step_limits(model)]
     report_data["threads"] = divisible_rows(model)
+    if picture is not None:
+        from fvsolve.report.case_picture import write_case_picture
+
+        write_case_picture(model, picture)
     present(as_json, report_data, printing.check_text(model.case, report_data, every))
 
 

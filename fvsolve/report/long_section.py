@@ -59,10 +59,21 @@ def section_paths(result) -> list[SectionPath]:
     """
     if not_valid(result.summary):
         return []
-    links = result.case.links
+    heads = {
+        name: (float(arrays["initial_head"][0]), float(arrays["initial_head"][-1]))
+        for name, arrays in result.envelope.items()
+    }
+    return paths_of(result.case, heads)
+
+
+def paths_of(case, heads: dict[str, tuple[float, float]]) -> list[SectionPath]:
+    """Paths of the long sections of a case: its routes, then the longest other paths.
+
+    heads : pipe -> heads at its first and last point at the start
+    """
+    links = case.links
     paths = [
-        _section_path(name, legs_of(route, links), links)
-        for name, route in result.case.routes.items()
+        _section_path(name, legs_of(route, links), links) for name, route in case.routes.items()
     ]
     # no duplicates
     paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[
@@ -71,11 +82,11 @@ def section_paths(result) -> list[SectionPath]:
     paths = [way for way in paths if not _is_covered(way, paths)]
     strung = {leg.pipe for way in paths for leg in way.legs}
     # a section may continue through a link between junctions
-    junctions = {name for name, node in result.case.nodes.items() if node.kind == "junction"}
+    junctions = {name for name, node in case.nodes.items() if node.kind == "junction"}
     merged = joined_places(
         {name: link for name, link in links.items() if {*link.ports.values()} <= junctions}
     )
-    free = [name for name in result.envelope if name in links and name not in strung]
+    free = [name for name in heads if name in links and name not in strung]
     pipes = {
         name: (
             *(merged.get(end, end) for end in (links[name].from_, links[name].to)),
@@ -88,7 +99,7 @@ def section_paths(result) -> list[SectionPath]:
         chain = _longest_chain(pipes)
         for pipe, _, _ in chain:
             del pipes[pipe]
-        others.append(_path_of_chain(chain, result))
+        others.append(_path_of_chain(chain, links, heads))
     return [*paths, *sorted(others, key=lambda path: -path.length)]
 
 
@@ -100,17 +111,19 @@ def _is_covered(way: SectionPath, ways: list[SectionPath]) -> bool:
     )
 
 
-def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
+def _path_of_chain(
+    chain: list[tuple[str, bool, float]], links: dict, heads: dict[str, tuple[float, float]]
+) -> SectionPath:
     """Section path of a chain of pipes, directed so that the initial head falls along it.
 
     chain : list of (name of the pipe, True if it is passed backwards, length [m]). A single pipe keeps its direction.
+    heads : as for `paths_of`
     """
     if len(chain) == 1:
         pipe = chain[0][0]
-        return _section_path(pipe, [pipe_leg(pipe, result.case.links)], result.case.links)
+        return _section_path(pipe, [pipe_leg(pipe, links)], links)
     first, last = chain[0], chain[-1]
-    begins = _initial_head(result, first[0], last=first[1])
-    ends = _initial_head(result, last[0], last=not last[1])
+    begins, ends = heads[first[0]][first[1]], heads[last[0]][not last[1]]
     mostly_turned = sum(turned for _, turned, _ in chain) * 2 > len(chain)
     if ends > begins + 1e-9 * abs(begins) or (ends >= begins and mostly_turned):
         chain = [(pipe, not turned, length) for pipe, turned, length in reversed(chain)]
@@ -118,7 +131,7 @@ def _path_of_chain(chain: list[tuple[str, bool, float]], result) -> SectionPath:
     for pipe, turned, length in chain:
         legs.append(Leg(pipe, at, at + length, turned))
         at += length
-    way = _section_path("", legs, result.case.links)
+    way = _section_path("", legs, links)
     names = [leg.pipe for leg in legs]
     name = (
         " \u2013 ".join(names) if len(names) < 4 else f"{way.places[0][0]} to {way.places[-1][0]}"
@@ -136,10 +149,6 @@ def _section_path(name: str, legs: list[Leg], links: dict) -> SectionPath:
         )
         places += ends[::-1] if leg.backwards else ends
     return SectionPath(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
-
-
-def _initial_head(result, pipe: str, last: bool) -> float:
-    return float(result.envelope[pipe]["initial_head"][-1 if last else 0])
 
 
 def _longest_chain(pipes: dict) -> list[tuple[str, bool, float]]:

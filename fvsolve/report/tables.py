@@ -223,7 +223,7 @@ def pipes(result) -> ResultTable | None:
         )
         heights = [float(height.from_si(item)) for item in heights] if stated else []
         points = [None if link.profile is None else len(link.profile.chainage)] if profiled else []
-        friction = _value_text(type(link).values()["friction"], plain_value(link.friction), case)
+        friction = key_text(type(link).values()["friction"], plain_value(link.friction), case)
         friction = friction.removeprefix("(model ").removesuffix(")")
         wave_speed = float(speed.from_si(case.wave_speed(name)))
         rows.append([name, *ends, *sizes, wave_speed, *heights, *points, friction, cells[name]])
@@ -278,7 +278,7 @@ def parts(result) -> ResultTable:
         values, texts = type(part).values(), []
         for key, value in part.table().items():
             if key not in HIDDEN_KEYS and value is not False and value not in ({}, []):
-                texts.append(f"{key.replace('_', ' ')} {_value_text(values.get(key), value, case)}")
+                texts.append(f"{key.replace('_', ' ')} {key_text(values.get(key), value, case)}")
         rows.append([name, part.kind, joins, *lies, " \u00b7 ".join(texts)])
     heads = ("part", "kind", "connects", *["elevation"] * stated, "keys")
     return ResultTable.of(
@@ -286,12 +286,12 @@ def parts(result) -> ResultTable:
     )
 
 
-def _value_text(value: Any, given: Any, case) -> str:
+def key_text(value: Any, given: Any, case) -> str:
     """Text of the value of a key in the units of [output]; value : declaration of the key, given : its value in SI."""
     dimension = getattr(value, "dimension", None)
     if isinstance(given, dict):
         texts = [
-            f"{key.replace('_', ' ')} {_value_text(_value_of_key(value, key), item, case)}"
+            f"{key.replace('_', ' ')} {key_text(_value_of_key(value, key), item, case)}"
             for key, item in given.items()
         ]
         text = f"({', '.join(texts)})"

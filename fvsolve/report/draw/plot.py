@@ -423,6 +423,50 @@ def section_figure(section, window, units, title=""):
 
 
 @style.without_markup
+def initial_section_figure(section, along: str, height: str, title=""):
+    """Figure of a section before a run: the pipe, and the heads at the start, with the names of places.
+
+    section : arrays `chainage`, `elevation` and `head` : float64[n]; `places` : list of (chainage, names)
+    along, height : units of chainage and head
+    """
+    figure = style.figure(4.6)
+    axes = figure.subplots()
+    style.style_axes(axes)
+    axes.plot(
+        section.chainage,
+        section.head,
+        color=style.COLOURS[0],
+        linewidth=1.4,
+        label="head at the start",
+    )
+    axes.plot(section.chainage, section.elevation, color=style.MUTED, linewidth=2.4, label="pipe")
+    span = (section.chainage[-1] - section.chainage[0]) or 1.0
+    last = None
+    for x, names in section.places:
+        axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
+        if last is not None and abs(x - last) < 0.03 * span:
+            continue  # the names would overlap
+        last = x
+        axes.annotate(
+            "\n".join(name_lines(names)),
+            (x, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 4),
+            rotation=40,
+            fontsize=7.5,
+            textcoords="offset points",
+            color=style.INK,
+        )
+    low, high = axes.get_ylim()
+    margin = 0.08 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    style.name_axes(axes, f"chainage [{along}]", f"head [{height}]")
+    style.legend(axes)
+    style.title(figure, title)
+    return figure
+
+
+@style.without_markup
 def phase_figure(pairs, title=""):
     """Figure with a phase plane for each pair of probes; a dot marks the start.
 

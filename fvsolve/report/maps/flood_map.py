@@ -183,25 +183,11 @@ def basin_frames(result: Any) -> dict[str, list[tuple[float, Path]]]:
 
 def flood_map(result: Any, basin: str) -> FloodMap:
     """Map of a basin of a run, see `FloodMap`."""
-    case, mesh = result.case, result.case.meshes[basin]
+    case = result.case
     part = case.nodes[basin]
-    x, y = pixel_centres(mesh)
-    bed = None
-    if hasattr(part, "bed"):
-        bed = samples(part.bed, mesh).mean(axis=0) + (part.elevation or 0.0)
-    found = FloodMap(
-        basin,
-        result.summary["title"] or result.summary["case"],
-        mesh,
-        x,
-        y,
-        cells_of_pixels(mesh, x, y),
-        bed,
-        part.origin or (0.0, 0.0),
-        part.crs or "",
-        stopped_text(result),
-    )
-    found.shapes = shapes_of(case, basin)
+    found = _empty_map(case, basin)
+    found.title = result.summary["title"] or result.summary["case"]
+    found.stopped = stopped_text(result)
     frames = basin_frames(result).get(basin, [])
     settings = report_table(case)
     is_water = "depth" in part.physics_type.fields
@@ -216,6 +202,40 @@ def flood_map(result: Any, basin: str) -> FloodMap:
     elif frames:
         found.frames, layer = _field_frames(case, part, frames)
         found.layers = [layer]
+    return found
+
+
+def _empty_map(case: Any, basin: str) -> FloodMap:
+    """Map of a basin of a case without layers."""
+    mesh, part = case.meshes[basin], case.nodes[basin]
+    x, y = pixel_centres(mesh)
+    bed = None
+    if hasattr(part, "bed"):
+        bed = samples(part.bed, mesh).mean(axis=0) + (part.elevation or 0.0)
+    found = FloodMap(
+        basin,
+        case.title or case.name,
+        mesh,
+        x,
+        y,
+        cells_of_pixels(mesh, x, y),
+        bed,
+        part.origin or (0.0, 0.0),
+        part.crs or "",
+        "",
+    )
+    found.shapes = shapes_of(case, basin)
+    return found
+
+
+def plan_of(case: Any, basin: str, depth: np.ndarray) -> FloodMap:
+    """Map of a basin before a run, with the depths at the start. depth : float64[cells] [m]"""
+    found = _empty_map(case, basin)
+    settings = report_table(case)
+    classes, factor = _depth_classes(case, settings)
+    values = np.where(depth >= settings.least_depth, factor * depth, np.nan)
+    source = "Depths at the start."
+    found.layers = [MapLayer("depth", "depth at the start", values, classes, source)]
     return found
 
 
