@@ -7,8 +7,7 @@ from fvsolve.case import chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
 from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
 from fvsolve.case.sections import Numerics
-from fvsolve.data import read_table
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import listing
 from fvsolve.parts import KINDS, Chamber, Pipe
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.part import MOST_CELLS
@@ -122,13 +121,12 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
     if isinstance(kind, str) and kind in known:
         return known[kind]
     other = "links" if group == "nodes" else "nodes"
-    hint = did_you_mean(str(kind), known)
     if isinstance(kind, str) and kind in KINDS[other]:
-        hint = f"; it belongs under [{other}]"
-    synonym = read_table("part_synonyms").get(
-        str(kind).casefold().replace("_", "-").replace(" ", "-")
-    )
-    hint = f"; use {synonym}" if synonym else f"; types are {listing(known)}{hint}"
+        hint = f"; types are {listing(known)}; it belongs under [{other}]"
+    else:
+        from fvsolve.case.part_names import type_hint  # names of practice, only for a fault
+
+        hint = type_hint(str(kind), group)
     return reading.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
 
 
