@@ -249,6 +249,8 @@ def parts(result) -> ResultTable:
     for name, part in [*case.nodes.items(), *case.links.items()]:
         if part.kind == "pipe" or (part.kind == "junction" and part.table().get("demand") == 0.0):
             continue  # pipes have their own table; a junction without demand only connects pipes
+        if getattr(part, "conduit", None) is not None:
+            continue  # the water of a conduit, which has the row of the conduit
         joins = ", ".join(map(str, getattr(part, "ports", {}).values()))
         lies = getattr(part, "elevation", None)
         lies = [None if lies is None else float(height.from_si(lies))] if stated else []
