@@ -431,8 +431,9 @@ def test_references_of_the_schema_have_unshared_meanings():
 
     def expanded(part):
         if isinstance(part, dict):
-            name = part.get("$ref", "").removeprefix("#/$defs/")
-            if name and name not in unshared["$defs"]:
+            address = part.get("$ref", "")
+            name = address.removeprefix("#/$defs/")
+            if name != address and name not in unshared["$defs"]:
                 beside = {key: one for key, one in part.items() if key != "$ref"}
                 return expanded(defs[name]) | beside
             return {key: expanded(one) for key, one in part.items()}

@@ -81,7 +81,7 @@ def test_a_type_comes_before_names_and_an_abbreviation_may_have_two_meanings():
     assert part_names.find_parts("xyzzy") == []
 
 
-def test_all_names_of_types_in_the_file_are_found_under_themselves():
+def test_each_entry_is_the_result_for_all_of_its_names():
     for entry in ENTRIES:
         for name in entry.names:
             assert entry in part_names.find_parts(name), name
