@@ -14,6 +14,9 @@ from fvsolve.units import show
 HEADER = 'schema = 1\ntitle = "Example"\n\n[fluid]\nname = "Water"\n'
 FOOTER = '\n[numerics]\nend = "END"\n'
 END = "1 s"  # of a scene with an example
+MOST_COMPARED = (
+    50  # unknown types in a file that are compared with all names, which takes 7 ms each
+)
 UNLINKED = ("basin", "body", "terminal")  # nodes without a link of the completed scene
 PLACE_KEYS = ("from", "to", "pilot")  # keys of links that name a place
 
@@ -112,16 +115,11 @@ def find_parts(word: str) -> list[PartName]:
 
 def unknown_part(word: str) -> FvsolveError:
     """Error for a word that is no name of a part, with the nearest name."""
-    names = {folded(name): name for name in all_names()}
+    entries = (*part_types().values(), *names_of_practice())
+    names = {folded(name): name for entry in entries for name in entry.names}
     near = nearest(folded(word), names)
     hint = f'; did you mean "{names[near]}"?' if near else "; fvsolve parts lists all types"
     return FvsolveError(f"unknown part {show(word)}{hint}")
-
-
-def all_names() -> Iterator[str]:
-    """Yield all types and all names of practice."""
-    for entry in (*part_types().values(), *names_of_practice()):
-        yield from entry.names
 
 
 def type_hint(word: str, group: str) -> str:
@@ -130,7 +128,8 @@ def type_hint(word: str, group: str) -> str:
     group : "nodes" or "links", the table in which the type stands; its types come first
     """
     key, known = folded(word), [*KINDS[group]]
-    near = key if key in index() else nearest(key, [*known, *index()])
+    compared = index() if FvsolveError.compared < MOST_COMPARED else ()
+    near = key if key in index() else nearest(key, [*known, *compared])
     if near is None or near in known or near in part_types():
         return f"; types are {listing(known)}{did_you_mean(word, known)}"
     entries = index()[near]
@@ -140,7 +139,7 @@ def type_hint(word: str, group: str) -> str:
     text = conjunction.join(filter(None, [", ".join(quoted[:-1]), quoted[-1]]))
     place = f", under [{group_of(next(iter(types)))}]" if not {*types} & {*known} else ""
     name = near.replace("-", " ")
-    return f"; did you mean {text} ({full_name(entries, near)}){place}? fvsolve parts {show(name)} shows an example"
+    return f"; did you mean {text} ({full_name(entries, near)}){place}? For an example: fvsolve parts {show(name)}"
 
 
 def group_of(kind: str) -> str:

@@ -1,7 +1,7 @@
 """Command `fvsolve parts`: types of parts, names of practice, keys and examples."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
 from typer import Argument
 
@@ -123,9 +123,6 @@ def parts(
     if not entries:
         raise unknown_part(word)
     lines = explanation(word, entries[0]) if len(entries) == 1 else list_of(word, entries)
-    present(as_json, {"entries": [plain_entry(entry) for entry in entries]}, lines)
-
-
-def plain_entry(entry) -> dict[str, Any]:
-    """Values of an entry for JSON, with the keys of its parts."""
-    return entry.plain() | {"keys": {kind: key_rows(kind) for kind in entry.parts}}
+    keys = [{kind: key_rows(kind) for kind in entry.parts} for entry in entries if as_json]
+    data = [entry.plain() | {"keys": own} for entry, own in zip(entries, keys, strict=False)]
+    present(as_json, {"entries": data}, lines)

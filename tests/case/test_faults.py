@@ -675,7 +675,7 @@ BAD = {
     ),
     "a hose": (
         swap('type = "pipe"', 'type = "hose"'),
-        'links.main.type: unknown type "hose"; did you mean "pipe" (hose)? fvsolve parts "hose"',
+        'links.main.type: unknown type "hose"; did you mean "pipe" (hose)? For an example: fvsolve parts "hose"',
     ),
     "a filter": (
         swap('type = "valve"', 'type = "Filter"'),

@@ -172,7 +172,7 @@ def test_energy_use_and_cost_are_the_sums_of_separate_pumps(tmp_path):
         assert first["pumps"]["all"][key] == approx(second["pumps"]["p0"][key], rel=1e-9)
 
 
-def test_a_count_of_one_is_the_pump_itself_to_the_bit(tmp_path):
+def test_a_count_of_1_is_the_pump_itself_to_the_bit(tmp_path):
     keys = PUMPS["power law"]
     one, plain = (
         fvsolve.run(station({"all": pump}), out=tmp_path / str(k), pictures=False)
@@ -231,7 +231,7 @@ def test_check_and_report_show_the_number_of_pumps(tmp_path):
 @pytest.mark.parametrize(("given", "text"), [
     (0, "is out of range"), (2.5, "is not a whole number"), ("3 x", "is not a whole number"),
 ])  # fmt: skip
-def test_a_count_is_a_whole_number_from_one_on(given, text):
+def test_a_count_is_a_whole_number_from_1_on(given, text):
     error = refused(station({"all": PUMPS["ramp"] | {"count": given}}))
     assert [f.place for f in error.faults] == ["links.all.count"] and text in str(error)
 
