@@ -274,6 +274,32 @@ def validation() -> str:
     return re.sub(r"(?<=\]\()([\w-]+\.png)", r"results/\1", text)
 
 
+def names_of_practice() -> str:
+    """Sections of the types of parts by group, and of the names of practice, each with an example."""
+    from fvsolve.case import part_names
+
+    types, text = part_names.part_types(), ""
+    for group in dict.fromkeys(entry.group for entry in types.values()):
+        text += f"## {group.capitalize()}\n\n"
+        entries = [entry for entry in types.values() if entry.group == group]
+        text += "".join(
+            f"### {one.names[0]}\n\n{escaped(one.about)}\n\n{toml(one)}" for one in entries
+        )
+    rows, examples = [], ""
+    for one in part_names.names_of_practice():
+        parts = (" and " if one.composed else " or ").join(f"`{kind}`" for kind in one.parts)
+        rows.append((", ".join(one.names), parts, one.about))
+        if one.example != types[one.parts[0]].example:
+            examples += f"### {one.names[0]}\n\n{escaped(one.about)}\n\n{toml(one)}"
+    head = ("names", "parts", "meaning")
+    return f"{text}## Names\n\n{table(head, rows)}\n## Examples of names\n\n{examples}"
+
+
+def toml(entry) -> str:
+    """Example of a part as a block of TOML."""
+    return f"```toml\n{entry.example}\n```\n\n"
+
+
 # shipped cases that can be turned by hand: time of the frame
 VIEWS = {"flooding": "40 s", "tanker-braking": "3 s"}
 
@@ -296,6 +322,7 @@ GENERATED = {
     "names": names,
     "tables": tables,
     "hooks": hooks,
+    "names_of_practice": names_of_practice,
     "validation": validation,
     "views": views,
 }

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case.reading import default_place, pipe_of_piece, raw_link
+from fvsolve.case.reading import default_place, pipe_of_piece, raw_link, with_defaults
 from fvsolve.errors import Notice
-from fvsolve.parts import Pipe
+from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.pipe.pipe_wall import elastic_compliance
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table_model import Table
@@ -57,7 +57,7 @@ def range_notices(case: Any) -> list[Notice]:
     result += [
         _notice(place, *odd[:1], case, *odd[1:])
         for place, part in parts.items()
-        for odd in _of_part(part, _raw_value(case.raw, place))
+        for odd in _of_part(part, _raw_part(case.raw, place))
     ]
     result += [
         _notice(
@@ -194,6 +194,12 @@ def _raw_value(raw: Any, keys: tuple[Any, ...]) -> Any:
     for key in keys:
         raw = raw.get(key) if isinstance(raw, dict) else None
     return raw
+
+
+def _raw_part(raw: Any, place: tuple[Any, ...]) -> Any:
+    """Keys of a part in the file, completed by defaults; None for a part that is not in the file."""
+    part = _raw_value(raw, place)
+    return with_defaults(raw, part) if isinstance(part, dict) and place[0] in KINDS else part
 
 
 def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, text: str) -> Notice:

@@ -235,7 +235,7 @@ def cut(
 ) -> CutTable:
     """Cut the pipes of a case at the parts placed on them; returns the `CutTable`.
 
-    table : nested dicts of the case, with junctions at bends (`add_bends`) and defaults (`fill_pipes`)
+    table : nested dicts of the case, with junctions at bends (`add_bends`) and defaults (`fill_parts`)
     read_pipes : pipes without faults, as read; cells : number of cells of each of these pipes
     faulty : (group, name) of parts with a fault from `faults`
     """

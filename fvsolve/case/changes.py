@@ -9,7 +9,7 @@ from fvsolve.case.chainage import original_keys, pieces_of, placed
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys, limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.reading import WITH_DEFAULTS, default_values, driven_keys, raw_link, split_key
+from fvsolve.case.reading import class_of_type, default_values, driven_keys, raw_link, split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.case.validation_table import KEYS as VALIDATION_KEYS
 from fvsolve.errors import FvsolveError
@@ -67,7 +67,11 @@ def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     driven = any(
         name in case.nodes and case.nodes[name].kind == "mass" for name in case.network_places
     )
-    if result == VALUE and (case.needs_equilibrium or driven) and keys[0] in ("nodes", "links"):
+    if (
+        result == VALUE
+        and (case.needs_equilibrium or driven)
+        and keys[0] in ("nodes", "links", "defaults")
+    ):
         # it may change the equilibrium, or the force of a mass on a network at the start
         result = PROFILE
     # the start chooses the terms of unsteady friction
@@ -103,6 +107,15 @@ class Keys(Value):
         return self.values[key]
 
 
+class Defaults(Value):
+    """Declaration of the table `[defaults]`: type of part -> keys that may have a default."""
+
+    def below(self, key: str) -> Value:
+        if class_of_type(key) is None:
+            raise KeyError(key)
+        return Keys(default_values(key))
+
+
 def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     """Declarations of all keys of a case, as nested tables with the names of its parts.
 
@@ -119,7 +132,7 @@ def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     result["controls"] = Keys(
         {name: part_keys(Control.kinds[entry["type"]]) for name, entry in blocks}
     )
-    result["defaults"] = Keys({kind: Keys(default_values(kind)) for kind in WITH_DEFAULTS})
+    result["defaults"] = Defaults()
     for group, name, _ in placed(raw):
         result[group] = Keys(
             {**result[group].values, name: Keys({**result[group].values[name].values, **CHAINAGE})}

@@ -183,7 +183,7 @@ class Blocks:
     @cached_property
     def followed(self) -> set[str]:
         """Names of the blocks that a key outside `[controls]` follows."""
-        found = followers(self.reading.raw.table, "control")
+        found = followers(self.reading.filled, "control")
         return {name for name, keys in found if keys[0] != "controls"}
 
     def read(self) -> dict[str, Block | None]:

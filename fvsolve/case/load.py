@@ -308,15 +308,16 @@ def read_general(reading: Reading) -> dict[str, Any]:
 def reusable_values(reading: Reading, previous: Case | None) -> dict[tuple, tuple[Any, Any]]:
     """Values of an earlier case that hold in this case if their raw values are the same : as `Reading.known`.
 
-    There are none if the ambient pressure changes, on which all gauge pressures depend, or defaults of pipes change.
+    There are none if the ambient pressure changes, on which all gauge pressures depend, or defaults of parts change.
     """
     if previous is None or previous.ambient_pressure != reading.setting.ambient:
         return {}
-    return (
-        previous.read
-        if defaults_of(previous.raw, "pipe") == defaults_of(reading.raw.table, "pipe")
-        else {}
-    )
+    now, before = reading.raw.table, previous.raw
+    same = now.get("defaults") == before.get("defaults")
+    same = same and defaults_of(now, "pipe") == defaults_of(
+        before, "pipe"
+    )  # with those of [numerics]
+    return previous.read if same else {}
 
 
 def read_fluid(reading: Reading) -> tuple[FluidSpec | None, Any]:

@@ -5,10 +5,9 @@ from typing import Any, NamedTuple
 
 from fvsolve.case import chainage, connections, resource_checks
 from fvsolve.case.case import default_cells
-from fvsolve.case.reading import GROUPS, Reading, fill_pipes, with_defaults
+from fvsolve.case.reading import GROUPS, Reading, fill_parts, with_defaults
 from fvsolve.case.sections import Numerics
-from fvsolve.data import read_table
-from fvsolve.errors import did_you_mean, listing
+from fvsolve.errors import listing
 from fvsolve.parts import KINDS, Chamber, Pipe
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.part import MOST_CELLS
@@ -31,10 +30,10 @@ def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> c
 
     properties : properties of the fluid, or None if it is faulty; numerics : table as read, or None if it is faulty
     """
-    table = chainage.add_bends(reading.raw.table)
+    table = chainage.add_bends(reading.filled)
     tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
     if not all(isinstance(item, dict) for item in tables) or not chainage.placed(table):
-        return chainage.CutTable(reading.raw.table, frozenset())
+        return chainage.CutTable(reading.filled, frozenset())
     for group, name, part in chainage.placed(table):
         part_kind(reading, group, name, part)
     reading.origin = {
@@ -46,7 +45,7 @@ def cut_pipes(reading: Reading, properties: Any, numerics: Numerics | None) -> c
     odd = list(chainage.faults(table))
     reading.add(odd)
     astray = {keys[:2] for keys, _ in odd}
-    pipes, table = {}, fill_pipes(table)
+    pipes, table = {}, fill_parts(table)
     for name, given in table["links"].items():
         if chainage.is_pipe(given) and ("links", name) not in astray:
             own = {key: item for key, item in given.items() if key != "pieces"}
@@ -107,7 +106,7 @@ def _read_group(reading: Reading, cut: chainage.CutTable, group: str) -> dict[st
         if kind is not None and (group, name) not in cut.unreadable:
             make = functools.partial(read_part, reading, table, kind, part)
             with reading.catch(group, name):
-                result[name] = reading.reuse((group, name), part, make)
+                result[name] = reading.reuse((group, name), reading.own_keys(part), make)
     return result
 
 
@@ -122,13 +121,12 @@ def part_kind(reading: Reading, group: str, name: str, part: dict[str, Any]) -> 
     if isinstance(kind, str) and kind in known:
         return known[kind]
     other = "links" if group == "nodes" else "nodes"
-    hint = did_you_mean(str(kind), known)
     if isinstance(kind, str) and kind in KINDS[other]:
-        hint = f"; it belongs under [{other}]"
-    synonym = read_table("part_synonyms").get(
-        str(kind).casefold().replace("_", "-").replace(" ", "-")
-    )
-    hint = f"; use {synonym}" if synonym else f"; types are {listing(known)}{hint}"
+        hint = f"; types are {listing(known)}; it belongs under [{other}]"
+    else:
+        from fvsolve.case.part_names import type_hint  # names of practice, only for a fault
+
+        hint = type_hint(str(kind), group)
     return reading.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
 
 

@@ -1,8 +1,8 @@
 """Raw case (before its values are read), and the state of the reading of a case, which its stages share.
 
-A raw case has nested dicts, line numbers, overrides and defaults of pipes. The table `[defaults.pipe]` has values of
-keys for all pipes that do not state these keys. The argument `table` of functions is a case as nested dicts, as in the
-file. The state of the reading holds the faults found, the values read and the origin of added parts.
+A raw case has nested dicts, line numbers, overrides and defaults of parts. The table `[defaults.TYPE]` has values of
+keys for all parts of a type that do not state these keys. The argument `table` of functions is a case as nested dicts,
+as in the file. The state of the reading holds the faults found, the values read and the origin of added parts.
 """
 
 import functools
@@ -17,7 +17,7 @@ from typing import Any
 from fvsolve.case import shipped, text
 from fvsolve.case.text import KeyPath, key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing, nearest
-from fvsolve.parts import KINDS, Pipe
+from fvsolve.parts import KINDS
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.part import QUASI_STEADY
 from fvsolve.parts.table_model import exclusive_key_faults
@@ -29,8 +29,8 @@ KEPT_FAULTS = 1000  # faults of a case that are kept; further faults are counted
 LONGEST_LINE = 500  # length of a line above which its names are not examined
 DEEPEST = 40  # levels of tables
 MOST_BYTES = 20_000_000  # of a TOML file; a network of 10 000 pipes has 2 MB
-WITH_DEFAULTS = {"pipe": Pipe}  # types of links that may have defaults
-NOT_DEFAULT = ("from", "to")  # keys that each part must state itself
+# keys that each part must state itself
+NOT_DEFAULT = ("from", "to", "ports", "on", "at")
 # tables that other keys may complete: checked only with their part
 COMPLETED = ("wall", "friction")
 
@@ -339,22 +339,23 @@ def _put(table: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
     table[keys[-1]] = value
 
 
+def class_of_type(kind: Any) -> Any:
+    """Class of a type of node or link; None for an unknown type."""
+    groups = (group for group in KINDS.values() if isinstance(kind, str) and kind in group)
+    return next((group[kind] for group in groups), None)
+
+
 def default_values(kind: str) -> dict[str, Value]:
     """Declarations of the keys that may have a default in a type of part : key -> declaration."""
-    return {
-        key: value for key, value in WITH_DEFAULTS[kind].values().items() if key not in NOT_DEFAULT
-    }
+    values = class_of_type(kind).values()
+    return {key: value for key, value in values.items() if key not in NOT_DEFAULT}
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
     """Keys and values in `[defaults]` for a type of part; empty if there are none or if they are not a table."""
     result, numerics = table.get("defaults"), table.get("numerics")
-    result = (
-        result.get(kind)
-        if isinstance(result, dict) and isinstance(kind, str) and kind in WITH_DEFAULTS
-        else None
-    )
-    result = result if isinstance(result, dict) else {}
+    result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) else None
+    result = result if isinstance(result, dict) and class_of_type(kind) is not None else {}
     if kind == "pipe" and isinstance(numerics, dict) and numerics.get("pipe_model") == QUASI_STEADY:
         return {"pipe_model": QUASI_STEADY, **result}  # a part of its own
     return result
@@ -369,8 +370,9 @@ def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, 
     if not general:
         return given
     # unknown keys are reported once, as faults of the defaults
-    known = WITH_DEFAULTS[given["type"]].keys()
-    groups = WITH_DEFAULTS[given["type"]].alternatives
+    kind = class_of_type(given["type"])
+    known = default_values(given["type"])
+    groups = kind.alternatives
     stated = {key for group in groups if any(word in given for word in group) for key in group}
     return {
         **{key: value for key, value in general.items() if key in known and key not in stated},
@@ -388,21 +390,27 @@ def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
     return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
-def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of a case, as nested dicts, with the defaults written into every pipe and without the table `defaults`."""
-    links = {
-        name: with_defaults(table, link) if isinstance(link, dict) else link
-        for name, link in table["links"].items()
-    }
-    return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
+def fill_parts(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of a case, as nested dicts, with the defaults written into all parts and without the table `defaults`.
+
+    Parts without defaults, and tables that are not dicts, are those of `table`.
+    """
+    result = {key: value for key, value in table.items() if key != "defaults"}
+    for group in KINDS:
+        if isinstance(parts := table.get(group), dict):
+            result[group] = {
+                name: with_defaults(table, part) if isinstance(part, dict) else part
+                for name, part in parts.items()
+            }
+    return result
 
 
 def default_place(table: Mapping[str, Any], keys: tuple) -> tuple:
     """Key path at which the file states a key: that of the part, or of `[defaults]` if only a default is stated."""
-    if len(keys) < 3 or keys[0] != "links":
+    if len(keys) < 3 or keys[0] not in KINDS:
         return keys
-    links = table.get("links")
-    part = links.get(keys[1]) if isinstance(links, dict) else None
+    parts = table.get(keys[0])
+    part = parts.get(keys[1]) if isinstance(parts, dict) else None
     if not isinstance(part, dict) or keys[2] in part or keys[2] not in with_defaults(table, part):
         return keys
     return ("defaults", part["type"], *keys[2:])
@@ -412,14 +420,21 @@ def default_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[t
     """Faults (key path, message) of the table `[defaults]`: unknown types or keys, and invalid values."""
     given = table.get("defaults", {})
     if not isinstance(given, dict):
-        yield ("defaults",), f"{show(given)} is not a table; expected [defaults.pipe]"
+        yield (
+            ("defaults",),
+            f"{show(given)} is not a table; expected [defaults.TYPE], such as [defaults.pipe]",
+        )
         return
     for kind, keys in given.items():
-        if kind not in WITH_DEFAULTS:
-            text = f"{show(kind)} has no defaults{did_you_mean(kind, WITH_DEFAULTS)}; expected defaults of pipe"
-            yield ("defaults", kind), text
+        if class_of_type(kind) is None:
+            types = [name for group in KINDS.values() for name in group]
+            near = did_you_mean(kind, types) or f"; types are {listing(types)}"
+            yield ("defaults", kind), f"{show(kind)} is not a type of part{near}"
         elif not isinstance(keys, dict):
-            yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
+            yield (
+                ("defaults", kind),
+                f"{show(keys)} is not a table; expected keys of {article(kind)}",
+            )
         else:
             yield from (
                 (("defaults", kind, *below), text)
@@ -430,8 +445,8 @@ def default_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[t
 def _faults_of_keys(
     kind: str, given: dict[str, Any], setting: ReadContext
 ) -> Iterator[tuple[tuple, str]]:
-    known = default_values(kind)
-    for group in WITH_DEFAULTS[kind].alternatives:
+    known, model = default_values(kind), class_of_type(kind)
+    for group in model.alternatives:
         yield from exclusive_key_faults(given, group)
     for key, value in given.items():
         if key in known:
@@ -444,7 +459,7 @@ def _faults_of_keys(
         elif key in (*NOT_DEFAULT, "type"):
             yield (key,), f"cannot be a default; each {kind} states its own value"
         else:
-            hint = WITH_DEFAULTS[kind].synonyms.get(key)
+            hint = model.synonyms.get(key)
             near = (
                 f"; use {hint}"
                 if hint
@@ -475,7 +490,28 @@ class Reading:
         self.read: dict[tuple, tuple[Any, Any]] = {}
         self.known: dict[tuple, tuple[Any, Any]] = {}
         self.origin: dict[tuple, tuple] = {}
+        self.completed: dict[
+            int, tuple[Any, Any]
+        ] = {}  # id of keys with defaults -> (they, own keys of the part)
         self.further = 0  # number of faults beyond `KEPT_FAULTS`
+
+    @functools.cached_property
+    def filled(self) -> dict[str, Any]:
+        """Case as nested dicts, with the defaults written into all parts; that of the file without defaults."""
+        table = self.raw.table
+        if not table.get("defaults"):
+            return table
+        filled = fill_parts(table)
+        for group in KINDS:
+            own = table.get(group)
+            for name, part in filled[group].items() if isinstance(own, dict) else ():
+                if part is not own[name]:
+                    self.completed[id(part)] = part, own[name]
+        return filled
+
+    def own_keys(self, part: Any) -> Any:
+        """Keys of a part as in the file; part : its keys, with defaults or without."""
+        return self.completed.get(id(part), (part, part))[1]
 
     def stop(self) -> None:
         """Raise CaseError if faults were found."""

@@ -11,7 +11,7 @@ from fvsolve.case.declared_tables import DECLARED
 from fvsolve.case.load import KEYS, TOP
 from fvsolve.case.part_reading import LINKLESS
 from fvsolve.case.pipe_routes import Route
-from fvsolve.case.reading import NOT_DEFAULT, WITH_DEFAULTS
+from fvsolve.case.reading import NOT_DEFAULT
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.control import Control
@@ -62,7 +62,7 @@ def full_schema() -> dict[str, Any]:
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
     any_block = [_typed(kind, block, definitions) for kind, block in sorted(Control.kinds.items())]
     properties["controls"] = {"type": "object", "additionalProperties": {"anyOf": any_block}}
-    properties["defaults"] = _defaults(definitions)
+    properties["defaults"] = _defaults()
     for name, model in (("scalars", Scalar), ("reactions", Reaction), ("routes", Route)):
         content = _with_shared_definitions(model, definitions)
         properties[name] = {"type": "object", "additionalProperties": content}
@@ -230,15 +230,16 @@ def _with_shared_definitions(model: Any, definitions: dict[str, Any]) -> dict[st
     return result
 
 
-def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
-    """Schema of the tables `[defaults.KIND]`, with the keys of the parts, all optional."""
+def _defaults() -> dict[str, Any]:
+    """Schema of the tables `[defaults.TYPE]`: keys of the parts, all optional, by reference to the parts."""
     result = {}
-    for kind, model in WITH_DEFAULTS.items():
-        keys = _with_shared_definitions(model, definitions)["properties"]
-        own = {
-            key: _without_siblings(value) for key, value in keys.items() if key not in NOT_DEFAULT
-        }
-        result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
+    for group, kinds in KINDS.items():
+        for number, (kind, model) in enumerate(sorted(kinds.items())):
+            place = f"#/properties/{group}/additionalProperties/anyOf/{number}/properties"
+            own = {
+                key: {"$ref": f"{place}/{key}"} for key in model.values() if key not in NOT_DEFAULT
+            }
+            result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
     return {"type": "object", "properties": result, "additionalProperties": False}
 
 

@@ -1,4 +1,4 @@
-"""Cases that are shipped with the package: folder, names, paths, titles, copies."""
+"""Cases and templates that are shipped with the package: folder, names, paths, titles, copies."""
 
 import shutil
 import tomllib
@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.file_replacement import replacing
+from fvsolve.file_replacement import replacing, write_file
 
 SCHEMA = "schema.json"  # file beside the cases; editors use it for completion and checks
+STUDY = "-study"  # end of the name of the study of a template
 
 
 def folder() -> Path:
@@ -23,6 +24,47 @@ def folder() -> Path:
 def names() -> list[str]:
     """Names of the shipped cases, sorted."""
     return sorted(path.stem for path in folder().glob("*.toml"))
+
+
+def templates() -> list[str]:
+    """Names of the templates, sorted; a template is a case with comments for changes, and may have a study."""
+    paths = (folder() / "templates").glob("*.toml")
+    return sorted(path.stem for path in paths if not path.stem.endswith(STUDY))
+
+
+def copy_template(name: str, to: Path) -> list[Path]:
+    """Write a template to the file `to`, and its study to the file of that name with "-study"; returns the paths.
+
+    `to` may also be a folder. The study names the written case. The schema of case files is copied too, if it is not
+    there. Raises FvsolveError for an unknown template, and if one of the files exists.
+    """
+    if name not in templates():
+        raise FvsolveError(
+            f"no template {name}{did_you_mean(name, templates())}; templates are {listing(templates())}"
+        )
+    to = to / f"{name}.toml" if to.is_dir() else to
+    texts = {}
+    for end in ("", STUDY):
+        source = folder() / "templates" / f"{name}{end}.toml"
+        if source.is_file():
+            text = source.read_text(encoding="utf-8")
+            text = text.replace(f"{name}{STUDY}", f"{to.stem}{STUDY}")
+            texts[to.with_name(f"{to.stem}{end}{to.suffix}")] = text.replace(
+                f'"{name}.toml"', f'"{to.name}"'
+            )
+    for path in texts:
+        if path.exists():
+            raise FvsolveError(
+                f"{path} exists; give another file: fvsolve new --template {name} FILE"
+            )
+    to.parent.mkdir(parents=True, exist_ok=True)
+    for path, text in texts.items():
+        write_file(path, text)
+    schema = to.parent / SCHEMA
+    if (folder() / SCHEMA).is_file() and not schema.exists():
+        with replacing(schema) as fresh:
+            shutil.copyfile(folder() / SCHEMA, fresh)
+    return [*texts]
 
 
 def find(name: str) -> Path:

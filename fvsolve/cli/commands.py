@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -179,16 +180,49 @@ def list_cases(as_json: Json = False) -> None:
 
 @command("new", order=40)
 def new(
-    name: Annotated[str, Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
+    name: Annotated[
+        str | None,
+        Argument(metavar="NAME", help="a shipped case, see `fvsolve list`; none with --template"),
+    ] = None,
     file: Annotated[
         Path | None, Argument(metavar="FILE", help="file to write (default NAME.toml)")
     ] = None,
+    template: Annotated[
+        str | None,
+        Option(
+            metavar="TEMPLATE",
+            help="template in place of a shipped case, a case with comments for your own "
+            "values: pumping-main, network, street-and-sewer, servo, tank-and-wave or course",
+        ),
+    ] = None,
 ) -> None:
-    """Copy a shipped case and the files it uses."""
+    """Copy a shipped case and the files it uses, or write a template: fvsolve new --template TEMPLATE [FILE]."""
     from fvsolve.case import load, shipped
 
+    if template is not None:
+        if file is not None:
+            raise FvsolveError(
+                "a template has no NAME; expected fvsolve new --template TEMPLATE [FILE]"
+            )
+        paths = shipped.copy_template(template, Path(name or f"{template}.toml"))
+        return present(False, None, template_text(paths))
+    if name is None:
+        raise FvsolveError(
+            "NAME is missing; give a shipped case (fvsolve list), "
+            f"or --template with one of {', '.join(shipped.templates())}"
+        )
     for path in shipped.copy(name, file or Path(f"{name}.toml"), load):
         print(path)
+
+
+def template_text(paths: list[Path]) -> Iterator[str]:
+    """Lines on a written template: its files, and the next commands."""
+    yield from map(str, paths)
+    case, *studies = paths
+    yield f"next: change the values marked >>>, then fvsolve check {case}"
+    yield f"fvsolve run {case} && fvsolve report runs/{case.stem}"
+    for study in studies:
+        yield f"fvsolve study {study} && fvsolve report runs/{study.stem}"
 
 
 @command("schema", order=50)

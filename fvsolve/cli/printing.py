@@ -13,6 +13,7 @@ from fvsolve.core.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
 from fvsolve.errors import listing
+from fvsolve.parts.nodes_and_links import kind_text
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all
@@ -217,6 +218,11 @@ def check_text(case, facts: dict, every: bool = False) -> Iterator:
         if text := _wall_text(case, pipe):
             walls.setdefault(text, []).append(name)
     notes += [f"wall of {listing(names)}: {text}" for text, names in walls.items()]
+    notes += [
+        f"{name}: {kind_text(link)} in parallel; flow, torque and power are those of all"
+        for name, link in case.links.items()
+        if getattr(link, "count", 1) > 1
+    ]
     lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay-line"}
     notes += [
         f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"

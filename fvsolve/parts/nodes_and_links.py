@@ -253,6 +253,12 @@ def is_kind(part: Any, kind: str) -> bool:
     return getattr(part, "kind", "") == kind
 
 
+def kind_text(part: Any) -> str:
+    """Type of a part, with the number of its equal machines before it: "3 x pump"."""
+    count = getattr(part, "count", 1)
+    return f"{count} x {part.kind}" if count > 1 else part.kind
+
+
 def is_in_network(kind: Any) -> bool:
     """True if a part, or class of parts, is in networks of rotation, electricity and heat, which carry no scalars."""
     return getattr(kind, "in_network", False) or getattr(kind, "domain", "") in NETWORK_DOMAINS

@@ -22,6 +22,7 @@ from fvsolve.core.output.unit_columns import UnitColumn
 from fvsolve.core.run.result import not_valid
 from fvsolve.core.run.verdicts import NEAR, Chainages
 from fvsolve.errors import RunError
+from fvsolve.parts.nodes_and_links import kind_text
 
 MAX_SECTIONS = 6  # greatest number of sections of a run, unless it has more routes
 
@@ -538,7 +539,7 @@ def _devices(result, way: SectionPath) -> list[SectionDevice]:
         )
         parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
         parts += [
-            f"{name} ({link.kind})"
+            f"{name} ({kind_text(link)})"
             for name, link in case.links.items()
             if link.kind != "pipe" and place in link.ports.values()
         ]

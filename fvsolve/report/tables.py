@@ -19,6 +19,7 @@ from fvsolve.core.output.summary_shape import FAILS, HOLDS, IN_WORDS, OPEN
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
 from fvsolve.errors import visible
+from fvsolve.parts.nodes_and_links import kind_text
 from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.long_section import SectionPath, envelope_column
@@ -279,7 +280,7 @@ def parts(result) -> ResultTable:
         for key, value in part.table().items():
             if key not in HIDDEN_KEYS and value is not False and value not in ({}, []):
                 texts.append(f"{key.replace('_', ' ')} {key_text(values.get(key), value, case)}")
-        rows.append([name, part.kind, joins, *lies, " \u00b7 ".join(texts)])
+        rows.append([name, kind_text(part), joins, *lies, " \u00b7 ".join(texts)])
     heads = ("part", "kind", "connects", *["elevation"] * stated, "keys")
     return ResultTable.of(
         "Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=FULL_VALUES_NOTE

@@ -115,7 +115,7 @@ def test_settings_and_sweeps_reach_them(file):
     (("7 mm", "7 kg"), "defaults.pipe.wall.thickness", "is a mass; expected a length"),
     (("factor = 0.02", "factr = 0.02"), "defaults.pipe.friction.factr", "unknown key"),
     (("wall = {", "wave_speed = 900\nwall = {"), "defaults.pipe.wall", "wave_speed and wall are given; keep one"),
-    (("[defaults.pipe]", "[defaults.pip]"), "defaults.pip", '"pip" has no defaults; did you mean "pipe"?'),
+    (("[defaults.pipe]", "[defaults.pip]"), "defaults.pip", '"pip" is not a type of part; did you mean "pipe"?'),
 ])  # fmt: skip
 def test_a_fault_is_named_where_it_stands_and_once(file, changed, place, said):
     error = refused(file(changed))

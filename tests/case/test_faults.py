@@ -675,11 +675,27 @@ BAD = {
     ),
     "a hose": (
         swap('type = "pipe"', 'type = "hose"'),
-        'links.main.type: unknown type "hose"; use a "pipe" with',
+        'links.main.type: unknown type "hose"; did you mean "pipe" (hose)? For an example: fvsolve parts "hose"',
     ),
     "a filter": (
         swap('type = "valve"', 'type = "Filter"'),
-        'links.valve.type: unknown type "Filter"; use an "orifice"',
+        'links.valve.type: unknown type "Filter"; did you mean "loss-curve" or "orifice" (filter)?',
+    ),
+    "an abbreviation of practice": (
+        swap('type = "valve"', 'type = "nrv"'),
+        'links.valve.type: unknown type "nrv"; did you mean "check-valve" (non-return valve)?',
+    ),
+    "a composition": (
+        swap('type = "valve"', 'type = "one_way tank"'),
+        'unknown type "one_way tank"; did you mean "tank" and "check-valve" (one-way tank)?',
+    ),
+    "a name of practice in the other table": (
+        swap('"junction"', '"PSV"'),
+        'did you mean "relief-valve" or "pressure-sustaining" (PSV), under [links]?',
+    ),
+    "a name of practice with a slip": (
+        swap('type = "valve"', 'type = "non-return-vavle"'),
+        'did you mean "check-valve" (non-return valve)?',
     ),
     "a bare name with an umlaut": (
         swap("[links.valve]", "[links.düse]"),

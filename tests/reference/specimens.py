@@ -202,6 +202,19 @@ add_link(
     None,
     ("low", "mid"),
 )
+add_link(
+    "pumps-in-parallel",
+    {
+        "type": "pump",
+        "count": 3,
+        "curve": {"flow": [0.004], "head": [20.0]},
+        "rated_speed": 150.0,
+        "inertia": 0.02,
+        "trip": 0.0,
+    },
+    None,
+    ("low", "mid"),
+)
 add_link("turbine", {"type": "turbine", "diameter": 0.05, "speed": 100.0, "hill_chart": HILL})
 for kind in ("pump", "motor"):
     machine = {

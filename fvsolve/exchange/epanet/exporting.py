@@ -16,6 +16,7 @@ from fvsolve.exchange.epanet.part_tables import (
     rounded_number,
 )
 from fvsolve.parts.pipe.part import Pipe
+from fvsolve.parts.pump.parallel import combined_pump
 
 LONGEST_NAME = 31  # of EPANET, in characters
 SHORT_PIPE = 0.01  # length of the pipe that stands for a check valve [m]
@@ -346,6 +347,11 @@ class _Export:
 
     def pump(self, name: str, link: Any) -> None:
         base, pattern = 1.0, ""
+        if link.count > 1:
+            self.notes.append(
+                f"links.{name}.count: {link.count} pumps are written as one pump with the flow of all"
+            )
+            link = combined_pump(link)
         if link.speed.kind != "control":
             base, pattern = self.scheduled(f"links.{name}.speed", link.speed, 1.0)
         if link.power is not None:

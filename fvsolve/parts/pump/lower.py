@@ -23,6 +23,7 @@ from fvsolve.parts.pump.lower_shaft import (
     specific_speed,
     usual_inertia,
 )
+from fvsolve.parts.pump.parallel import combined_pump, single_pump
 
 SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
 # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
@@ -76,17 +77,18 @@ def estimated_inertia(draft, name: str, part) -> list[Notice]:
     """Notice of the estimated inertia if a pump trips and its inertia is not given; as a list."""
     if part.trip is None or part.inertia is not None:
         return []
-    value = inertia(part, draft.fluid.density * draft.case.gravity)
+    value = inertia(single_pump(part), draft.fluid.density * draft.case.gravity)
+    share = f" of each of {part.count} pumps" if part.count > 1 else ""
     text = (
-        f"{name}: its inertia is estimated from power and speed: {value:.4g} kg m2 for impeller, water and motor; "
-        "the surge depends on this value; give the key `inertia` from the manufacturer"
+        f"{name}: its inertia is estimated from power and speed: {value:.4g} kg m2 for impeller, water and "
+        f"motor{share}; the surge depends on this value; give the key `inertia` from the manufacturer"
     )
     return [Notice("range", f"links.{name}", text, "inertia", value)]
 
 
 def rated_point_notes(draft, name: str, part) -> list[Notice]:
     """Notices if the inertia or the shaft power of a pump is implausible for its rated point; as a list."""
-    weight = draft.fluid.density * draft.case.gravity
+    part, weight = single_pump(part), draft.fluid.density * draft.case.gravity
     if weight == 0.0:
         return []
     notices, power = [], rated_power(part, weight)
@@ -127,7 +129,7 @@ def unusual_flow(draft, name: str, part) -> list[Notice]:
     bores = [pipe.diameter for pipe in pipes if {pipe.from_, pipe.to} & {part.from_, part.to}]
     if not bores or part.power is not None:
         return []
-    flow = rated_point(part, draft.fluid.density * draft.case.gravity)[0]
+    flow = rated_point(combined_pump(part), draft.fluid.density * draft.case.gravity)[0]
     most, least = (flow / (math.pi / 4.0 * bore**2) for bore in (min(bores), max(bores)))
     if least <= MAX_VELOCITY and most >= MIN_VELOCITY:
         return []
@@ -172,13 +174,14 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         return self.speed_input(model, name, SPEED)
 
     def restriction(self, draft, name, link, row) -> None:
-        weight = draft.fluid.density * draft.case.gravity
+        link, weight = combined_pump(link), draft.fluid.density * draft.case.gravity
         flow, head = rated_point(link, weight)
         row["data"] = len(draft.floats)
         draft.floats += curve_numbers(link, weight)
         row["conductance"] = (draft.fluid.density * flow) ** 2 / (weight * head)
 
     def numbers(self, draft, name, part) -> list[float]:
+        part = combined_pump(part)
         rated, weight = part.rated_speed or 1.0, draft.fluid.density * draft.case.gravity
         numbers, own = self.drive_numbers(draft, name, part), shaft_points(part, weight)
         numbers |= {
@@ -205,7 +208,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
         shaft = [self.small for _ in super().states_of(draft, name, part)]
         if draft.case.energy is None:
             return shaft
-        weight = draft.fluid.density * draft.case.gravity
+        part, weight = combined_pump(part), draft.fluid.density * draft.case.gravity
         flow, head = rated_point(part, weight)
         return shaft + energy_scales(draft, weight * flow * head, flow)
 
@@ -225,15 +228,17 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
     def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
         if not self.has_free_shaft(model, row):
             return []
-        return [
-            {int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}
-        ]
+        return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * self.inertia(model, part))}]
 
     def above(self, model, part, row) -> float:
         speed = float(model.tables.valves[row["valve"]]["drive"])
         if not self.has_free_shaft(model, row):
             return 0.0
-        return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2
+        return 0.5 * self.inertia(model, part) * (part.rated_speed * speed) ** 2
+
+    def inertia(self, model, part) -> float:
+        """Inertia of all rotating masses of all pumps of a part that runs free [kg m2]."""
+        return inertia(combined_pump(part), weight_of(model))
 
     def has_free_shaft(self, model, row) -> bool:
         """True if the speed of the shaft is a state; row : of the device"""
@@ -241,7 +246,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
 
     def passing_notice(self, model, name, part, time) -> Notice:
         """Notice that a pump was outside its head curve in a way that its law allows, first at `time` [s]."""
-        moment = model.case.amount(time, "time", 6)
+        part, moment = single_pump(part), model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
             text = (

@@ -73,8 +73,11 @@ def joined_table(part, flow: float, head: float) -> Quadrants | None:
 
 
 def specific_speed(part, flow: float, head: float) -> float:
-    """Specific speed of a pump at its rated point [rpm (m3/s)^(1/2) / m^(3/4)]; flow : [m3/s], head : [m]"""
-    return part.rated_speed * 30.0 / math.pi * math.sqrt(flow) / head**0.75
+    """Specific speed of each pump at its rated point [rpm (m3/s)^(1/2) / m^(3/4)].
+
+    flow : of all `count` pumps [m3/s]; head : [m]
+    """
+    return part.rated_speed * 30.0 / math.pi * math.sqrt(flow / part.count) / head**0.75
 
 
 # flow over the last flow, below which a curve that is flat at no flow is replaced by a line
@@ -270,11 +273,11 @@ def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
 def inertia(part, weight: float) -> float | None:
     """Inertia of all rotating masses [kg m2], as given; if not given, None, or for a pump that trips an estimate.
 
-    The estimate follows from power and speed; weight : rho g [N/m3]
+    The estimate follows from power and speed of each pump; part : all `count` pumps; weight : rho g [N/m3]
     """
     if part.inertia is not None or part.trip is None:
         return part.inertia
-    return usual_inertia(rated_power(part, weight), part.rated_speed)
+    return part.count * usual_inertia(rated_power(part, weight) / part.count, part.rated_speed)
 
 
 def rated_power(part, weight: float) -> float:

@@ -14,7 +14,18 @@ from fvsolve.parts.pump.head_curve import (
     SuterTable,
 )
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import PROFILE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
+from fvsolve.parts.table_model import CaseContext, Faults
+from fvsolve.parts.value import (
+    PROFILE,
+    Choice,
+    Flag,
+    Quantity,
+    UsualRange,
+    Whole,
+    between,
+    nonnegative,
+    positive,
+)
 
 EFFICIENCY = 0.75
 SPEEDS = UsualRange(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
@@ -26,7 +37,8 @@ class Pump(TwoPort, kind="pump"):
     On a free shaft, J d(omega)/dt = sum of torques, with inertia J and angular velocity omega. As in EPANET, f is a - b
     q^c through one point (4/3 of its head at no flow, zero head at twice its flow) or through three points from no flow
     on, and linear between any other number of points. Ports: from, to. Place: shaft (angular velocity, torque). Stored
-    energy: J omega^2 / 2 [J] where the shaft runs free. It supplies rho g H q [W], H the head.
+    energy: J omega^2 / 2 [J] where the shaft runs free. It supplies rho g H q [W], H the head. With `count`,
+    equal pumps in parallel are a single part: other keys are those of each pump; flow, torque and power those of all.
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
@@ -105,6 +117,14 @@ class Pump(TwoPort, kind="pump"):
             about="price of its electric energy per kWh, with `[energy]`; that of `[energy]` if left out",
         ),
     ] = None
+    count: Annotated[
+        int,
+        Whole(
+            between(1, 1000),
+            "number of equal pumps in parallel that turn and trip together; other keys are those of each pump",
+            PROFILE,
+        ),
+    ] = 1
     check_valve: Annotated[
         bool, Flag("ideal check valve: no flow from `to` to `from`, no loss", PROFILE)
     ] = False
@@ -148,3 +168,11 @@ class Pump(TwoPort, kind="pump"):
                 (("shaft_power",), "`suter` already gives the torque; leave `shaft_power` out")
             )
         return faults
+
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        yield from super().faults(name, around)
+        shaft = f"{name}.shaft"
+        for other, link in around.links.items() if self.count > 1 else ():
+            if shaft in link.ports.values():
+                text = f"{self.count} pumps have no common shaft, but {other} joins {shaft}"
+                yield ("count",), f"{text}; expected count = 1, or a part for each pump"

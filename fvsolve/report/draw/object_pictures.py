@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 
+from fvsolve.parts.nodes_and_links import kind_text
 from fvsolve.report.draw import style
 from fvsolve.units import convert
 
@@ -29,7 +30,7 @@ def case_figure(case):
             middle = [sum(x) / len(ends) for x in zip(*ends, strict=True)]
             axes.text(
                 *middle,
-                f"{name} ({link.kind})",
+                f"{name} ({kind_text(link)})",
                 fontsize=7,
                 color=style.MUTED,
                 ha="center",

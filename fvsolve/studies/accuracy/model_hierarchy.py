@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.argument_checks import FUNCTION, NUMBER, TABLE, validated
 from fvsolve.case.chainage import add_bends, placed
-from fvsolve.case.reading import raw_link
+from fvsolve.case.reading import raw_link, with_defaults
 from fvsolve.case.sloshing import slowest
 from fvsolve.core.assembly.schedule_tables import value_at
 from fvsolve.core.fluid import LAWS, law_named
@@ -205,7 +205,7 @@ def junction_chambers(case, pipes: dict) -> dict[str, Any]:
             raise NotApplicable(
                 f"{name} is a chamber of a cylinder, to which no other volume can be added"
             )
-        raw = case.raw["nodes"][name]
+        raw = with_defaults(case.raw, case.raw["nodes"][name])
         if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
             raise NotApplicable(f"flow enters or leaves at {name}, which a volume cannot represent")
         start_keys = {
