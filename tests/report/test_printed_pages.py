@@ -113,7 +113,7 @@ def test_the_images_of_pages_are_of_a4_and_show_the_curves_of_each_event(study, 
     assert sum(count > 500 for count in curves) >= 2
 
 
-def test_without_a_browser_a_sentence_tells_how_to_print(study, fvs, monkeypatch):
+def test_without_a_browser_the_message_is_how_to_print(study, fvs, monkeypatch):
     monkeypatch.setenv("FVSOLVE_BROWSER", "no-such-browser")
     code, out, said = fvs("report", study, "--pdf")
     assert code == 2 and out.split() == [str(study / "report.html")]
