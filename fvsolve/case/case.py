@@ -32,6 +32,7 @@ from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
 from fvsolve.parts.table_model import plain_value
+from fvsolve.parts.time_stamps import moment_text
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -377,6 +378,10 @@ class Case(Displayable):
         if span:
             return f"{units.find(units.span(unit), dimension).number(value):.{digits}g} {units.span(unit)}"
         return f"{units.convert(value, dimension, unit, self.ambient_pressure):.{digits}g} {unit}"
+
+    def moment(self, t: float) -> str:
+        """Text of the time t [s] in the unit of `[output]`, with its date if the case has a start time."""
+        return moment_text(self.amount(t, "time", 6), t, self.numerics.start_time)
 
     def step_amount(self, step: float, digits: int = 6) -> str:
         """Text of a time step [s], in the unit of times in `[output]`, or in s if that unit is longer than 1 s."""

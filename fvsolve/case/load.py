@@ -43,6 +43,7 @@ from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import RunTimes, read_keys
+from fvsolve.parts.time_stamps import StartTimeValue
 from fvsolve.units import Kinematic, show
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     numerics = reading.table("numerics", Numerics)
     if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
         reading.setting.span = times.start, times.end
+    reading.setting.start_time = read_start_time(reading, times)
     check_names(reading)
     cut = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
@@ -304,9 +306,14 @@ def read_general(reading: Reading) -> dict[str, Any]:
 def reusable_values(reading: Reading, previous: Case | None) -> dict[tuple, tuple[Any, Any]]:
     """Values of an earlier case that hold in this case if their raw values are the same : as `Reading.known`.
 
-    There are none if the ambient pressure changes, on which all gauge pressures depend, or defaults of pipes change.
+    There are none if the ambient pressure changes, on which all gauge pressures depend, if the start time changes, from
+    which dates count, or if defaults of pipes change.
     """
     if previous is None or previous.ambient_pressure != reading.setting.ambient:
+        return {}
+    # times of files with dates count from the start time
+    stated = [raw.get("numerics") for raw in (previous.raw, reading.raw.table)]
+    if len({str(table.get("start_time")) for table in stated if isinstance(table, dict)}) != 1:
         return {}
     return (
         previous.read
@@ -493,6 +500,25 @@ def valid_times(reading: Reading) -> Numerics | None:
     valid = reading.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
     times = {key for key in ("start", "end") if valid is not None and key in given}
     return valid if "end" in times and times <= valid.model_fields_set else None
+
+
+def read_start_time(reading: Reading, numerics: Numerics | None) -> Any:
+    """Instant of t = 0 of `[numerics]`: None without one, UNREAD if it is faulty.
+
+    Adds a fault if the run leaves the calendar. numerics : table as far as it is valid, None if faulty
+    """
+    given = reading.raw.table.get("numerics")
+    if not isinstance(given, dict) or "start_time" not in given:
+        return None
+    try:
+        start = StartTimeValue().read(given["start_time"], reading.setting)
+    except ValueError:
+        return val.UNREAD
+    if numerics is not None and not start.holds(numerics.start, numerics.end):
+        text = f"{start.table()} with a run from {numerics.start:g} s to {numerics.end:g} s leaves the years 1 to 9999"
+        reading.fault(("numerics", "start_time"), f"{text}; expected a run within these years")
+        return val.UNREAD
+    return start
 
 
 def check_parts(

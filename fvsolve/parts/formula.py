@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+from fvsolve.parts.csv_rows import CsvRows, read_table_file
 from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, ValueFault, anything
 from fvsolve.units import show
 
@@ -375,19 +375,18 @@ class SpatialFieldKey(Value):
                 raise
             except ValueError as error:
                 raise ValueFault([(("raster",), str(error))]) from None
-        if set(given) != {"file"} or not isinstance(given["file"], str):
+        if "file" not in given:
             text = f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
             raise ValueError(f'{text}, or {{ raster = "NAME.tif" }}')
+        if isinstance(name := given["file"], str) and Path(name).suffix.lower() in RASTER_SUFFIXES:
+            text = f"{show(name)} is a raster; expected {{ raster = {show(name)} }}"
+            raise ValueFault([(("file",), text)])
+        _, rows, stated = read_table_file(given, setting)
         try:
-            path = find_file(given["file"], setting)
-            if path.suffix.lower() in RASTER_SUFFIXES:
-                raise ValueError(
-                    f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}"
-                )
-            columns = read_points(path, self.dimension)
+            columns = read_points(rows, self.dimension)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
-        return SpatialField({"file": copy_name(path, setting)}, Samples(columns))
+        return SpatialField(stated, Samples(columns))
 
     @property
     def takes(self) -> str:
@@ -417,17 +416,16 @@ class NumberOrField(Value):
         return f"{self.number.takes}; formula; raster"
 
 
-def read_points(path: Path, dimension: str) -> np.ndarray:
-    """Points of a CSV file : float64[n, 3] with x [m], y [m] and the value [SI].
+def read_points(rows: CsvRows, dimension: str) -> np.ndarray:
+    """Points of a table file : float64[n, 3] with x [m], y [m] and the value [SI].
 
     Raises ValueError with the faulty line. dimension : dimension of the value
     """
-    rows = read_rows(path)
     if len(rows.header) != 3:
-        raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
+        raise ValueError(f"{rows.file} has {len(rows.header)} columns; expected x, y and the value")
     if len(rows.lines) < 3:
         raise ValueError(
-            f"{path.name}: too few points ({len(rows.lines)}); expected at least three"
+            f"{rows.file}: too few points ({len(rows.lines)}); expected at least three"
         )
     return np.column_stack(
         [rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))]

@@ -96,7 +96,7 @@ class RunChecks:
         name, times = self.model.state_names[worst], GROWTH_LIMIT * float(ratio[worst])
         text = (
             f"{name} has grown to {times:.3g} times the range of its forcing at t = "
-            f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
+            f"{self.model.case.moment(t)}; the step is beyond the limit of the method: "
             "halve the step"
         )
         place = name.partition("[")[0]
@@ -205,7 +205,7 @@ class SloshingCheck:
                 keep_greatest(record[RISE], rise(y, *lifting), t)
             weight, reference = self.weight(out, *about, modal)
             if weight <= WEIGHT_ROUNDING * reference:
-                when = f"t = {self.model.case.amount(t, 'time', 6)}"
+                when = f"t = {self.model.case.moment(t)}"
                 return f"stopped: {STATUS_FAILURES[rec.NO_WEIGHT].format(name=name, when=when)}"
             keep_greatest(record[LOSS], abs(weight / reference - 1.0), t)
         return ""
