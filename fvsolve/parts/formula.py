@@ -366,6 +366,12 @@ class SpatialFieldKey(Value):
             return SpatialField(given, Arithmetic(given, str(error)))
 
     def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
+        if "groups" in given:
+            from fvsolve.parts.mesh_fields import read_group_values  # few meshes have groups
+
+            return SpatialField(
+                *read_group_values(given, Quantity(self.dimension, self.range), setting)
+            )
         if "raster" in given:
             try:
                 from fvsolve.parts.raster import read_raster  # only fields of files need it
@@ -511,12 +517,10 @@ def samples(shape: SpatialField | None, mesh: Any) -> np.ndarray:
     """Values of a formula at points in the n cells of a mesh : float64[points, n]; zeros if `shape` is None.
 
     On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
-    only the centre. The values of a raster are its means over the cells, at all points.
+    only the centre. The values of a raster, of groups and of nodes are means over the cells, at all points.
     """
     if shape is not None:
-        from fvsolve.parts.raster import Raster  # only cases with basins need it
-
-        if isinstance(shape.rule, Raster):
+        if hasattr(shape.rule, "over"):  # of a raster, of groups or of nodes of the mesh
             mean = shape.rule.over(mesh)
             return np.broadcast_to(mean, (len(GAUSS) if is_grid(mesh) else 1, mean.size))
     x, y = np.ascontiguousarray(mesh.centre.T)
