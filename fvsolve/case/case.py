@@ -29,10 +29,10 @@ from fvsolve.core.schemes import SCHEMES
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.parts import Link, Node, Pipe, Scalar
+from fvsolve.parts.date_keys import moment_text
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
 from fvsolve.parts.table_model import plain_value
-from fvsolve.parts.time_stamps import moment_text
 from fvsolve.units import show
 
 if TYPE_CHECKING:

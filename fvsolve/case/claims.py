@@ -25,8 +25,8 @@ from fvsolve.case.probe import (
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
+from fvsolve.parts.date_keys import DATE_KEYS
 from fvsolve.parts.table_model import SHEET_KEY, check_table, read_keys
-from fvsolve.parts.time_stamps import DATE_KEYS
 from fvsolve.parts.value import (
     NEEDED,
     VALUE,

@@ -39,11 +39,11 @@ from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
+from fvsolve.parts.date_keys import StartTimeValue
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
 from fvsolve.parts.table_model import RunTimes, read_keys
-from fvsolve.parts.time_stamps import StartTimeValue
 from fvsolve.units import Kinematic, show
 
 if TYPE_CHECKING:
@@ -162,9 +162,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     given = reading.raw.table.get("fluid", reading.needs_no_fluid)
     fluid, state = reading.reuse(("fluid",), given, functools.partial(read_fluid, reading))
     numerics = reading.table("numerics", Numerics)
-    if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
-        reading.setting.span = times.start, times.end
-    reading.setting.start_time = read_start_time(reading, times)
+    read_calendar(reading, numerics or valid_times(reading))
     check_names(reading)
     cut = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
@@ -500,6 +498,16 @@ def valid_times(reading: Reading) -> Numerics | None:
     valid = reading.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
     times = {key for key in ("start", "end") if valid is not None and key in given}
     return valid if "end" in times and times <= valid.model_fields_set else None
+
+
+def read_calendar(reading: Reading, numerics: Numerics | None) -> None:
+    """Store start and end of the run and the instant of t = 0 in the context of values.
+
+    numerics : table as far as it is valid, None if faulty
+    """
+    if numerics is not None and numerics.start < numerics.end:
+        reading.setting.span = numerics.start, numerics.end
+    reading.setting.start_time = read_start_time(reading, numerics)
 
 
 def read_start_time(reading: Reading, numerics: Numerics | None) -> Any:

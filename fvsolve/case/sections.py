@@ -18,9 +18,9 @@ from fvsolve.declarations import Declarations
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
 from fvsolve.parts import value as val
+from fvsolve.parts.date_keys import StartTimeValue
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, RunTimes, Table, check_table, read_keys
-from fvsolve.parts.time_stamps import StartTime, StartTimeValue
 from fvsolve.parts.value import (
     BY_CELLS,
     SHAPE,
@@ -277,7 +277,7 @@ class Numerics(Table):
 
     end: Annotated[float, Quantity("time", about="end time of the run [s]")]
     start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
-    start_time: Annotated[StartTime | None, StartTimeValue()] = None
+    start_time: Annotated[Any, StartTimeValue()] = None
     initial: Annotated[
         str,
         Choice(

@@ -13,7 +13,7 @@ from fvsolve.core.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
 from fvsolve.errors import listing
-from fvsolve.parts.time_stamps import moment_text, start_time_in
+from fvsolve.parts.date_keys import moment_text, start_time_in
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all

@@ -15,9 +15,9 @@ import numpy as np
 
 from fvsolve import units
 from fvsolve.errors import did_you_mean
+from fvsolve.parts.date_keys import DATE_KEYS
 from fvsolve.parts.table_model import FILE_KEYS, SHEET_KEY, read_keys
 from fvsolve.parts.time_stamps import (
-    DATE_KEYS,
     Stamp,
     StampError,
     StartTime,

@@ -10,8 +10,8 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
+from fvsolve.parts.date_keys import DATE_KEYS
 from fvsolve.parts.table_model import SHEET_KEY, keys_json, read_keys
-from fvsolve.parts.time_stamps import DATE_KEYS
 from fvsolve.parts.value import (
     NEEDED,
     Choice,

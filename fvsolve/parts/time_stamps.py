@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.parts.value import VALUE, Choice, ReadContext, Value
 from fvsolve.units import show
 
-ORDERS = ("day-month-year", "month-day-year")  # of dates that begin with two small numbers
-EXAMPLE = "2026-03-01T06:00:00Z"
+EXAMPLE = "2026-03-01T06:00:00"
+DAY_FIRST = "day-month-year"
 DAY, HOUR, MINUTE = 86400, 3600, 60  # [s]
 MICRO = 1_000_000  # stamps are written to the microsecond
 FIRST_HOURS = (
@@ -129,7 +128,7 @@ class StartTime:
         text = str(np.datetime_as_string(instant, unit="ms"))
         return text.removesuffix(".000") + zone_text(self.stamp.offset)
 
-    def beside(self, t: float | None) -> str:
+    def in_brackets(self, t: float | None) -> str:
         """Text of the instant of t [s] in brackets, which follows the text of t; "" for None and nan."""
         return "" if t is None or not np.isfinite(t) else f" ({self.text(t)})"
 
@@ -193,7 +192,7 @@ def read_stamp(text: str, order: str | None = None, offset: int | None = None) -
     """
     match = STAMP.fullmatch(text.strip())
     if match is None:
-        raise StampError(f"{show(text)} is not a date; expected for example {EXAMPLE[:-1]}")
+        raise StampError(f"{show(text)} is not a date; expected for example {EXAMPLE}")
     part = match.groupdict()
     day = _days(part["date"], order)
     hour, minute, second = (int(part[f"{key}4"] or part[key] or 0) for key in ("h", "min", "s"))
@@ -225,10 +224,9 @@ def _days(text: str, order: str | None) -> int:
     part = STAMP.fullmatch(text + "T00:00").groupdict()
     if part["a"]:
         if order is None:
-            raise StampError(
-                f'{show(text)} is ambiguous; expected the key `date_order`, "{ORDERS[0]}" or "{ORDERS[1]}"'
-            )
-        day, month = (part["a"], part["b"]) if order == ORDERS[0] else (part["b"], part["a"])
+            words = f'"{DAY_FIRST}" or "month-day-year"'
+            raise StampError(f"{show(text)} is ambiguous; expected the key `date_order`, {words}")
+        day, month = (part["a"], part["b"]) if order == DAY_FIRST else (part["b"], part["a"])
         year = part["ay"]
     else:
         year = part["y"] or part["y8"] or part["dy"] or part["ny"] or part["uy"]
@@ -246,51 +244,6 @@ def _days(text: str, order: str | None) -> int:
         raise StampError(
             f"{show(text)} is not a day of the calendar{hint}; expected an existing day"
         ) from None
-
-
-class ZoneValue(Value):
-    """Value of a case file for the offset of a zone from UTC: text such as "+01:00" or "UTC"."""
-
-    about = "offset from UTC of the dates of the file that state none"
-    changes = VALUE
-    takes = '`"+01:00"`, `"UTC"`'
-    schema = {"type": "string"}
-
-    def read(self, given: Any, setting: ReadContext) -> str:
-        if not isinstance(given, str):
-            raise ValueError(f'{show(given)} is not text; expected for example "+01:00" or "UTC"')
-        return zone_text(read_zone(given))
-
-
-class StartTimeValue(Value):
-    """Value of a case file for the instant of t = 0: a date-time of TOML, or text in ISO 8601."""
-
-    about = (
-        "date and time of the day at t = 0, with or without a zone; results then have real times, and files of time "
-        "series may have dates"
-    )
-    changes = VALUE
-    takes = f"date-time, `{EXAMPLE}`"
-    schema = {"type": "string", "examples": [EXAMPLE]}
-
-    def read(self, given: Any, setting: ReadContext) -> StartTime:
-        if isinstance(given, StartTime):
-            return given
-        text = given
-        if isinstance(given, datetime.datetime):
-            text = given.isoformat()
-        elif isinstance(given, datetime.date):
-            text = given.isoformat()
-        elif isinstance(given, datetime.time):
-            raise ValueError(f"{show(str(given))} has no date; expected for example {EXAMPLE}")
-        if not isinstance(text, str):
-            raise ValueError(f"{show(given)} is not a date; expected for example {EXAMPLE}")
-        stamp = read_stamp(text)
-        if len(stamp.fraction) > 6:
-            raise ValueError(
-                f"{show(text)} has more than six digits after the seconds; expected at most six"
-            )
-        return StartTime(stamp)
 
 
 def order_fault(stamps: list[Stamp], texts: list[str]) -> tuple[int, str] | None:
@@ -317,28 +270,3 @@ def order_fault(stamps: list[Stamp], texts: list[str]) -> tuple[int, str] | None
             )
         return k, f"{text}; expected rising times"
     return None
-
-
-DATE_KEYS: dict[str, tuple[Value, Any]] = {  # of a file of a time series
-    "date_order": (
-        Choice(
-            "order of dates",
-            ORDERS,
-            "order of dates such as 01/02/2026; other forms of dates are unambiguous",
-            changes=VALUE,
-        ),
-        None,
-    ),
-    "time_zone": (ZoneValue(), None),
-}
-
-
-def start_time_in(summary: dict[str, Any]) -> StartTime | None:
-    """Instant of t = 0 in the summary of a run; None without one. Raises StampError if its text is not a date."""
-    text = summary.get("start_time")
-    return None if text is None else StartTime(read_stamp(text))
-
-
-def moment_text(text: str, t: float, start: StartTime | None) -> str:
-    """Text of a time with its date; text : the time in its unit, t : the time [s], start : None without dates"""
-    return text if start is None else text + start.beside(t)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fvsolve.parts.time_stamps import ORDERS, Stamp, StampError, StartTime, read_stamp
+from fvsolve.parts.date_keys import ORDERS
+from fvsolve.parts.time_stamps import Stamp, StampError, StartTime, read_stamp
 
 INSTANTS = st.datetimes(datetime.datetime(1900, 1, 1), datetime.datetime(2200, 1, 1))
 OFFSETS = st.sampled_from([None, 0, 60, -330, 840])  # [min]

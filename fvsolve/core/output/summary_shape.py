@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple, NotRequired, TypedDict
 from fvsolve import units
 from fvsolve.core.output.json_files import faults_of, joined
 from fvsolve.errors import Notice
-from fvsolve.parts.time_stamps import StampError, start_time_in
+from fvsolve.parts.date_keys import start_time_in
 from fvsolve.units import show
 
 HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
@@ -370,7 +370,7 @@ def contradictions(summary: dict[str, Any]) -> Iterator[str]:
     """Yield a text for each unknown unit, and for extremes and errors of other probes than those of the summary."""
     try:
         start_time_in(summary)
-    except StampError as error:
+    except ValueError as error:
         yield f"start_time: {error}"
     columns = {"time_unit": ("time", summary["time_unit"])}
     columns |= {

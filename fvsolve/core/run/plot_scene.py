@@ -9,7 +9,7 @@ from fvsolve.core.output import network_layout
 from fvsolve.core.output.fields import FIELD_UNITS, read_pipe_lines
 from fvsolve.core.output.unit_columns import column
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.parts.time_stamps import moment_text
+from fvsolve.parts.date_keys import moment_text
 from fvsolve.report.draw.scene import PLAUSIBLE_SCALE, DrawnPart, DrawnScene, DrawnUnit
 
 DIMENSIONS = {

@@ -19,11 +19,12 @@ from fvsolve.core.output.summary_shape import (
 from fvsolve.core.output.unit_columns import UnitColumn
 from fvsolve.display import Displayable, save_if_path
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
-from fvsolve.parts.time_stamps import StartTime, moment_text, start_time_in
+from fvsolve.parts.date_keys import moment_text, start_time_in
 from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
+    from fvsolve.parts.time_stamps import StartTime
 
 KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
@@ -179,7 +180,7 @@ class Result(Displayable):
         return self._time.to_si(self.t)
 
     @property
-    def start_time(self) -> StartTime | None:
+    def start_time(self) -> "StartTime | None":
         """Instant of t = 0, `[numerics] start_time`; None without one."""
         return start_time_in(self.summary)
 
