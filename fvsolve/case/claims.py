@@ -25,7 +25,7 @@ from fvsolve.case.probe import (
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.date_keys import DATE_KEYS
+from fvsolve.parts.date_keys import DATE_KEYS, TimeColumns
 from fvsolve.parts.table_model import SHEET_KEY, check_table, read_keys
 from fvsolve.parts.value import (
     NEEDED,
@@ -95,7 +95,7 @@ class Compare:
     probe: Probe
     file: str
     path: Path
-    time: str
+    time: str | list[str]
     value: str
     shift: float
     t: np.ndarray = field(repr=False)
@@ -230,7 +230,7 @@ COMPARE_KEYS = {
         val.Text("CSV file or Excel workbook with a header; path relative to the case file", VALUE),
         NEEDED,
     ),
-    "time": (val.Text("header of the column of times; the first column if left out", VALUE), None),
+    "time": (TimeColumns(), None),
     "value": (
         val.Text("header of the column of values; the second column if left out", VALUE),
         None,

@@ -7,7 +7,7 @@ shorter row is a fault, since its meaning would be ambiguous.
 import codecs
 import csv
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,9 @@ COMMA_HINT = "; with decimal commas, separate columns by ; or tabs"
 SEPARATORS = ("\t", ";", ",")
 PLAIN_SIGNS = frozenset("0123456789+-.eE")
 NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+SEPARATOR_LINE = re.compile(r"sep=[,;\t]?", re.IGNORECASE)
 MOST_COLUMNS = 4096
+MIDNIGHT = " 00:00:00"  # of a date in a cell of Excel
 ZONE_HEADER = re.compile(r"[\[(]((?:UTC|GMT|Z)(?:[+-][\d:]+)?|[+-][\d:]+)[\])]$")
 
 
@@ -111,6 +113,16 @@ class CsvRows:
         if known is None:
             return values
         return known.si(values) + (ambient if known.gauge and dimension == "pressure" else 0.0)
+
+    def with_dates(self, date: str, clock: str) -> "CsvRows":
+        """Rows with a further column of dates with times of the day, from a column of each. Raises ValueError."""
+        first, second = self.column(date, 0), self.column(clock, 0)
+        texts = [f"{row[first].removesuffix(MIDNIGHT)} {row[second]}" for row in self.cells]
+        if not begins_as_stamp(texts[0]):
+            text = f"{self.file}: {show(texts[0])} of the columns {show(date)} and {show(clock)} is not a date"
+            raise ValueError(f"{text}; expected a column of dates and a column of times of the day")
+        cells = [[*row, text] for row, text in zip(self.cells, texts, strict=True)]
+        return replace(self, header=[*self.header, self.header[first]], cells=cells)
 
     def seconds(
         self, column: int, start: Any, order: str | None = None, zone: str | None = None
@@ -227,7 +239,8 @@ def number(text: str) -> float | None:
 def read_rows(path: Path, sheet: str | None = None) -> CsvRows:
     """Read header and rows of a CSV file or of a sheet of an Excel workbook.
 
-    Empty lines and lines that begin with # are skipped. sheet : name of the sheet, None for the only one
+    Empty lines, lines that begin with #, and a first line `sep=;` are skipped.
+    sheet : name of the sheet, None for the only one
     Raises ValueError for a file that cannot be read, a missing header, or rows that do not match the header.
     """
     if path.suffix.lower() in SPREADSHEETS:
@@ -244,6 +257,8 @@ def read_rows(path: Path, sheet: str | None = None) -> CsvRows:
         for n, line in enumerate(read_text(path).splitlines(), 1)
         if line.strip() and line[0] != "#"
     ]
+    if lines and SEPARATOR_LINE.fullmatch(lines[0][1].strip()):  # which Excel writes and reads
+        del lines[0]
     if len(lines) < 2:
         raise ValueError(f"{path.name} has no rows; expected a header and rows of numbers")
     readings = {
@@ -365,19 +380,26 @@ def copy_name(path: Path, setting: ReadContext) -> str:
 
 def read_columns(
     path: Path, keys: dict[str, Any], dimension: str, setting: ReadContext
-) -> tuple[np.ndarray, np.ndarray, str, str]:
-    """(times [s], values [SI, pressures absolute], header of the times, header of the values) of a table file.
+) -> tuple[np.ndarray, np.ndarray, str | list[str], str]:
+    """(times [s], values [SI, pressures absolute], header(s) of the times, header of the values) of a table file.
 
     Times and values are float64[n].
     keys : as read: `time`, `value`, headers of the columns, with or without unit, None for the first and the second
-    column; `unit` of the values if their header has none, "" for SI; and those of `DATE_KEYS` and `SHEET_KEY`
+    column, and for `time` also the headers of a column of dates and of a column of times of the day;
+    `unit` of the values if their header has none, "" for SI; and those of `DATE_KEYS` and `SHEET_KEY`
     Raises ValueError with the faulty line of the file.
     """
     rows = read_rows(path, keys["sheet"])
-    time_column, value_column = rows.column(keys["time"], 0), rows.column(keys["value"], 1)
+    value_column = rows.column(keys["value"], 1)
+    if isinstance(keys["time"], tuple):
+        time_header: Any = list(keys["time"])
+        rows, time_column = rows.with_dates(*keys["time"]), len(rows.header)
+    else:
+        time_column = rows.column(keys["time"], 0)
+        time_header = rows.header[time_column]
     t = rows.seconds(time_column, setting.start_time, keys["date_order"], keys["time_zone"])
     v = rows.numbers(value_column, dimension, setting.ambient, keys.get("unit", ""))
-    return t, v, rows.header[time_column], rows.header[value_column]
+    return t, v, time_header, rows.header[value_column]
 
 
 def stated_keys(keys: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import datetime
 from typing import TYPE_CHECKING, Any
 
-from fvsolve.parts.value import VALUE, Choice, ReadContext, Value
+from fvsolve.parts.value import PROFILE, VALUE, Choice, ReadContext, Value
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class StartTimeValue(Value):
         "date and time of the day at t = 0, with or without a zone; results then have real times, and files of time "
         "series may have dates"
     )
-    changes = VALUE
+    changes = PROFILE
     takes = f"date-time, `{EXAMPLE}`"
     schema = {"type": "string", "examples": [EXAMPLE]}
 
@@ -49,6 +49,27 @@ class StartTimeValue(Value):
                 f"{show(text)} has more than six digits after the seconds; expected at most six"
             )
         return StartTime(stamp)
+
+
+class TimeColumns(Value):
+    """Value of a case file for the header of the column of times, or of columns of dates and of times of the day."""
+
+    about = (
+        "header of the column of times, or headers of a column of dates and of a column of times of the day; the first "
+        "column if left out"
+    )
+    changes = VALUE
+    takes = '`"t"`, `["date", "time"]`'
+    schema = {"type": ["string", "array"], "items": {"type": "string"}}
+
+    def read(self, given: Any, setting: ReadContext) -> str | tuple[str, str]:
+        if isinstance(given, str):
+            return given
+        texts = isinstance(given, (list, tuple)) and all(isinstance(item, str) for item in given)
+        if not texts or len(given) != 2:
+            text = f"{show(given)} is not the header of a column"
+            raise ValueError(f'{text}; expected for example "t", or ["date", "time"]')
+        return tuple(given)
 
 
 class ZoneValue(Value):

@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.date_keys import DATE_KEYS
+from fvsolve.parts.date_keys import DATE_KEYS, TimeColumns
 from fvsolve.parts.table_model import SHEET_KEY, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
@@ -196,7 +196,7 @@ class Scheduled(Value):
             },
             "file": {
                 "file": (Text(), NEEDED),
-                "time": (Text(), None),
+                "time": (TimeColumns(), None),
                 "value": (Text(), None),
                 "unit": (Text(), ""),
                 **SHEET_KEY,

@@ -122,6 +122,8 @@ def test_printed_results_name_the_dates(runs, fvs, tmp_path):
         assert line in text
     [verdict] = [line for line in text.splitlines() if "high: pressure" in line]
     assert f"s ({START[:14]}" in verdict
+    note = fvs("check", runs["dated"].directory / "case.toml", "--set", "numerics.end=70")[1]
+    assert "90 s (2026-03-01T06:01:30Z), after the end of the run at 70 s (2026" in note
     plain = fvs("run", runs["plain"].directory / "case.toml", "--out", tmp_path / "plain")[1]
     assert "2026" not in plain
 

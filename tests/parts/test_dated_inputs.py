@@ -3,6 +3,7 @@
 import datetime
 
 import numpy as np
+import pandas
 import pytest
 from reference.dated_cases import FLOWS, STAMPS, START, TIMES, fed, table
 from reference.rainfall import OPEN, field
@@ -48,6 +49,43 @@ def test_fractions_of_seconds_are_those_of_a_column_of_seconds(tmp_path, monkeyp
     plain = fed({"file": table(tmp_path / "plain.csv", seconds, values, "t [s];flow [l/s]")}, None)
     found = [fvsolve.load(case).nodes["source"].flow.time.tolist() for case in (dated, plain)]
     assert found[0] == found[1] == seconds
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_european_file_of_excel_gives_the_schedule(coding, ending, tmp_path, monkeypatch):
+    """Its first line states the separator; dates have dots, numbers have decimal commas, and cells have quotes."""
+    monkeypatch.chdir(tmp_path)
+    rows = [
+        f"{stamp};{str(flow).replace('.', ',')}" for stamp, flow in zip(GERMAN, FLOWS, strict=True)
+    ]
+    text = ending.join(["sep=;", '"Zeit (MEZ)";"Abfluß [l/s]"', *rows, ""])
+    (tmp_path / "q.csv").write_bytes(text.encode(coding))
+    case = fvsolve.load(fed({"file": "q.csv", "time_zone": "+01:00"}, "2026-03-01T05:00:00Z"))
+    assert case.nodes["source"].flow.time.tolist() == list(TIMES)
+
+
+@pytest.mark.parametrize("form", ["csv", "xlsx"])
+def test_a_column_of_dates_and_a_column_of_clock_times_are_dates(form, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    days = [datetime.datetime.fromisoformat(text) for text in STAMPS]
+    rows = [(day.date(), day.time(), flow) for day, flow in zip(days, FLOWS, strict=True)]
+    frame = pandas.DataFrame(rows, columns=["Datum", "Uhrzeit", "Q [l/s]"])
+    if form == "csv":
+        frame.to_csv("q.csv", index=False, sep=";", decimal=",", date_format="%d.%m.%Y")
+    else:
+        frame.to_excel("q.xlsx", index=False)
+    given = {"file": f"q.{form}", "time": ["Datum", "Uhrzeit"], "value": "Q"}
+    case = fed(given, START[:-1], compare={"main.flow": given})
+    fvsolve.run(case, out="run")
+    for found in (fvsolve.load(case), fvsolve.load("run/case.toml")):
+        assert found.nodes["source"].flow.time.tolist() == list(TIMES)
+        assert found.compare["main.flow"].t.tolist() == list(TIMES)
+    assert "is not a date; expected a column of dates" in str(
+        refused(fed(given | {"time": ["Q", "Uhrzeit"]}, START[:-1]))
+    )
+    for bad in (["Datum"], 5):
+        assert "flow.time: " in str(refused(fed(given | {"time": bad}, START[:-1])))
 
 
 def test_a_header_may_state_the_zone(tmp_path, monkeypatch):
@@ -222,6 +260,17 @@ def test_a_faulty_start_time_is_the_only_fault_of_a_file_with_dates(
     monkeypatch.chdir(tmp_path)
     error = refused(fed({"file": table(tmp_path / "q.csv")}, start))
     assert message in str(error) and len(error.faults) == 1
+
+
+@pytest.mark.parametrize("year, end", [("2025", "before"), ("2027", "after"), ("2026", None)])
+def test_a_file_outside_the_run_is_noted_with_its_dates(year, end, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    stamps = [text.replace("2026", year) for text in STAMPS]
+    case = fvsolve.load(fed({"file": table(tmp_path / "q.csv", stamps)}))
+    texts = [notice.text for notice in case.notices if "outside the run" in notice.text]
+    assert len(texts) == (end is not None)
+    for text in texts:
+        assert f"s ({year}-03-01T06:00:00Z) to" in text and "100 s (2026-03-01T06:01:40Z)" in text
 
 
 def test_a_changed_start_time_moves_the_schedule_of_an_earlier_case(tmp_path, monkeypatch):

@@ -238,17 +238,17 @@ class SloshingCheck:
 
     def notices(self) -> list[Notice]:
         """Notices for waves that were not small, and for changes of weight that the waves neglect."""
-        notices, amount = [], self.model.case.amount
+        notices, moment = [], self.model.case.moment
         rows = zip(self.tanks, self.restart_data.tolist(), strict=True)
         for (name, *_), (height, rise_time, change, change_time) in rows:
             if height > SMALL_WAVE:
-                text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
+                text = f"{name}: at {moment(rise_time, 4)} its water rises by {height:.2g} of its depth, but "
                 text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'
                 notices.append(
                     Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL_WAVE)
                 )
             if change > WEIGHT_CHANGE:
-                text = f"{name}: at {amount(change_time, 'time')} the vertical acceleration of its body changes the "
+                text = f"{name}: at {moment(change_time, 4)} the vertical acceleration of its body changes the "
                 text += f"weight of its water by a fraction of {change:.2g}; the waves do not include this change"
                 notices.append(Notice("weight", f"nodes.{name}", text, None, change, WEIGHT_CHANGE))
         return notices
