@@ -7,6 +7,7 @@ import numpy as np
 import pandas
 import pytest
 import xarray
+from reference.browser import browser
 from reference.dated_cases import FLOWS, START, TIMES, fed, table
 from reference.resumed_runs import killed_and_resumed
 from reference.scenes import scene
@@ -142,6 +143,18 @@ def test_pictures_and_report_have_axes_of_dates(runs, fvs):
     axis = '"range":["2026-03-01 06:00:00.000000","2026-03-01 06:01:40.000000"],"type":"date"'
     assert axis in page and "2026-03-01T06:01:" in page
     assert axis not in plain and "2026-03-01" not in plain
+
+
+def test_a_browser_in_another_zone_shows_the_dates_of_the_case(runs, fvs):
+    folder = runs["dated"].directory
+    assert fvs("report", folder)[0] == 0
+    with browser() as started:
+        page = started.new_page(timezone_id="America/New_York")
+        page.goto((folder / "report.html").as_uri())
+        page.wait_for_selector(".xtick text")
+        ticks = page.eval_on_selector_all(".xtick text", "all => all.map(one => one.textContent)")
+    first = [text for text in ticks if "Mar 1, 2026" in text]
+    assert first and all(text.startswith("06:00") for text in first), ticks
 
 
 @pytest.mark.parametrize("start", [START, "2026-03-01T07:00:00+01:00", "2026-03-01T06:00:00"])
