@@ -28,6 +28,7 @@ from fvsolve.case.sections import Output
 from fvsolve.core.fluid.laws import law_names
 from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.parts.formula import means, samples
+from fvsolve.parts.mesh_fields import NODES
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
@@ -296,16 +297,20 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
                 ]
             )
         groups = [wall.group for wall in (getattr(basin, "walls", None) or {}).values()]
-        mesh = read(setting.files[basin.mesh.file], basin.mesh.unit, groups)
+        bed = getattr(basin, "bed", None)
+        heights = bed is not None and bed.given == NODES
+        path, unit = setting.files[basin.mesh.file], basin.mesh.unit
+        mesh = read(path, unit, groups, heights, basin.mesh.ignore)
         mesh = replace(mesh, notes=(*mesh.notes, *stretch_notes(basin, mesh, setting)))
         return replace(mesh, interior=interior_patches(basin, mesh))
     except MeshError as error:
         if not basin.is_rectangle:  # the faults are in the mesh file, not in keys of the case
             name = Path(basin.mesh.file).name
-            places = [item.place == "unit" for item in error.faults]
+            keys = ("unit", "ignore")
+            places = [item.place if item.place in keys else "" for item in error.faults]
             raise ValueFault(
                 [
-                    (("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
+                    (("mesh", key), item.message) if key else (("mesh",), f"{name}: {item}")
                     for key, item in zip(places, error.faults, strict=True)
                 ]
             ) from None

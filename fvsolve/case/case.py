@@ -29,6 +29,7 @@ from fvsolve.core.schemes import SCHEMES
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.parts import Link, Node, Pipe, Scalar
+from fvsolve.parts.date_keys import moment_text
 from fvsolve.parts.nodes_and_links import NETWORK_DOMAINS
 from fvsolve.parts.pipe.pipe_wall import OF_WALL, elastic_compliance, heat_retardation
 from fvsolve.parts.table_model import plain_value
@@ -313,7 +314,12 @@ class Case(Displayable):
             case_notices.end_notices(self),
             case_notices.unread_notices(self),
         )
-        return [notice for notices in found for notice in notices]
+        result = [notice for notices in found for notice in notices]
+        if self.numerics.start_time is not None:
+            from fvsolve.case.dated_notices import outside_notices
+
+            result += outside_notices(self)
+        return result
 
     @cached_property
     def elevations_stated(self) -> bool:
@@ -379,6 +385,10 @@ class Case(Displayable):
         if span:
             return f"{units.find(units.span(unit), dimension).number(value):.{digits}g} {units.span(unit)}"
         return f"{units.convert(value, dimension, unit, self.ambient_pressure):.{digits}g} {unit}"
+
+    def moment(self, t: float, digits: int = 6) -> str:
+        """Text of the time t [s] in the unit of `[output]`, with its date if the case has a start time."""
+        return moment_text(self.amount(t, "time", digits), t, self.numerics.start_time)
 
     def step_amount(self, step: float, digits: int = 6) -> str:
         """Text of a time step [s], in the unit of times in `[output]`, or in s if that unit is longer than 1 s."""

@@ -218,7 +218,7 @@ def end_notices(case: Any) -> list[Notice]:
         for name, part in parts.items():
             for key, time in starts_after_end(part, end):
                 place = f"{group}.{name}"
-                late, last = (case.amount(t, "time", 6) for t in (time, end))
+                late, last = (case.moment(t) for t in (time, end))
                 verb = "occurs at" if key == "trip" else "continues to"
                 text = f"{place}.{key}: {verb} {late}, after the end of the run at {last}"
                 result.append(Notice("end", place, text, key, time, end))

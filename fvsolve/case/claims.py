@@ -25,7 +25,8 @@ from fvsolve.case.probe import (
 from fvsolve.case.reading import Reading
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.table_model import check_table, read_keys
+from fvsolve.parts.date_keys import DATE_KEYS, TimeColumns
+from fvsolve.parts.table_model import SHEET_KEY, check_table, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     VALUE,
@@ -88,20 +89,23 @@ class Compare:
     time, value : headers of the columns of the CSV file
     shift : time that is added to the measured times [s]
     t, v : float64[n]  measured times without shift [s], and values [SI, pressures absolute]
+    stated : further keys that the file of the case states, such as `time_zone`
     """
 
     probe: Probe
     file: str
     path: Path
-    time: str
+    time: str | list[str]
     value: str
     shift: float
     t: np.ndarray = field(repr=False)
     v: np.ndarray = field(repr=False)
+    stated: dict[str, Any] = field(default_factory=dict)
 
     def table(self) -> dict[str, Any]:
         """Keys of the series as in a file."""
-        return {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
+        keys = {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
+        return keys | self.stated
 
 
 def read_expect(
@@ -222,8 +226,11 @@ def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
 
 
 COMPARE_KEYS = {
-    "file": (val.Text("CSV file with a header; path relative to the case file", VALUE), NEEDED),
-    "time": (val.Text("header of the column of times; the first column if left out", VALUE), None),
+    "file": (
+        val.Text("CSV file or Excel workbook with a header; path relative to the case file", VALUE),
+        NEEDED,
+    ),
+    "time": (TimeColumns(), None),
     "value": (
         val.Text("header of the column of values; the second column if left out", VALUE),
         None,
@@ -232,12 +239,14 @@ COMPARE_KEYS = {
         Quantity("time", about="time shift, added to the times of the file [s]", changes=VALUE),
         0.0,
     ),
+    **SHEET_KEY,
+    **DATE_KEYS,
 }
 
 
 def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compare | None:
     """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError if entry or file are invalid."""
-    from fvsolve.parts.csv_rows import copy_name, find_file, read_columns
+    from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, stated_keys
 
     check_table(given, 'for example { file = "rig.csv" }')
     values = read_keys(given, COMPARE_KEYS, setting)
@@ -245,12 +254,11 @@ def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compa
         path = find_file(values["file"], setting)
         if probe is None:
             return None
-        t, v, *headers = read_columns(
-            path, values["time"], values["value"], probe.dimension, setting
-        )
+        t, v, *headers = read_columns(path, values, probe.dimension, setting)
     except ValueError as error:
         raise ValueFault([(("file",), str(error))]) from None
-    return Compare(probe, copy_name(path, setting), path, *headers, values["shift"], t, v)
+    name, stated = copy_name(path, setting), stated_keys(values)
+    return Compare(probe, name, path, *headers, values["shift"], t, v, stated)
 
 
 class Bound(val.Value):

@@ -40,6 +40,7 @@ from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Pipe, Scalar
 from fvsolve.parts import value as val
 from fvsolve.parts.carried_scalar import ZEROS
+from fvsolve.parts.date_keys import StartTimeValue
 from fvsolve.parts.nodes_and_links import is_kind
 from fvsolve.parts.pipe.pipe_wall import OF_WALL
 from fvsolve.parts.schedule import Schedule, Scheduled, signal_fault
@@ -162,8 +163,7 @@ def _read_all(reading: Reading, previous: Case | None) -> Case:
     given = reading.raw.table.get("fluid", reading.needs_no_fluid)
     fluid, state = reading.reuse(("fluid",), given, functools.partial(read_fluid, reading))
     numerics = reading.table("numerics", Numerics)
-    if (times := numerics or valid_times(reading)) is not None and times.start < times.end:
-        reading.setting.span = times.start, times.end
+    read_calendar(reading, numerics or valid_times(reading))
     check_names(reading)
     cut = part_reading.cut_pipes(reading, state, numerics)
     scalars = read_scalars(reading)
@@ -308,15 +308,19 @@ def read_general(reading: Reading) -> dict[str, Any]:
 def reusable_values(reading: Reading, previous: Case | None) -> dict[tuple, tuple[Any, Any]]:
     """Values of an earlier case that hold in this case if their raw values are the same : as `Reading.known`.
 
-    There are none if the ambient pressure changes, on which all gauge pressures depend, or defaults of parts change.
+    There are none if the ambient pressure changes, on which all gauge pressures depend, if the start time changes, from
+    which dates count, or if defaults of parts change.
     """
     if previous is None or previous.ambient_pressure != reading.setting.ambient:
         return {}
+    # times of files with dates count from the start time
+    stated = [raw.get("numerics") for raw in (previous.raw, reading.raw.table)]
+    if len({str(table.get("start_time")) for table in stated if isinstance(table, dict)}) != 1:
+        return {}
     now, before = reading.raw.table, previous.raw
     same = now.get("defaults") == before.get("defaults")
-    same = same and defaults_of(now, "pipe") == defaults_of(
-        before, "pipe"
-    )  # with those of [numerics]
+    # with those of [numerics]
+    same = same and defaults_of(now, "pipe") == defaults_of(before, "pipe")
     return previous.read if same else {}
 
 
@@ -498,6 +502,35 @@ def valid_times(reading: Reading) -> Numerics | None:
     valid = reading.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
     times = {key for key in ("start", "end") if valid is not None and key in given}
     return valid if "end" in times and times <= valid.model_fields_set else None
+
+
+def read_calendar(reading: Reading, numerics: Numerics | None) -> None:
+    """Store start and end of the run and the instant of t = 0 in the context of values.
+
+    numerics : table as far as it is valid, None if faulty
+    """
+    if numerics is not None and numerics.start < numerics.end:
+        reading.setting.span = numerics.start, numerics.end
+    reading.setting.start_time = read_start_time(reading, numerics)
+
+
+def read_start_time(reading: Reading, numerics: Numerics | None) -> Any:
+    """Instant of t = 0 of `[numerics]`: None without one, UNREAD if it is faulty.
+
+    Adds a fault if the run leaves the calendar. numerics : table as far as it is valid, None if faulty
+    """
+    given = reading.raw.table.get("numerics")
+    if not isinstance(given, dict) or "start_time" not in given:
+        return None
+    try:
+        start = StartTimeValue().read(given["start_time"], reading.setting)
+    except ValueError:
+        return val.UNREAD
+    if numerics is not None and not start.holds(numerics.start, numerics.end):
+        text = f"{start.table()} with a run from {numerics.start:g} s to {numerics.end:g} s leaves the years 1 to 9999"
+        reading.fault(("numerics", "start_time"), f"{text}; expected a run within these years")
+        return val.UNREAD
+    return start
 
 
 def check_parts(

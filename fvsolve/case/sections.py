@@ -18,6 +18,7 @@ from fvsolve.declarations import Declarations
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.exact import NAMES
 from fvsolve.parts import value as val
+from fvsolve.parts.date_keys import StartTimeValue
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, RunTimes, Table, check_table, read_keys
 from fvsolve.parts.value import (
@@ -276,6 +277,7 @@ class Numerics(Table):
 
     end: Annotated[float, Quantity("time", about="end time of the run [s]")]
     start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
+    start_time: Annotated[Any, StartTimeValue()] = None
     initial: Annotated[
         str,
         Choice(
@@ -635,26 +637,25 @@ class Gauge(Table):
 
 
 class Gauges(NamedTables):
-    """Value of a case file for gauges: tables by name, or a CSV file with a row for each gauge."""
+    """Value of a case file for gauges: tables by name, or a table file with a row for each gauge."""
 
     columns = ("name", "basin", "x", "y")
     schema = {"type": "object", "additionalProperties": {"type": ["object", "string"]}}
 
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if isinstance(given, dict) and isinstance(given.get("file"), str):
-            if len(given) > 1:
-                other = next(key for key in given if key != "file")
+            if other := next((key for key in given if key not in ("file", "sheet")), ""):
                 raise ValueError(
                     f"file and {other} are given; expected all gauges in the file, or all in this table"
                 )
-            given = self.rows(given["file"], setting)
+            given = self.rows(given, setting)
         return super().read(given, setting)
 
-    def rows(self, file: str, setting: ReadContext) -> dict[str, Any]:
-        """Tables of the gauges of a file by name. Raises ValueError for faults of the file."""
-        from fvsolve.parts.csv_rows import CsvError, find_file, read_rows
+    def rows(self, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+        """Tables of the gauges of a table { file, sheet } by name. Raises ValueError for faults of the file."""
+        from fvsolve.parts.csv_rows import CsvError, read_table_file
 
-        rows = read_rows(find_file(file, setting))
+        _, rows, _ = read_table_file(given, setting)
         name, basin, x, y = (rows.column(column, 0) for column in self.columns)
         tables: dict[str, Any] = {}
         points = zip(

@@ -1,6 +1,7 @@
 """TOML text of a case, and line numbers of the keys in a TOML text."""
 
 import bisect
+import datetime
 import json
 import re
 import tomllib
@@ -76,6 +77,8 @@ def inline(value: Any) -> str:
         )
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(inline(item) for item in value) + "]"
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
     return repr(value)
 
 

@@ -194,9 +194,7 @@ def ledger_text(result, case, folder) -> Iterator:
         yield mark, "yellow"
     cut = result.reason == "interrupted"
     ended = (
-        f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}"
-        if result.ok or cut
-        else result.reason
+        f"{result.reason} at t = {case.moment(result.t[-1])}" if result.ok or cut else result.reason
     )
     yield (
         f"{ended}; {result.steps} steps{f': the ledger ends at this time, {RESTARTS}' if cut else ''}",

@@ -13,6 +13,7 @@ from fvsolve.core.output.summary_shape import IN_WORDS, OPEN, LimitVerdict
 from fvsolve.core.output.unit_columns import UnitColumn, column
 from fvsolve.core.run.result import not_valid
 from fvsolve.errors import listing
+from fvsolve.parts.date_keys import moment_text, start_time_in
 from fvsolve.parts.nodes_and_links import kind_text
 from fvsolve.units import span
 
@@ -157,9 +158,9 @@ def time_column(summary: dict):
 
 
 def time_formatter(summary: dict) -> Callable[[float], str]:
-    """Function that formats a time [s] in the time unit of a run, from its summary."""
-    clock = time_column(summary)
-    return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
+    """Function that formats a time [s] in the time unit of a run, with its date if the run has a start time."""
+    clock, start = time_column(summary), start_time_in(summary)
+    return lambda t: moment_text(f"{_number(float(clock.from_si(t)))} {clock.unit}", t, start)
 
 
 def files_text(run) -> Iterator:
@@ -394,15 +395,16 @@ def difference_text(results: dict, summary: dict) -> Iterator:
 
 def _extremes(run) -> Iterator:
     clock = UnitColumn("at", "time", run.summary["time_unit"])
+    start = start_time_in(run.summary)
     missing = not_valid(run.summary) or "-"
     rows = [
         [
             name,
             run.units[name],
             missing if extreme.minimum is None else _number(extreme.minimum),
-            _number(_in_unit(clock, extreme.t_min)),
+            moment_text(_number(_in_unit(clock, extreme.t_min)), extreme.t_min, start),
             missing if extreme.maximum is None else _number(extreme.maximum),
-            _number(_in_unit(clock, extreme.t_max)),
+            moment_text(_number(_in_unit(clock, extreme.t_max)), extreme.t_max, start),
         ]
         for name, extreme in run.extremes.items()
     ]

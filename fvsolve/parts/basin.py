@@ -334,17 +334,41 @@ class File(Value):
         return {"type": "string"}
 
 
+class GroupNames(Value):
+    """Value of a case file: names of groups of a mesh file."""
+
+    takes = "list of names"
+    schema = {"type": "array", "items": {"type": "string"}}
+
+    def __init__(self, about: str) -> None:
+        self.about = about
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
+        if not isinstance(given, (list, tuple)) or not all(isinstance(x, str) for x in given):
+            raise ValueError(
+                f'{show(given)} is not a list of names; expected for example ["section 1"]'
+            )
+        return tuple(given)
+
+
 class BasinMesh(Table):
     """A mesh of triangles and quadrilaterals, whose groups of lines are patches; or square cells over a raster."""
 
     raster_keys: ClassVar[tuple[str, ...]] = ("cell", "outside", "band", "variable")
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"), ("unit", "raster"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("file", "raster"),
+        ("unit", "raster"),
+        ("ignore", "raster"),
+    )
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("file", "raster"),)
 
     file: Annotated[str | None, File("mesh file that meshio reads, path relative to the case")] = (
         None
     )
     unit: Annotated[str, Text("unit of the coordinates of the file")] = "m"
+    ignore: Annotated[
+        tuple[str, ...], GroupNames("groups of lines of the file that are no patches")
+    ] = ()
     raster: Annotated[str | None, File("raster that the cells cover, instead of a mesh file")] = (
         None
     )
@@ -377,7 +401,7 @@ class BasinMesh(Table):
         return {
             key: value
             for key, value in super().table().items()
-            if key not in others and value != ""
+            if key not in others and value not in ("", [])
         }
 
 

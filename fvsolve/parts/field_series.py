@@ -9,11 +9,14 @@ import numpy as np
 from fvsolve import units
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey, means, samples
 from fvsolve.parts.raster import Raster, open_raster, raster_keys
+from fvsolve.parts.raster_files import Pixels
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import keys_json, read_keys
-from fvsolve.parts.value import ReadContext, ValueFault
+from fvsolve.parts.time_stamps import StampError, read_stamp
+from fvsolve.parts.value import UNREAD, ReadContext, ValueFault
 from fvsolve.units import DIMENSIONS, show
 
+SINGLE_DIGIT = re.compile(r"(?<!\d)(?=\d(?!\d))(?<![.,])")  # before a number of a single digit
 OF_PLACE = re.compile(r"\b[xy]\b")  # in a formula
 
 
@@ -67,11 +70,32 @@ def read_series(given: dict[str, Any], dimension: str, setting: ReadContext) -> 
     )
     return SpatialSeries(
         stated,
-        np.zeros(1) if pixels.times is None else pixels.times,
+        np.zeros(1) if pixels.times is None else frame_times(name, pixels, setting.start_time),
         tuple(fields),
         least,
         float(np.nanmax(frames)),
     )
+
+
+def frame_times(name: str, pixels: Pixels, start: Any) -> np.ndarray:
+    """Times t of the frames of a raster [s], from their dates if there are dates and a start time.
+
+    start : instant of t = 0 (`StartTime`), None without one, UNREAD if it is faulty
+    A reference date without a zone is in UTC, after CF; in a case in local time it is local too.
+    Raises ValueError for a reference that is not a date of our calendar.
+    """
+    if pixels.clock is None or start is None or start is UNREAD:
+        return pixels.times
+    reference, first = pixels.clock
+    padded = SINGLE_DIGIT.sub("0", reference)
+    try:
+        zero = start.seconds(read_stamp(padded, offset=None))
+    except StampError:
+        try:
+            zero = start.seconds(read_stamp(f"{padded}Z"))
+        except StampError as error:
+            raise ValueError(f"{name}, times since {reference}: {error}") from None
+    return zero + first + pixels.times
 
 
 class ScheduledField(Scheduled):

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+from fvsolve.parts.csv_rows import CsvRows, read_table_file
 from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, ValueFault, anything
 from fvsolve.units import show
 
@@ -366,6 +366,12 @@ class SpatialFieldKey(Value):
             return SpatialField(given, Arithmetic(given, str(error)))
 
     def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
+        if "groups" in given:
+            from fvsolve.parts.mesh_fields import read_group_values  # few meshes have groups
+
+            return SpatialField(
+                *read_group_values(given, Quantity(self.dimension, self.range), setting)
+            )
         if "raster" in given:
             try:
                 from fvsolve.parts.raster import read_raster  # only fields of files need it
@@ -375,19 +381,18 @@ class SpatialFieldKey(Value):
                 raise
             except ValueError as error:
                 raise ValueFault([(("raster",), str(error))]) from None
-        if set(given) != {"file"} or not isinstance(given["file"], str):
+        if "file" not in given:
             text = f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
             raise ValueError(f'{text}, or {{ raster = "NAME.tif" }}')
+        if isinstance(name := given["file"], str) and Path(name).suffix.lower() in RASTER_SUFFIXES:
+            text = f"{show(name)} is a raster; expected {{ raster = {show(name)} }}"
+            raise ValueFault([(("file",), text)])
+        _, rows, stated = read_table_file(given, setting)
         try:
-            path = find_file(given["file"], setting)
-            if path.suffix.lower() in RASTER_SUFFIXES:
-                raise ValueError(
-                    f"{show(given['file'])} is a raster; expected {{ raster = {show(given['file'])} }}"
-                )
-            columns = read_points(path, self.dimension)
+            columns = read_points(rows, self.dimension)
         except ValueError as error:
             raise ValueFault([(("file",), str(error))]) from None
-        return SpatialField({"file": copy_name(path, setting)}, Samples(columns))
+        return SpatialField(stated, Samples(columns))
 
     @property
     def takes(self) -> str:
@@ -417,17 +422,16 @@ class NumberOrField(Value):
         return f"{self.number.takes}; formula; raster"
 
 
-def read_points(path: Path, dimension: str) -> np.ndarray:
-    """Points of a CSV file : float64[n, 3] with x [m], y [m] and the value [SI].
+def read_points(rows: CsvRows, dimension: str) -> np.ndarray:
+    """Points of a table file : float64[n, 3] with x [m], y [m] and the value [SI].
 
     Raises ValueError with the faulty line. dimension : dimension of the value
     """
-    rows = read_rows(path)
     if len(rows.header) != 3:
-        raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
+        raise ValueError(f"{rows.file} has {len(rows.header)} columns; expected x, y and the value")
     if len(rows.lines) < 3:
         raise ValueError(
-            f"{path.name}: too few points ({len(rows.lines)}); expected at least three"
+            f"{rows.file}: too few points ({len(rows.lines)}); expected at least three"
         )
     return np.column_stack(
         [rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))]
@@ -513,12 +517,10 @@ def samples(shape: SpatialField | None, mesh: Any) -> np.ndarray:
     """Values of a formula at points in the n cells of a mesh : float64[points, n]; zeros if `shape` is None.
 
     On full rectangular grids there are nine Gauss points per cell, in the order of `GAUSS`; on other meshes there is
-    only the centre. The values of a raster are its means over the cells, at all points.
+    only the centre. The values of a raster, of groups and of nodes are means over the cells, at all points.
     """
     if shape is not None:
-        from fvsolve.parts.raster import Raster  # only cases with basins need it
-
-        if isinstance(shape.rule, Raster):
+        if hasattr(shape.rule, "over"):  # of a raster, of groups or of nodes of the mesh
             mean = shape.rule.over(mesh)
             return np.broadcast_to(mean, (len(GAUSS) if is_grid(mesh) else 1, mean.size))
     x, y = np.ascontiguousarray(mesh.centre.T)

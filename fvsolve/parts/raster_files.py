@@ -43,6 +43,7 @@ EVEN = 1e-4  # of the spacing: greatest distance of a coordinate from an even gr
 SINCE = re.compile(
     r"\s*(s|min|h|d|sec|hr|second|minute|hour|day)s?\s+since\s+(\S.*)", re.IGNORECASE
 )
+CALENDARS = ("standard", "gregorian", "proleptic_gregorian")  # of dates as ours
 # along y, after CF
 NORTH = re.compile("y|northing|lat(itude)?|projection_y_coordinate", re.IGNORECASE)
 
@@ -53,6 +54,7 @@ class Pixels(NamedTuple):
     values : float64[ny, nx]  rows from south to north, NaN without data
     x, y : south-west corner [m]; dx, dy : size of a pixel [m]; unit, crs : as stated, "" if unknown
     metric : True if the file states that its coordinates are lengths
+    clock : (text of the reference date of the times, time of the first frame after it [s]); None without a date
     times : float64[frames]  of a series of frames since the start of the run [s], with values : float64[frames, ny, nx]
     """
 
@@ -65,6 +67,7 @@ class Pixels(NamedTuple):
     crs: str = ""
     times: np.ndarray | None = None
     metric: bool = False
+    clock: tuple[str, float] | None = None
 
     @property
     def hint(self) -> str:
@@ -377,13 +380,13 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         )
     check_count(file, *item.shape[-2:])
     (x, dx), (y, dy) = (_even(file, key, known[key]) for key in (along, across))
-    (*outer, _, _), times = item.shape, None
+    (*outer, _, _), times, clock = item.shape, None, None
     if np.prod(outer) != 1 and not (series and len(outer) == 1 and outer[0]):
         raise ValueError(
             f"{file}: {name or planes[0]} has {np.prod(outer):.0f} planes; expected one at a single time"
         )
     if np.prod(outer) != 1:
-        times = _frame_times(file, item.dimensions[0], known)
+        times, clock = _frame_times(file, item.dimensions[0], known)
     values = item.read().reshape((*outer, *item.shape[-2:])[-3 if times is not None else -2 :])
     values = values.swapaxes(-1, -2) if turned else values
     values = values[..., :: -1 if dy < 0.0 else 1, :: -1 if dx < 0.0 else 1].copy()
@@ -399,7 +402,16 @@ def _pixels_of(file: str, known: dict[str, NetcdfVariable], name: str, series: b
         raise ValueError(f"{file} {error}") from None
     metric = text.strip() != "" or "units" in known[along].attributes
     return Pixels(
-        values, x, y, abs(dx), abs(dy), str(item.attributes.get("units", "")), crs, times, metric
+        values,
+        x,
+        y,
+        abs(dx),
+        abs(dy),
+        str(item.attributes.get("units", "")),
+        crs,
+        times,
+        metric,
+        clock,
     )
 
 
@@ -410,8 +422,10 @@ def _is_northward(dimension: str, known: dict[str, NetcdfVariable]) -> bool:
     return any(NORTH.fullmatch(str(text)) for text in texts)
 
 
-def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.ndarray:
-    """Times of frames since the start of the run [s]: as stated "since start", otherwise since the first frame.
+def _frame_times(
+    file: str, name: str, known: dict[str, NetcdfVariable]
+) -> tuple[np.ndarray, tuple[str, float] | None]:
+    """(times of frames [s], `clock` of `Pixels`): as stated "since start", otherwise since the first frame.
 
     name : of the dimension of time; known : variables of the NetCDF file
     """
@@ -430,10 +444,12 @@ def _frame_times(file: str, name: str, known: dict[str, NetcdfVariable]) -> np.n
         check_increasing(times, times.tolist(), "times")
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from None
-    first = 0.0 if match[2].strip().lower() == "start" else times[0]
-    return units.find({"s": "s", "m": "min", "h": "h", "d": "d"}[match[1][0].lower()], "time").si(
-        times - first
-    )
+    unit = units.find({"s": "s", "m": "min", "h": "h", "d": "d"}[match[1][0].lower()], "time")
+    if match[2].strip().lower() == "start":
+        return unit.si(times), None
+    calendar = str(known[name].attributes.get("calendar", "standard")).lower()
+    reference = match[2].strip() if calendar in CALENDARS else f"{calendar} calendar"
+    return unit.si(times - times[0]), (reference, float(unit.si(float(times[0]))))
 
 
 def _even(file: str, name: str, item: NetcdfVariable) -> tuple[float, float]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import value as val
-from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.date_keys import DATE_KEYS, TimeColumns
+from fvsolve.parts.table_model import SHEET_KEY, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     Choice,
@@ -195,9 +196,11 @@ class Scheduled(Value):
             },
             "file": {
                 "file": (Text(), NEEDED),
-                "time": (Text(), None),
+                "time": (TimeColumns(), None),
                 "value": (Text(), None),
                 "unit": (Text(), ""),
+                **SHEET_KEY,
+                **DATE_KEYS,
                 "kind": kind,
             },
             "signal": {"signal": (Text(), NEEDED), "factor": (Quantity(self.dimension), None)},
@@ -278,16 +281,20 @@ class Scheduled(Value):
         )
 
     def _read_file(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
-        from fvsolve.parts.csv_rows import copy_name, find_file, read_columns, split_header
+        from fvsolve.parts.csv_rows import (
+            copy_name,
+            find_file,
+            read_columns,
+            split_header,
+            stated_keys,
+        )
 
         values = read_keys(given, self.forms["file"], setting)
         kind = values["kind"]
         try:
             path = find_file(values["file"], setting)
             unit = values["unit"]
-            t, v, *headers = read_columns(
-                path, values["time"], values["value"], self.dimension, setting, unit
-            )
+            t, v, *headers = read_columns(path, values, self.dimension, setting)
             if self.needs_unit and not unit and not split_header(headers[1])[1]:
                 unit = DIMENSIONS[self.dimension].example.split()[-1]
                 text = f"{path.name}, column {show(headers[1])} has no unit; expected for example `unit = {show(unit)}`"
@@ -303,7 +310,7 @@ class Scheduled(Value):
             "value": headers[1],
             "kind": kind,
         }
-        origin |= {"unit": unit} if unit else {}
+        origin |= ({"unit": unit} if unit else {}) | stated_keys(values)
         return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
 
     def _read_signal(self, given: dict[str, Any], setting: ReadContext) -> Schedule:

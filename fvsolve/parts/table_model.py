@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from fvsolve.errors import listing
 from fvsolve.parts.value import (
     NEEDED,
+    VALUE,
     ReadContext,
+    Text,
     Value,
     ValueFault,
     check_increasing,
@@ -75,6 +77,18 @@ class CaseContext(NamedTuple):
         """
         ends = [link.ports.get(port) for port in (first, second)]
         return None if None in ends else self.place_distance(*ends)
+
+
+SHEET_KEY: dict[str, tuple[Value, Any]] = {  # of a table file
+    "sheet": (
+        Text("name of a sheet of an Excel workbook; its only sheet if left out", VALUE),
+        None,
+    )
+}
+FILE_KEYS: dict[str, tuple[Value, Any]] = {  # of a value whose columns are in a table file
+    "file": (Text("CSV file or Excel workbook; path relative to the case file", VALUE), NEEDED),
+    **SHEET_KEY,
+}
 
 
 def read_keys(

@@ -19,6 +19,7 @@ from fvsolve.units import show
 
 ROOT = object()  # in the key path of a fault: the following keys start at the top of the case
 NEEDED = object()  # instead of a default: the key is required
+UNREAD = object()  # instead of a value: it is stated, but faulty
 
 OF_TIME = re.compile(r"[*/+(-] ?t\b(?![\w.])|(?<![\w.])t ?[*/+)<>^-]")  # formula with the name t
 CHANGING = ("control", "formula", "signal", "sum", "time")  # keys of schedules
@@ -122,6 +123,9 @@ class ReadContext:
     driven: dict[str, list[tuple[str, Range]]] = field(default_factory=dict)
     block_units: tuple[str, str] = ("number", "number")
     span: tuple[float, float] | None = None  # start and end of the run [s]; None if unknown
+    start_time: Any = (
+        None  # instant of t = 0 (`StartTime`); None without one, UNREAD if it is faulty
+    )
     # easting and northing [m] of the basin, and its CRS
     frame: tuple[tuple[float, float], str] = ((0.0, 0.0), "")
 

@@ -55,7 +55,7 @@ FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-seri
 
 
 class Series(NamedTuple):
-    """Series of a probe or of a measurement, in the units of history.csv.
+    """Series of a probe or of a measurement, in the units of history.csv; with a start time, `t` has dates.
 
     seen : True if it is visible at first; measured : True for a measurement
     """
@@ -86,7 +86,7 @@ def history_panels(result) -> list[HistoryPanel]:
     for (kind, unit), names in _by_panel(result, chosen).items():
         seen = names if len(names) <= SHOWN_LINES else _most_varying(result, names)
         lines = [
-            Series(name, *thin_series(result.t, result[name], points), name in seen)
+            Series(name, *thin_series(result.drawn_times, result[name], points), name in seen)
             for name in names
         ]
         lines += [
@@ -223,14 +223,14 @@ def with_devices_of_all(sections: Sequence[Section]) -> Section:
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
     """Figure of the series of a panel over time; shaded from the time `doubt`, from which results are not valid.
 
-    time_unit : unit of times; doubt : None if all results are valid
+    time_unit : unit of times, or zone of dates; doubt : None if all results are valid
     """
     data, names = [], [line.name for line in panel.lines if not line.measured]
     for line in panel.lines:
         place = names.index(line.name)
         colour = COLOURS[place % len(COLOURS)]
         dash = DASHES[place // len(COLOURS) % len(DASHES)]
-        trace = _line(line.name, packed_array(line.t), packed_array(line.values), colour, dash=dash)
+        trace = _line(line.name, time_data(line.t), packed_array(line.values), colour, dash=dash)
         if line.measured:
             trace |= {
                 "mode": "markers",
@@ -243,9 +243,11 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
     )
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
     if ends:
-        layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
+        first, last = min(a for a, _ in ends), max(b for _, b in ends)
+        layout["xaxis"] |= {"range": [axis_time(first), axis_time(last)]}
+        layout["xaxis"] |= {"type": "date"} if isinstance(first, np.datetime64) else {}
     if doubt is not None and ends:
-        layout["shapes"] = [_band(doubt, layout["xaxis"]["range"][1], DOUBT, 0.08)]
+        layout["shapes"] = [_band(axis_time(doubt), layout["xaxis"]["range"][1], DOUBT, 0.08)]
     layout |= {"yaxis": layout["yaxis"] | _range_at_rest(panel)}
     return {"data": data, "layout": layout}
 
@@ -253,6 +255,16 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
 def escape_markup(text: str) -> str:
     """Escape a text for plotly.js: no markup, and `$` does not begin a formula."""
     return html.escape(visible(str(text)), quote=False).replace("$", "&#36;")
+
+
+def axis_time(t: Any) -> float | str:
+    """Time on an axis of plotly.js: a number, or the text of a date without zone, which no browser shifts."""
+    return str(t).replace("T", " ") if isinstance(t, np.datetime64) else float(t)
+
+
+def time_data(t: np.ndarray) -> dict[str, str] | list[str]:
+    """Times of a series for plotly.js: packed numbers, or texts of dates."""
+    return [axis_time(at) for at in t] if t.dtype.kind == "M" else packed_array(t)
 
 
 def packed_array(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:

@@ -16,6 +16,7 @@ from fvsolve.core.run.result import not_valid
 from fvsolve.errors import visible
 from fvsolve.report import figures as plots
 from fvsolve.report import import_library, tables
+from fvsolve.report.dated_tables import all_with_dates, with_dates
 from fvsolve.report.draw.plot import probe_quantity, thin_series
 from fvsolve.report.grouped_notices import grouped_texts
 from fvsolve.report.long_section import (
@@ -64,11 +65,13 @@ def page(result, ways: list[SectionPath]) -> str:
 def _page(result, ways: list[SectionPath]) -> str:
     sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
-    probes = tables.extremes_of_probes(result)
+    start = result.start_time
+    probes = with_dates(tables.extremes_of_probes(result), start)
     told = [visible(text) for text in grouped_texts(item for item in result.warnings if item.ok)]
     if len(told) > MAX_WARNINGS:
         told[MAX_WARNINGS:] = [f"{len(told) - MAX_WARNINGS} more in summary.json"]
-    places = [*tables.worst_tables(result), *tables.ranked_pipes(result)]
+    places = all_with_dates([*tables.worst_tables(result), *tables.ranked_pipes(result)], start)
+    events = (tables.cavities(result), tables.events(result))
     filled = {
         **_words(result),
         "invalid": not_valid(result.summary),
@@ -78,9 +81,9 @@ def _page(result, ways: list[SectionPath]) -> str:
         "source": visible(result.case.source),
         "ended": result.summary.get("ended", ""),
         "words": tables.top_sentences(result),
-        "limits": tables.verdict_table(result),
-        "worst": tables.extremes_of_pipes(result, ways) or probes,
         "maps": [*_maps(result, figures), *_network_plans(result, figures)],
+        "limits": with_dates(tables.verdict_table(result), start),
+        "worst": with_dates(tables.extremes_of_pipes(result, ways), start) or probes,
         "sections": _sections(result, sections, figures),
         "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(plots.chosen_probes(result)),
@@ -88,7 +91,7 @@ def _page(result, ways: list[SectionPath]) -> str:
         "model": [*filter(None, tables.model_tables(result))],
         "numbers": [*filter(None, tables.numerics_tables(result))],
         "told": told,
-        "happened": [table for table in (tables.cavities(result), tables.events(result)) if table],
+        "happened": all_with_dates(events, start),
         "versions": tables.versions(result),
     }
     return render_page("page", filled, figures)
@@ -420,9 +423,10 @@ def failing_limits(runs: list) -> ResultTable:
         "time",
     )
     units = ("",) * 9 + (length.unit, time.unit)
-    return ResultTable.of(
+    table = ResultTable.of(
         "", heads, rows, units, mixed=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages
     )
+    return with_dates(table, runs[0][1].start_time)
 
 
 def change_tables(study: dict[str, Any]) -> list[ResultTable]:
@@ -469,14 +473,14 @@ def event_figures(
     for k, probe in enumerate(shared[:MAX_PROBES]):
         lines = [
             plots.Series(
-                name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True
+                name or "the case",
+                *thin_series(result.drawn_times, result[probe], SERIES_POINTS),
+                seen=True,
             )
             for name, result in own
         ]
         panel = plots.HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
-        figures[f"history-{number}-{k}"] = plots.history_figure(
-            panel, own[0][1].summary["time_unit"], None
-        )
+        figures[f"history-{number}-{k}"] = plots.history_figure(panel, own[0][1].drawn_unit, None)
         entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})
     return entries
 

@@ -21,6 +21,7 @@ from fvsolve.display import save_if_path
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing, visible
 from fvsolve.file_replacement import replacing, write_file
 from fvsolve.report import import_library, page, tables
+from fvsolve.report.dated_tables import all_with_dates
 from fvsolve.report.draw.map_picture import map_figure, network_figure
 from fvsolve.report.draw.plot import history_figure, phase_figure, section_figure
 from fvsolve.report.long_section import (
@@ -177,7 +178,7 @@ def workbook_tables(result, sections: list[SectionPath]) -> list[ResultTable]:
         notes,
         replace(tables.versions(result), title="Versions"),
     ]
-    return [table for table in contents if table]
+    return all_with_dates(contents, result.start_time)
 
 
 def study_tables(runs: list) -> list[ResultTable]:

@@ -371,7 +371,7 @@ def top_sentences(result) -> list[Sentence]:
     rows = []
     if result.reason != "finished":
         reached, end = (
-            result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end)
+            result.case.moment(item) for item in (summary["t"], result.case.numerics.end)
         )
         text = f"{result.reason}. The run reached t = {reached} of {end}; later values are unknown."
         rows.append(Sentence("bad", "This run stopped early.", text))
@@ -399,7 +399,7 @@ def _mark_sentences(result) -> list[Sentence]:
     marks = sorted(result.marks, key=lambda mark: mark.time)
     if not marks:
         return []
-    when = [result.case.amount(mark.time, "time", 6) for mark in marks]
+    when = [result.case.moment(mark.time) for mark in marks]
     places = [f"{mark.place.partition('.')[2]} at {t}" for mark, t in zip(marks, when, strict=True)]
     later = ", ".join(places[1 : 1 + MAX_LATER_MARKS])
     more = (
@@ -844,7 +844,5 @@ def comparisons(result) -> ResultTable:
 
 def _method_text(row: dict, case) -> str:
     return (
-        row["method"]
-        if not row["time"]
-        else f"{row['method']} from {case.amount(row['time'], 'time', 6)} on"
+        row["method"] if not row["time"] else f"{row['method']} from {case.moment(row['time'])} on"
     )

@@ -553,7 +553,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         settings | {"cells": run.model.cells},
         summary.steps,
         [
-            f"{mark.text}: the energy balance from {run.model.case.amount(mark.time, 'time', 6)} "
+            f"{mark.text}: the energy balance from {run.model.case.moment(mark.time)} "
             "on is not to be trusted"
             for mark in summary.marks
         ],
@@ -644,7 +644,7 @@ def port_text(port: Port, case) -> str:
         if port.passive
         else "NOT passive: the network supplied more energy than it had"
     )
-    time, margin_time = (case.amount(value, "time", 6) for value in (port.time, port.t_margin))
+    time, margin_time = (case.moment(value) for value in (port.time, port.t_margin))
     return (
         f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
         f"least margin {margin} at {margin_time}: {verdict}"

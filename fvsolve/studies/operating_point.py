@@ -89,7 +89,7 @@ def operating_point(
     t, y, armed, outputs, discrete = _state_at(model, at)
     sides = {time: jump for time, jump in model.breaks if time == t}
     side = "before" if before else "after"
-    when = "the start" if at is None else f"t = {case.amount(t, 'time', 6)}"
+    when = "the start" if at is None else f"t = {case.moment(t)}"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
     when += frequency_limit_note(model, delayed) if delayed else ""
     model = with_held_schedules(model, t, before)

@@ -404,6 +404,7 @@ class ScenarioRun(Work):
             "events",
             "expectations",
             "time_unit",
+            "start_time",
             "envelope_units",
             "warnings",
         )

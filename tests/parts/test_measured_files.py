@@ -21,7 +21,12 @@ T, H = [0.0, 0.5, 1.25], [45.7, -46.1, 1234.5]
 
 def columns(path, text, encoding="utf-8"):
     path.write_bytes(text.encode(encoding))
-    return read_columns(path, None, None, "head", ReadContext())[:2]
+    return read_columns(path, keys(), "head", ReadContext())[:2]
+
+
+def keys(**stated):
+    """Keys of a file of a time series, without values unless stated."""
+    return {key: stated.get(key) for key in ("time", "value", "sheet", "date_order", "time_zone")}
 
 
 def refusal(path, text, encoding="utf-8"):
@@ -97,7 +102,7 @@ def test_ambiguous_files_are_refused_with_their_line(text, words, tmp_path):
     else:
         (tmp_path / "rig.csv").write_text(text)
         with pytest.raises(ValueError, match='has 2 columns "H"'):
-            read_columns(tmp_path / "rig.csv", "t", "H", "head", ReadContext())
+            read_columns(tmp_path / "rig.csv", keys(time="t", value="H"), "head", ReadContext())
 
 
 def test_bytes_that_are_no_text_are_named(tmp_path):
@@ -106,7 +111,7 @@ def test_bytes_that_are_no_text_are_named(tmp_path):
     )
     (tmp_path / "rig.csv").write_bytes(b"PK\x03\x04\x00\x00\x00\x00\x12\x00\x00\x00\n1\n")
     with pytest.raises(ValueError, match="not UTF-8 or UTF-16 text"):
-        read_columns(tmp_path / "rig.csv", None, None, "head", ReadContext())
+        read_columns(tmp_path / "rig.csv", keys(), "head", ReadContext())
 
 
 def test_a_measured_series_with_decimal_commas_is_compared_as_measured(tmp_path):

@@ -465,7 +465,7 @@ FOUND = [
     ([], "is not a list of curves"),
     ([3], "hill_chart[0]: 3 is not a table"),
     ({"file": "nowhere.csv"}, "there is no such file"),
-    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; expected only `file`"),
+    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; keys are file, sheet"),
 ]  # fmt: skip
 
 

@@ -59,12 +59,16 @@ class GmshMesh(NamedTuple):
     points : float64[p, 3]; cells : elements, in the order of the file
     groups : number of a physical group of lines -> numbers of its lines, counted over all blocks of lines
     field_data : name of a physical group of lines -> (its number, 1), as in meshio
+    surfaces : number of a physical group of surfaces -> numbers of its cells, over all triangles and quadrilaterals
+    surface_names : number of a physical group of surfaces -> its name
     """
 
     points: np.ndarray
     cells: list[ElementBlock]
     groups: dict[int, np.ndarray]
     field_data: dict[str, tuple[int, int]]
+    surfaces: dict[int, np.ndarray]
+    surface_names: dict[int, str]
 
 
 class Numbers:
@@ -149,19 +153,26 @@ def read_gmsh_4(data: bytes) -> GmshMesh | None:
     numbers, points = nodes(read["Nodes"], old)
     order = np.argsort(numbers, kind="stable")
     cells = []
-    groups = {}
-    first = 0
+    groups: dict[str, dict[int, list[np.ndarray]]] = {"line": {}, "cell": {}}
+    first = {"line": 0, "cell": 0}
     for dimension, entity, kind, rows in elements(read["Elements"], old):
         spot = order[
             np.minimum(np.searchsorted(numbers, rows, sorter=order), max(numbers.size - 1, 0))
         ]
         cells.append(ElementBlock(kind, np.where(numbers[spot] == rows, spot, -1)))
-        if kind == "line":
-            for group in {abs(number) for number in physical.get((dimension, entity), ())}:
-                groups.setdefault(group, []).append(first + np.arange(len(rows)))
-            first += len(rows)
-    lines = {group: np.concatenate(blocks) for group, blocks in groups.items()}
-    return GmshMesh(points, cells, lines, line_names(parts.get("PhysicalNames", b"")))
+        shape = {"line": "line", "triangle": "cell", "quad": "cell"}.get(kind)
+        if shape is None:
+            continue
+        for group in {abs(number) for number in physical.get((dimension, entity), ())}:
+            own = first[shape] + np.arange(len(rows))
+            groups[shape].setdefault(group, []).append(own)
+        first[shape] += len(rows)
+    lines, surfaces = (
+        {group: np.concatenate(blocks) for group, blocks in groups[shape].items()}
+        for shape in ("line", "cell")
+    )
+    names = parts.get("PhysicalNames", b"")
+    return GmshMesh(points, cells, lines, line_names(names), surfaces, surface_names(names))
 
 
 def sections(data: bytes) -> Iterator[tuple[str, bytes]]:
@@ -242,6 +253,12 @@ def elements(section: Numbers, old: bool) -> Iterator[tuple[int, int, str, np.nd
         rows = section.numbers(count * (1 + points)).reshape(count, 1 + points)[:, 1:]
         dimension, entity = (second, first) if old else (first, second)
         yield dimension, entity, kind, rows
+
+
+def surface_names(content: bytes) -> dict[int, str]:
+    """Names of the physical groups of surfaces : number -> name; content : of the section PhysicalNames"""
+    found = NAME.findall(content.decode(errors="replace"))
+    return {int(number): name for dimension, number, name in found if dimension == "2"}
 
 
 def line_names(content: bytes) -> dict[str, tuple[int, int]]:

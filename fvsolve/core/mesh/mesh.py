@@ -43,6 +43,8 @@ class Mesh:
     patches : names of the patches, the last one always "wall"; grid : grid lines, None if the mesh is not a rectangle
     notes : remarks about the mesh file for the user; interior : cells of each interior patch, name -> int64[count]
     groups : name -> int64[:] faces between cells that a group of the mesh file contains, of groups that are no patches
+    regions : name -> int64[:] cells of a group of cells of the mesh file
+    heights : float64[p]  elevations of the points in the mesh file [m], None if they are not read
     """
 
     points: np.ndarray
@@ -60,6 +62,8 @@ class Mesh:
     notes: tuple[str, ...] = ()
     interior: dict[str, np.ndarray] = field(default_factory=dict)
     groups: Mapping[str, np.ndarray] = field(default_factory=dict)
+    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
+    heights: np.ndarray | None = None
 
     @property
     def inner(self) -> int:

@@ -18,7 +18,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fvsolve.core.mesh.gmsh_files import GmshMesh, line_names, read_gmsh_4, sections
+from fvsolve.core.mesh.gmsh_files import (
+    GmshMesh,
+    line_names,
+    read_gmsh_4,
+    sections,
+    surface_names,
+)
 from fvsolve.core.mesh.mesh import (
     CROWDED,
     WALL,
@@ -30,8 +36,10 @@ from fvsolve.core.mesh.mesh import (
     edges_of,
     key_of,
 )
+from fvsolve.core.mesh.sms_files import SmsMesh, read_sms
+from fvsolve.core.mesh.surface_groups import surface_groups
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
-from fvsolve.units import find
+from fvsolve.units import find, show
 
 LEAST_HEIGHT = 1e-8  # of the longest side: smaller sides and heights count as zero
 MAX_CELLS = 3
@@ -328,6 +336,8 @@ def _line_location(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
     return f"the line {where} {'lies between two cells' if inside else 'is not a side of a cell'}"
 
 
+SMS = ".2dm"  # suffix of the mesh files of SMS
+NODES = "nodes"  # value of the key `bed` that gives the elevations of nodes
 PLANE = {"triangle": 3, "quad": 4}
 IGNORED = {"vertex", "line", *PLANE}
 TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in the formats
@@ -349,7 +359,7 @@ class Content:
     points : float64[p, 3]  coordinates in the unit of the file
     cells : int64[n, 4]  points of cells, -1 last in a triangle
     lines : int64[k, 2]  points of lines; groups : name -> int64[:] numbers of lines, in the order of the file
-    notes : remarks about the file for the user
+    notes : remarks about the file for the user; regions : name of a group of cells -> int64[:] its cells
     """
 
     points: np.ndarray
@@ -357,37 +367,32 @@ class Content:
     lines: np.ndarray
     groups: dict[str, np.ndarray]
     notes: tuple[str, ...]
+    regions: dict[str, np.ndarray]
 
 
-def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh:
+def read(
+    path: str | Path,
+    unit: str = "m",
+    walls: Collection[str] = (),
+    heights: bool = False,
+    ignored: Collection[str] = (),
+) -> Mesh:
     """Read a plane mesh from a file of any format of meshio, with coordinates in `unit`.
 
     Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
     patches, except `walls`: names of groups whose lines may lie between cells. Another group, all of whose lines lie
-    between cells, is ignored, with a note. The file, its coordinates, its cells and
-    its boundary are checked in this order; MeshError is raised with all faults of the first of these checks that fails.
+    between cells, is ignored, with a note, and so are the groups of lines `ignored`.
+    heights : True to read the elevations z of nodes, which otherwise must be constant, except in .2dm files
+    The file, its coordinates, its cells and its boundary are checked in this order; MeshError is raised with all faults
+    of the first of these checks that fails.
     """
     path = Path(path)
     try:
         factor = find(unit, "length").read("1")
     except ValueError as error:
         raise MeshError([Fault("unit", str(error))], path.name) from None
-    content = load_file(path)
-    faults = _place_faults(content, unit)
-    if faults:
-        raise MeshError(faults, path.name)
-    # -1 comes first
-    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)
-    cells = renumbered[:-1].reshape(-1, 4) - 1
-    notes = list(content.notes)
-    spare = len(content.points) + 1 - used.size
-    if spare:
-        notes.append(
-            f"points in the file that belong to no cell: {spare} of {len(content.points)}, ignored"
-        )
-    spot = np.minimum(np.searchsorted(used[1:], content.lines), used.size - 2)
-    # -1 for a point that belongs to no cell
-    lines = np.where(used[1:][spot] == content.lines, spot, -1)
+    content = _checked_content(path, unit, heights, ignored)
+    used, cells, lines, notes = _used_points(content)
     sketch = Sketch(content.points[used[1:], :2], cells, unit)
     faults, bad, clockwise = shape_faults(sketch)
     quads, triangles = cells[clockwise][:, [0, 3, 2, 1]], cells[clockwise][:, [0, 2, 1, 3]]
@@ -399,8 +404,8 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     faults += overlap_faults(sketch, edges, number)
     if faults:
         raise MeshError(faults, path.name)
-    outline, ignored = _outline(content.groups, lines, edges, len(sketch.points), walls)
-    notes += ignored
+    outline, remarks = _outline(content.groups, lines, edges, len(sketch.points), walls)
+    notes += remarks
     faults, names, patch = assign_patches(sketch, edges, lines, outline)
     chains = {
         name: key_of(lines[members], len(sketch.points))
@@ -418,25 +423,86 @@ def read(path: str | Path, unit: str = "m", walls: Collection[str] = ()) -> Mesh
     if faults:
         raise MeshError(faults, path.name)
     notes += _notes(sketch, factor, patch, bool(content.groups))
-    cells = cells[edges.order(len(cells))]
+    order = edges.order(len(cells))
+    cells = cells[order]
+    rank = np.argsort(order)
     sketch, edges = Sketch(sketch.points, cells, unit), edges_of(cells, len(sketch.points))
     patch = assign_patches(sketch, edges, lines, outline)[2]
     patch = np.where(patch < 0, len(names) - 1, patch)
     mesh = assemble(factor * sketch.points, cells, edges, names, patch, notes=notes)
     between = key_of(mesh.ends[: mesh.inner], len(sketch.points))
     return replace(
-        mesh, groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()}
+        mesh,
+        groups={name: np.flatnonzero(np.isin(between, keys)) for name, keys in chains.items()},
+        regions={name: np.sort(rank[members]) for name, members in content.regions.items()},
+        heights=factor * content.points[used[1:], 2] if heights else None,
     )
+
+
+def _checked_content(path: Path, unit: str, heights: bool, ignored: Collection[str]) -> Content:
+    """Content of a mesh file without the groups of lines `ignored`; arguments as for `read`. Raises MeshError."""
+    content = load_file(path)
+    if heights:
+        faults = _coordinate_faults(content)
+    else:
+        content = _flattened(content, path)
+        faults = _place_faults(content, unit)
+    faults += [
+        Fault("ignore", f"no group of lines {show(name)}{did_you_mean(name, content.groups)}")
+        for name in ignored
+        if name not in content.groups
+    ]
+    if faults:
+        raise MeshError(faults, path.name)
+    groups = {name: own for name, own in content.groups.items() if name not in ignored}
+    return replace(content, groups=groups)
+
+
+def _used_points(content: Content) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """(-1 and numbers of the points of cells, cells and lines with new numbers of these points, notes).
+
+    The number of a point that belongs to no cell is -1 in lines.
+    """
+    # -1 comes first
+    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)
+    cells = renumbered[:-1].reshape(-1, 4) - 1
+    notes = list(content.notes)
+    spare = len(content.points) + 1 - used.size
+    if spare:
+        notes.append(
+            f"points in the file that belong to no cell: {spare} of {len(content.points)}, ignored"
+        )
+    spot = np.minimum(np.searchsorted(used[1:], content.lines), used.size - 2)
+    lines = np.where(used[1:][spot] == content.lines, spot, -1)
+    return used, cells, lines, notes
+
+
+def _flattened(content: Content, path: Path) -> Content:
+    """Content without the elevations of a file .2dm, whose nodes always have elevations; other content unchanged."""
+    if path.suffix.lower() != SMS or np.ptp(content.points[:, 2]) == 0.0:
+        return content
+    points = np.column_stack([content.points[:, :2], np.zeros(len(content.points))])
+    note = 'elevations of nodes in the file: ignored; bed = "nodes" makes them the bed'
+    return replace(content, points=points, notes=(*content.notes, note))
+
+
+def _coordinate_faults(content: Content) -> list[Fault]:
+    """List with the fault of points with invalid coordinates; else empty."""
+    used = np.unique(content.cells[content.cells >= 0])
+    points = content.points[used]
+    invalid = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
+    if not invalid.size:
+        return []
+    text = f"{invalid.size} of {used.size} {'has' if invalid.size == 1 else 'have'} invalid coordinates"
+    return [Fault("points", f"{text} (not a number, or too large), first point {invalid[0]}")]
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:
     """List with the fault of points with invalid coordinates, or not in one plane z = constant; else empty."""
+    if faults := _coordinate_faults(content):
+        return faults
     used = np.unique(content.cells[content.cells >= 0])
     points = content.points[used]
-    invalid = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
-    if invalid.size:
-        text = f"{invalid.size} of {used.size} {'has' if invalid.size == 1 else 'have'} invalid coordinates"
-        return [Fault("points", f"{text} (not a number, or too large), first point {invalid[0]}")]
     extent = np.ptp(points, axis=0)
     near = PLANE_TOLERANCE * extent.max()
     if extent[2] <= near:
@@ -447,7 +513,8 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
     text = f"z runs from {span}; cell {cell} has a point in the upper half of this range"
     level = [axis for axis, e in zip("xy", extent, strict=False) if e <= near]
     constant = "".join(f"; {axis} is constant: turn the mesh" for axis in level)
-    return [Fault("points", f"{text}; expected a mesh in one plane, z = constant{constant}")]
+    remedy = constant or f", or bed = {show(NODES)}"
+    return [Fault("points", f"{text}; expected a mesh in one plane, z = constant{remedy}")]
 
 
 def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
@@ -504,6 +571,7 @@ def load_file(path: Path) -> Content:
         np.concatenate(lines).astype(np.int64) if lines else np.empty((0, 2), np.int64),
         groups,
         (*notes, *unnamed),
+        surface_groups(file_mesh, PLANE, TAGS),
     )
     for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0)):
         low = np.where(np.arange(table.shape[1]) == 3, least, 0)
@@ -526,6 +594,11 @@ def _read_file(path: Path) -> tuple[Any, tuple[str, ...]]:
         raise MeshError(
             [Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)
         )
+    if path.suffix.lower() == SMS:
+        try:
+            return read_sms(path), ()
+        except (OSError, ValueError) as error:
+            raise MeshError([Fault("", f"the file cannot be read ({error})")], path.name) from None
     if path.suffix.lower() != ".msh":
         return _read_by_meshio(path)
     try:
@@ -538,7 +611,9 @@ def _read_file(path: Path) -> tuple[Any, tuple[str, ...]]:
         ) from None
     file_mesh, notes = _read_by_meshio(path)
     with contextlib.suppress(ValueError):  # meshio keeps one of two groups of the same name
-        file_mesh.field_data = line_names(dict(sections(data)).get("PhysicalNames", b""))
+        names = dict(sections(data)).get("PhysicalNames", b"")
+        file_mesh.field_data = line_names(names)
+        file_mesh.surface_names = surface_names(names)
     return file_mesh, notes
 
 
@@ -633,6 +708,8 @@ def _padded(cells: np.ndarray) -> np.ndarray:
 
 def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """(name -> numbers of the lines of each group, notes on groups that have only a number in the file)."""
+    if isinstance(file_mesh, SmsMesh):
+        return file_mesh.strings, ()
     # name -> (number, dimension) of each group of lines that has a name
     field_data = file_mesh.field_data or {}
     name_of = {

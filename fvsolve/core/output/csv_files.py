@@ -25,25 +25,32 @@ ENVELOPE_QUANTITIES = {
 }
 VELOCITY_AXES = {"u": 0, "v": 1}  # of velocities
 BLOCK, LONGEST_LINE = 2**20, 2**24  # bytes that are read at once, and greatest length of a row
+DATES = "time"  # header of the column of dates, which has no unit
+DATED_EXTREMES = {"time_min": "t_min", "time_max": "t_max"}  # columns of dates -> their times
 LATEST = 1e100  # limit of times, in any unit
 LINE_FILE = re.compile(r"(.+)-(\d{6,})\.csv")
 
 
 class HistoryFile:
-    """CSV file to which rows are appended; numbers are written with all digits, so that they are read back exactly."""
+    """CSV file to which rows are appended; numbers are written with all digits, so that they are read back exactly.
 
-    def __init__(self, path: Path, time: UnitColumn, columns: list[UnitColumn]):
+    start : instant of t = 0 (`StartTime`); with it, dates stand in the second column, `time`
+    """
+
+    def __init__(self, path: Path, time: UnitColumn, columns: list[UnitColumn], start: Any = None):
         self.path = path
         self.time = time
         self.columns = columns
+        self.start_time = start
         self.rows = 0
         self._file = None
 
     def start(self) -> None:
         """Start an empty file with its header."""
         self._file = open(self.path, "wb")
-        headers = ",".join(csv_quoted(column.header) for column in [self.time, *self.columns])
-        self._file.write(f"{headers}\n".encode())
+        first, *headers = [csv_quoted(column.header) for column in [self.time, *self.columns]]
+        dates = [] if self.start_time is None else [DATES]
+        self._file.write((",".join([first, *dates, *headers]) + "\n").encode())
 
     def refuse_unfit(self, rows: int, size: int, t: float) -> None:
         """Raise RunError if the file has not `rows` rows in its first `size` bytes, up to the time `t` [s]."""
@@ -71,7 +78,13 @@ class HistoryFile:
         """Append rows. t : float64[k] [s]; values : float64[k, n] in SI"""
         times = self.time.from_si(t).tolist()
         table = to_column_units(self.columns, values).tolist()
-        lines = [",".join(map(repr, [time, *row])) for time, row in zip(times, table, strict=True)]
+        firsts = map(repr, times)
+        if self.start_time is not None:
+            dates = self.start_time.texts(t)
+            firsts = [f"{first},{date}" for first, date in zip(firsts, dates, strict=True)]
+        lines = [
+            ",".join([first, *map(repr, row)]) for first, row in zip(firsts, table, strict=True)
+        ]
         if lines:
             self._file.write(("\n".join(lines) + "\n").encode())
             self.rows += len(lines)
@@ -125,16 +138,22 @@ def read_headers(path: Path) -> list[tuple[str, str]]:
 
 
 def read_table(path: Path) -> np.ndarray:
-    """All rows of a table without its header : float64[k, columns]; raises RunError if it cannot be read."""
-    names = len(read_headers(path))
+    """All rows of a table without its header and without dates : float64[k, columns].
+
+    Raises RunError if it cannot be read.
+    """
+    headers = [name for name, unit in read_headers(path)]
+    dated = headers[1:2] == [DATES]
+    names = len(headers)
     with open(path, encoding="utf-8") as file:
         file.readline()
         start = file.tell()
         if not file.read(1):  # no rows
-            return np.empty((0, names))
+            return np.empty((0, names - dated))
         file.seek(start)
         try:
-            table = np.loadtxt(file, delimiter=",", ndmin=2)
+            skipped = {1: lambda date: 0.0} if dated else None
+            table = np.loadtxt(file, delimiter=",", ndmin=2, converters=skipped)
         except ValueError:
             text = f"a row does not have {names} numbers; the file was truncated or edited; run again with --force"
             raise RunError(f"{path} cannot be read: {text}") from None
@@ -145,7 +164,9 @@ def read_table(path: Path) -> np.ndarray:
         raise RunError(
             f"{path} cannot be read: its times are not numbers in rising order; run again with --force"
         )
-    return table if table.size else np.empty((0, names))
+    if dated:
+        table = np.delete(table, 1, axis=1)
+    return table if table.size else np.empty((0, names - dated))
 
 
 def csv_quoted(text: str) -> str:
@@ -202,12 +223,26 @@ def write_envelope(path: Path, envelope: dict, case) -> None:
     envelope : pipe -> name as in `ENVELOPE_QUANTITIES` -> float64[cells] in the units of the columns
     """
     columns = envelope_columns(case)
+    start = case.numerics.start_time
     with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["pipe", *(col.header for col in columns)])
+        dated = [] if start is None else DATED_EXTREMES
+        table.writerow(["pipe", *(col.header for col in columns), *dated])
         for pipe, arrays in envelope.items():
-            values = [arrays[col.name].tolist() for col in columns]
-            table.writerows([pipe, *map(repr, row)] for row in zip(*values, strict=True))
+            values = [map(repr, arrays[col.name].tolist()) for col in columns]
+            values += extreme_dates(arrays, columns, start)
+            table.writerows([pipe, *row] for row in zip(*values, strict=True))
+
+
+def extreme_dates(arrays: dict, columns: list[UnitColumn], start: Any) -> list[list[str]]:
+    """Dates of the extremes in the order of `DATED_EXTREMES`; [] without a start time (`start` is None).
+
+    arrays : quantity -> float64[cells] in the units of the columns
+    """
+    if start is None:
+        return []
+    known = {col.name: col for col in columns}
+    return [start.texts(known[key].to_si(arrays[key])) for key in DATED_EXTREMES.values()]
 
 
 def read_envelope(path: Path) -> dict:
@@ -217,8 +252,11 @@ def read_envelope(path: Path) -> dict:
         with open(path, encoding="utf-8", newline="") as file:
             rows = csv.reader(file)
             names = [split_header(header)[0] for header in next(rows, [])]
+            if dated := [name for name in names if name in DATED_EXTREMES]:
+                names = names[: -len(dated)]
             for row in rows:
-                pipes.setdefault(row[0], []).append([float(text) for text in row[1:]])
+                numbers = row[1 : len(row) - len(dated)]
+                pipes.setdefault(row[0], []).append([float(text) for text in numbers])
         tables = {
             pipe: dict(zip(names[1:], np.array(values).T, strict=True))
             for pipe, values in pipes.items()
@@ -276,15 +314,18 @@ def write_routes(path: Path, envelope: dict, case) -> None:
         "pipe",
         *(item.header for item in columns),
     ]
+    start = case.numerics.start_time
+    headers += [] if start is None else DATED_EXTREMES
     with replacing(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(headers)
         for name, item in route_envelopes(envelope, case).items():
-            values = zip(*(item[key.name].tolist() for key in columns), strict=True)
+            values = [map(repr, item[key.name].tolist()) for key in columns]
+            values = zip(*values, *extreme_dates(item, columns, start), strict=True)
             for chainage, pipe, row in zip(
                 item["chainage"].tolist(), item["pipe"].tolist(), values, strict=True
             ):
-                table.writerow([name, repr(chainage), pipe, *map(repr, row)])
+                table.writerow([name, repr(chainage), pipe, *row])
 
 
 class LineSeries:

@@ -103,7 +103,10 @@ class RunDirectory:
         _refuse_reserved_names(model.case)
         self.identity = identity(model.case)
         self.history = csv_files.HistoryFile(
-            self.folder / "history.csv", time_column(model.case), probe_columns(model)
+            self.folder / "history.csv",
+            time_column(model.case),
+            probe_columns(model),
+            model.case.numerics.start_time,
         )
         drawn = (
             model.case.output.fields > 0

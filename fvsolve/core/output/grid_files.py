@@ -100,6 +100,12 @@ class PixelGrid:
         )
         return [time for time, _ in files], frames
 
+    @property
+    def zero_time(self) -> str:
+        """Date of t = 0 in UTC, or in local time without zone, after CF; 1970-01-01 without a start time."""
+        start = self.basin.case.numerics.start_time
+        return "1970-01-01 00:00:00" if start is None else start.stamp.reference
+
     def unit(self, key: str) -> str:
         """SI unit of a field."""
         own = self.basin.part.physics_type
@@ -141,7 +147,7 @@ class PixelGrid:
             file.Conventions, file.title = "CF-1.8", self.basin.case.title or self.basin.name
             file.comment = self.end
             for axis, unit, word, at in (
-                ("time", "seconds since 1970-01-01 00:00:00", "time", np.array(times)),
+                ("time", f"seconds since {self.zero_time}", "time", np.array(times)),
                 ("y", "m", "projection_y_coordinate", self.north + self.y),
                 ("x", "m", "projection_x_coordinate", self.east + self.x),
             ):

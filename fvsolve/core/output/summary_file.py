@@ -32,6 +32,7 @@ def summary_data(summary, model) -> dict:
             for item in probe_columns(model)
         },
         "time_unit": time_column(model.case).unit,
+        **start_entry(model.case),
         "envelope_units": {item.name: item.unit for item in envelope_columns(model.case)},
         "ambient_pressure": model.case.ambient_pressure,
         "fluid": model.case.properties.plain(),
@@ -48,6 +49,12 @@ def summary_data(summary, model) -> dict:
         **({"energy_use": plain(summary.energy_use)} if summary.energy_use else {}),
         "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
     }
+
+
+def start_entry(case) -> dict[str, str]:
+    """Entry with the instant of t = 0, which only the summary of a case with a start time has."""
+    start = case.numerics.start_time
+    return {} if start is None else {"start_time": start.table()}
 
 
 def plain(value):

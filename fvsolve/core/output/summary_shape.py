@@ -6,6 +6,7 @@ from typing import Any, Literal, NamedTuple, NotRequired, TypedDict
 from fvsolve import units
 from fvsolve.core.output.json_files import faults_of, joined
 from fvsolve.errors import Notice
+from fvsolve.parts.date_keys import start_time_in
 from fvsolve.units import show
 
 HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
@@ -335,6 +336,7 @@ class SummaryShape(TypedDict):
     versions: Versions
     files: list[str]
     energy_use: NotRequired[EnergyUseRows]
+    start_time: NotRequired[str]
     ended: NotRequired[str]
     seconds_total: NotRequired[float]
     peaks: NotRequired[dict[str, PeakRow]]
@@ -366,6 +368,10 @@ def summary_faults(summary: dict[str, Any]) -> Iterator[str]:
 
 def contradictions(summary: dict[str, Any]) -> Iterator[str]:
     """Yield a text for each unknown unit, and for extremes and errors of other probes than those of the summary."""
+    try:
+        start_time_in(summary)
+    except ValueError as error:
+        yield f"start_time: {error}"
     columns = {"time_unit": ("time", summary["time_unit"])}
     columns |= {
         f"envelope_units.{key}": (kind, summary["envelope_units"][key])

@@ -9,6 +9,7 @@ from fvsolve.core.output import network_layout
 from fvsolve.core.output.fields import FIELD_UNITS, read_pipe_lines
 from fvsolve.core.output.unit_columns import column
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.parts.date_keys import moment_text
 from fvsolve.report.draw.scene import PLAUSIBLE_SCALE, DrawnPart, DrawnScene, DrawnUnit
 
 DIMENSIONS = {
@@ -38,7 +39,11 @@ def scene_of(
     clock = column("t", "time", case)
     over_run = any(field in case.nodes[name].physics_type.maxima for name in case.meshes)
     caption = f"{field.replace('_', ' ')} {'up to' if over_run else 'at'} t = "
-    captions = [(f"{caption}{clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
+    start = case.numerics.start_time
+    captions = [
+        (moment_text(f"{caption}{clock.from_si(t):.6g} {clock.unit}", t, start), files)
+        for t, files in frames
+    ]
     pipes = [name for name, link in case.links.items() if link.kind == "pipe"]
     lengths = {name: case.links[name].length for name in pipes}
     bodies = any(node.kind == "body" for node in case.nodes.values())

@@ -19,10 +19,12 @@ from fvsolve.core.output.summary_shape import (
 from fvsolve.core.output.unit_columns import UnitColumn
 from fvsolve.display import Displayable, save_if_path
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
+from fvsolve.parts.date_keys import moment_text, start_time_in
 from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.case import Case
+    from fvsolve.parts.time_stamps import StartTime
 
 KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
@@ -32,7 +34,9 @@ def not_valid(summary: dict) -> str:
     if summary["invalid_from"] is None:
         return ""
     clock = UnitColumn("t", "time", summary["time_unit"])
-    return f"not valid from t = {float(clock.from_si(summary['invalid_from'])):.6g} {clock.unit} on"
+    begin = summary["invalid_from"]
+    text = f"{float(clock.from_si(begin)):.6g} {clock.unit}"
+    return f"not valid from t = {moment_text(text, begin, start_time_in(summary))} on"
 
 
 class Result(Displayable):
@@ -176,6 +180,34 @@ class Result(Displayable):
         return self._time.to_si(self.t)
 
     @property
+    def start_time(self) -> "StartTime | None":
+        """Instant of t = 0, `[numerics] start_time`; None without one."""
+        return start_time_in(self.summary)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Dates of the rows on the clock of `start_time` : datetime64[us]. Raises FvsolveError without start time."""
+        if (start := self.start_time) is None:
+            raise FvsolveError(
+                "the case has no start time; expected numerics.start_time, for example 2026-03-01T06:00:00Z"
+            )
+        return start.datetimes(self.seconds)
+
+    @property
+    def drawn_times(self) -> np.ndarray:
+        """Times of the rows for the axis of a picture: dates with a start time, otherwise as `t`."""
+        return self.t if self.start_time is None else self.times
+
+    @property
+    def drawn_unit(self) -> str:
+        """Unit of `drawn_times` for the label of an axis: the zone of dates, otherwise the unit of times."""
+        return self._time.unit if self.start_time is None else self.start_time.zone
+
+    def _drawn_times(self, seconds: Any) -> np.ndarray:
+        start = self.start_time
+        return self._time.from_si(seconds) if start is None else start.datetimes(seconds)
+
+    @property
     def _time(self) -> UnitColumn:
         return UnitColumn("t", "time", self.summary["time_unit"])
 
@@ -211,18 +243,20 @@ class Result(Displayable):
         if not self.probes:
             return {}
         marks = [
-            (self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks
+            (np.asarray(self._drawn_times(item.time))[()], f"{item.place} {item.what}")
+            for item in self.marks
         ]
+        times = self.drawn_times
         marks += [
-            (self.t[0], f"{item.place} {item.kind}")
+            (times[0], f"{item.place} {item.kind}")
             for item in self.warnings
-            if not item.ok and len(self.t)
+            if not item.ok and len(times)
         ]
         return {
-            "t": self.t,
+            "t": times,
             "values": self._table[:, 1:],
             "probes": list(self.units.items()),
-            "time_unit": self._time.unit,
+            "time_unit": self.drawn_unit,
             "marks": marks,
             "measured": self._measured(),
             "title": self.summary["title"],
@@ -342,7 +376,7 @@ class Result(Displayable):
         for series in compared.values():
             name = series.probe.text
             measured[name] = (
-                self._time.from_si(series.t + series.shift),
+                self._drawn_times(series.t + series.shift),
                 self.column(name).from_si(series.v),
             )
         return measured

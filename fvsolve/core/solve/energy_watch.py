@@ -273,7 +273,7 @@ class EnergyWatch:
             return None
         amount = self.model.case.amount
         place = self.terms.places[int(self.record[PLACE])]
-        excess, when = float(self.record[EXCESS]), amount(float(self.record[TIME]), "time", 6)
+        excess, when = float(self.record[EXCESS]), self.model.case.moment(float(self.record[TIME]))
         limit = excess / float(self.record[RATIO])
         text = (
             f"{place}: at {when} the case stores {amount(excess, 'energy', 4)} more than it had at the "

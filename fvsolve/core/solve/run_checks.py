@@ -96,7 +96,7 @@ class RunChecks:
         name, times = self.model.state_names[worst], GROWTH_LIMIT * float(ratio[worst])
         text = (
             f"{name} has grown to {times:.3g} times the range of its forcing at t = "
-            f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
+            f"{self.model.case.moment(t)}; the step is beyond the limit of the method: "
             "halve the step"
         )
         place = name.partition("[")[0]
@@ -205,7 +205,7 @@ class SloshingCheck:
                 keep_greatest(record[RISE], rise(y, *lifting), t)
             weight, reference = self.weight(out, *about, modal)
             if weight <= WEIGHT_ROUNDING * reference:
-                when = f"t = {self.model.case.amount(t, 'time', 6)}"
+                when = f"t = {self.model.case.moment(t)}"
                 return f"stopped: {STATUS_FAILURES[rec.NO_WEIGHT].format(name=name, when=when)}"
             keep_greatest(record[LOSS], abs(weight / reference - 1.0), t)
         return ""
@@ -238,17 +238,17 @@ class SloshingCheck:
 
     def notices(self) -> list[Notice]:
         """Notices for waves that were not small, and for changes of weight that the waves neglect."""
-        notices, amount = [], self.model.case.amount
+        notices, moment = [], self.model.case.moment
         rows = zip(self.tanks, self.restart_data.tolist(), strict=True)
         for (name, *_), (height, rise_time, change, change_time) in rows:
             if height > SMALL_WAVE:
-                text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
+                text = f"{name}: at {moment(rise_time, 4)} its water rises by {height:.2g} of its depth, but "
                 text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'
                 notices.append(
                     Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL_WAVE)
                 )
             if change > WEIGHT_CHANGE:
-                text = f"{name}: at {amount(change_time, 'time')} the vertical acceleration of its body changes the "
+                text = f"{name}: at {moment(change_time, 4)} the vertical acceleration of its body changes the "
                 text += f"weight of its water by a fraction of {change:.2g}; the waves do not include this change"
                 notices.append(Notice("weight", f"nodes.{name}", text, None, change, WEIGHT_CHANGE))
         return notices

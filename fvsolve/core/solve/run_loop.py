@@ -348,7 +348,7 @@ class RunLoop:
         model = self.model
         text = FAILURES.get(code, "")
         names = {}
-        names["when"] = f"t = {model.case.amount(self.t, 'time', 6)}"
+        names["when"] = f"t = {model.case.moment(self.t)}"
         if code == loop_records.CHATTERING and self.event_fault:
             return f"{self.event_fault} at {names['when']}"
         if code == loop_records.CHATTERING:

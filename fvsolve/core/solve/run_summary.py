@@ -181,7 +181,7 @@ def spill_notices(run_data: RunData) -> list[Notice]:
     for node, time in zip(model.node_names, run_data.marks[first:], strict=False):
         if np.isfinite(time):
             name = node.removesuffix(".inside")
-            when = model.case.amount(float(time), "time", 6)
+            when = model.case.moment(float(time))
             text = f"{name}: full to its height, it spills from {when} on; the mass ledger contains the lost water"
             notices.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
     return notices
@@ -217,8 +217,8 @@ def unsupplied_demands(
             [_shut_by(valves[k], begin, events) for k in np.flatnonzero(shut == begin)], 6
         )
         text = (
-            f"{listing(names, 6)}: no open path supplies the demand between {amount(begin, 'time', 6)} and "
-            f"{amount(float(last[own].max()), 'time', 6)}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
+            f"{listing(names, 6)}: no open path supplies the demand between {model.case.moment(begin)} and "
+            f"{model.case.moment(float(last[own].max()))}{f'; shut: {causes}' if causes else ''}; {amounts}, and "
             "the pressure there is that of drained pipes"
         )
         notices.append(
@@ -255,7 +255,7 @@ def undetermined_notices(run_data: RunData) -> list[Notice]:
     if not names:
         return []
     text = (
-        f"{listing(names, 6)}: from {model.case.amount(first, 'time', 6)} on, at least for a time, only shut links "
+        f"{listing(names, 6)}: from {model.case.moment(first)} on, at least for a time, only shut links "
         "join this part of the network, which draws nothing: no flow determines its pressure, and extremes and "
         "limits leave it out"
     )
@@ -294,8 +294,8 @@ def find_cavities(run_data: RunData) -> list[Cavity]:
             amount = model.case.amount
             text = (
                 f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
-                f"{amount(time, 'time', 6)}; its greatest volume is {amount(volume, 'volume', silent='l')}, "
-                f"at {amount(t_volume, 'time', 6)}"
+                f"{model.case.moment(time)}; its greatest volume is {amount(volume, 'volume', silent='l')}, "
+                f"at {model.case.moment(t_volume)}"
             )
             cavities.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
     return cavities

@@ -39,9 +39,7 @@ def held_discharges(
                 volume -= scheduled_volume(
                     model.case.nodes[basin].patches[patch].discharge, start, t
                 )
-            lack, when = (
-                model.case.amount(x, kind, 4) for x, kind in ((volume, "volume"), (time, "time"))
-            )
+            lack, when = model.case.amount(volume, "volume", 4), model.case.moment(time, 4)
             drawn, result = HELD_TEXTS[int(linked)]
             text = f"{name}: from {when} on {drawn} is more than critical flow, which leaves instead; {lack} {result}"
             marks.append(Mark("discharge held", f"nodes.{name}", time, text, volume))

@@ -89,7 +89,7 @@ class ErrorWatch:
         t, *error = self.greatest.tolist()
         if not error[0] > self.least:
             return []
-        return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]
+        return [self.notice(self.basin, error, f" at {self.basin.case.moment(t, 4)}")]
 
 
 def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:

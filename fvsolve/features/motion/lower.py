@@ -345,7 +345,7 @@ def drive_joint(draft, name: str, schedule, row) -> None:
     kinks = [(time, jump) for time, jump in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
         kind = "it jumps" if kinks[0][1] else "its rate jumps"
-        time_text = draft.case.amount(kinks[0][0], "time", 6)
+        time_text = draft.case.moment(kinks[0][0])
         text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
         remedy = 'expected kind = "smooth" with zero slope at both ends, or a harmonic'
         draft.fault(f"nodes.{name}.joint.{key}", f"{text}; {remedy}")

@@ -73,9 +73,7 @@ class ProfileValue(Value):
     """
 
     about = "elevation along the axis, linear between points; a straight line between the end nodes if left out"
-    takes = (
-        "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file }` with these columns"
-    )
+    takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists in m, or `{ file, sheet }` with these columns"
 
     def read(self, given: Any, setting: ReadContext) -> Profile:
         if isinstance(given, Profile):
@@ -149,22 +147,14 @@ def from_lists(
 def from_file(
     given: dict[str, Any], setting: ReadContext
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """(columns, table): arrays of the points by key [m], read from a CSV file by its header, and the table { file }.
+    """(columns, table): arrays of the points by key [m], from a table file by its header; table { file, sheet }.
 
     setting : context for reading. Raises ValueFault with the fault.
     """
-    from fvsolve.parts.csv_rows import copy_name, find_file, read_rows
+    from fvsolve.parts.csv_rows import read_table_file
 
-    unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
-    if unknown:
-        raise ValueFault(unknown)
-    if not isinstance(given["file"], str):
-        raise ValueFault(
-            [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")]
-        )
+    path, rows, stated = read_table_file(given, setting)
     try:
-        path = find_file(given["file"], setting)
-        rows = read_rows(path)
         keys = columns_among([name.casefold() for name in rows.names], f"columns of {path.name}")
         names = {name.casefold(): name for name in rows.names}
         columns = {key: rows.numbers(rows.column(names[key], 0), "length") for key in keys}
@@ -178,7 +168,7 @@ def from_file(
             )
     except ValueError as error:
         raise ValueFault([(("file",), str(error))]) from None
-    return columns, {"file": copy_name(path, setting)}
+    return columns, stated
 
 
 def columns_among(names: list[str], source: str) -> tuple[str, ...]:

@@ -246,7 +246,7 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
 
     def passing_notice(self, model, name, part, time) -> Notice:
         """Notice that a pump was outside its head curve in a way that its law allows, first at `time` [s]."""
-        part, moment = single_pump(part), model.case.amount(time, "time", 6)
+        part, moment = single_pump(part), model.case.moment(time)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
             text = (

@@ -395,7 +395,7 @@ class ShaftLowering:
             return -1
         kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
         if part.trip < start:
-            trip, begin = (draft.case.amount(moment, "time", 6) for moment in (part.trip, start))
+            trip, begin = (draft.case.moment(moment) for moment in (part.trip, start))
             draft.fault(
                 f"links.{name}.trip",
                 f"{trip} lies before the start at {begin}; expected a later time",

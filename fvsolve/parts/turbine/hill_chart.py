@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from fvsolve.parts.csv_rows import CsvError, copy_name, find_file, read_rows, split_header
+from fvsolve.parts.csv_rows import CsvError, read_table_file, split_header
 from fvsolve.parts.table_model import check_table, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
@@ -194,7 +194,7 @@ class HillChartValue(Value):
     )
     takes = (
         "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, "
-        "or `{ file }`"
+        "or `{ file, sheet }`"
     )
     keys = {
         "opening": (Number(between(0, 1)), NEEDED),
@@ -248,18 +248,12 @@ class HillChartValue(Value):
 def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     """Hill chart from a CSV file with the columns opening, unit_speed, unit_flow, and efficiency or unit_torque.
 
-    The points of each opening are in order along its curve. given : table { file } of the case file
+    The points of each opening are in order along its curve. given : table { file, sheet } of the case file
     Raises ValueFault with all faults.
     """
-    unknown = [((key,), "unknown key; expected only `file`") for key in given if key != "file"]
-    if unknown or not isinstance(given["file"], str):
-        raise ValueFault(
-            unknown
-            or [(("file",), f"{show(given['file'])} is not text; expected a file name in quotes")]
-        )
+    path, rows, source = read_table_file(given, setting)
     try:
-        path = find_file(given["file"], setting)
-        columns, word = columns_of(read_rows(path))
+        columns, word = columns_of(rows)
     except ValueError as error:
         raise ValueFault([(("file",), str(error))]) from None
     points: dict[float, list] = {}
@@ -275,7 +269,6 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
                 (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}")
                 for below, text in error.faults
             ]
-    source = {"file": copy_name(path, setting)}
     return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, source, f"{path.name}, ")
 
 

@@ -226,7 +226,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
         return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
 
     def passing_notice(self, model, name, part, time) -> Notice:
-        moment = model.case.amount(time, "time", 6)
+        moment = model.case.moment(time)
         text = (
             f"{name}: leaves its hill chart at {moment}; beyond the chart the curves are straight lines to the "
             "flow at rest and to the speed without flow; give more points there"

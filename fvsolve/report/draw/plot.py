@@ -155,7 +155,8 @@ def _is_scaled(a: np.ndarray, b: np.ndarray) -> bool:
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
     """Figure of probes over time, with a panel for each quantity and unit. Constant probes are named in the legend.
 
-    t : float64[k] in `time_unit`; values : float64[k, n]; probes : (name, unit) of each column
+    t : float64[k] in `time_unit`, or datetime64[k] in the zone `time_unit`; values : float64[k, n]
+    probes : (name, unit) of each column
     marks : (time, cause) of events after which results are not to be trusted; the panels are shaded after the first
     measured : probe -> (times, values) of a measurement, which is drawn dotted
     """
@@ -172,6 +173,8 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     for axes in rows:
         _shade(axes, t, marks, first=axes is rows[0])
     style.name_axes(rows[-1], f"time [{time_unit}]")
+    if np.asarray(t).dtype.kind == "M":
+        style.shorten_dates(rows[-1])
     figure.align_ylabels(rows)
     style.title(figure, title)
     return figure
@@ -276,9 +279,9 @@ def _shade(axes, t, marks, first: bool) -> None:
     begun, cause = min(marks)
     axes.axvspan(begun, t[-1], color=style.DOUBT, alpha=0.08, linewidth=0)
     axes.axvline(begun, color=style.DOUBT, linewidth=0.8)
-    late = begun > 0.5 * (t[0] + t[-1])
+    late = begun - t[0] > t[-1] - begun
     # leaves space for the power of ten of the axis
-    offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4
+    offset = 28 if begun - t[0] < 0.05 * (t[-1] - t[0]) else 4
     if first:
         place = {
             "xycoords": ("data", "axes fraction"),

@@ -73,6 +73,16 @@ def name_axes(axes, x: str = "", y: str = "") -> None:
             write(name, fontsize=8.5, color=INK)
 
 
+def shorten_dates(axes) -> None:
+    """Label an axis of dates at even times, each label without what the label before it states."""
+    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+    locator = AutoDateLocator()
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.xaxis.get_offset_text().set(fontsize=8, color=MUTED)
+
+
 def label_decades(axes) -> None:
     """Label logarithmic axes only at powers of ten, unless an axis spans less than a decade."""
     from matplotlib.ticker import NullFormatter

@@ -96,7 +96,7 @@ def subcritical_inflow(basin, name: str, patch) -> Iterator[Notice]:
     if number[k] < 1.0:
         given = f"{amount(flow[k], 'flow')} at a depth of {amount(depth[k], 'length')}"
         text = (
-            f"{basin.name}.{name}: the inflow of {given} is subcritical at {amount(t[k], 'time')} (Froude number "
+            f"{basin.name}.{name}: the inflow of {given} is subcritical at {basin.case.moment(t[k], 4)} (Froude number "
             f"{number[k]:.3g}); leave out `depth`, which the water in the basin determines"
         )
         yield Notice(
@@ -183,7 +183,7 @@ class InflowWatch:
             return []
         basin, amount = self.basin, self.basin.case.amount
         text = (
-            f"{basin.name}.{self.name}: the inflow of {amount(flow, 'flow')} at {amount(t, 'time')} enters at "
+            f"{basin.name}.{self.name}: the inflow of {amount(flow, 'flow')} at {basin.case.moment(t, 4)} enters at "
             "critical depth, because the water inside runs off faster than waves or is shallow; give the `depth` "
             "of a supercritical inflow"
         )

@@ -8,6 +8,7 @@ from fvsolve.errors import listing
 from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
 from fvsolve.parts.field_series import ScheduledField, SpatialSeries
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
+from fvsolve.parts.mesh_fields import NODES, NodeElevations
 from fvsolve.parts.nodes_and_links import TwoPort
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table_model import NamedTables, Nested, Table
@@ -17,6 +18,7 @@ from fvsolve.parts.value import (
     Choice,
     Number,
     Quantity,
+    ReadContext,
     Text,
     UsualRange,
     anything,
@@ -27,6 +29,19 @@ from fvsolve.parts.weir.part import COEFFICIENTS, WEIR_COEFFICIENTS
 from fvsolve.units import show
 
 RAIN = UsualRange(1e-9, 500 / 3.6e6, "drizzle to cloudburst")
+
+
+class BedKey(SpatialFieldKey):
+    """Value of a case file for the bed: a field, or "nodes" for the elevations of the nodes of the mesh file."""
+
+    def read(self, given: Any, setting: ReadContext) -> SpatialField:
+        if given == NODES:
+            return SpatialField(NODES, NodeElevations())
+        return super().read(given, setting)
+
+    @property
+    def takes(self) -> str:
+        return f"{super().takes}; `{NODES}`"
 
 
 class SurfaceStart(VelocityStart):
@@ -192,8 +207,10 @@ class FreeSurface(Physics, name="free-surface"):
     ]
     bed: Annotated[
         SpatialField | None,
-        SpatialFieldKey(
-            "length", "height of the bed of a free surface above the elevation [m]; default 0"
+        BedKey(
+            "length",
+            "height of the bed of a free surface above the elevation [m], nodes: that of the nodes of the mesh file; "
+            "default 0",
         ),
     ] = None
     manning: Annotated[

@@ -174,7 +174,8 @@ def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
     """Flow through every face per depth, along its normal : float64[f] [m2/s].
 
     velocity : {"expression": name, and its parameters}, {"stream": float64[p] stream function at the corners [m2/s]} or
-    {"file": CSV file with columns x, y, u, v or x, y, psi, with units in the header or in SI, interpolated linearly}.
+    {"file": table file with columns x, y, u, v or x, y, psi, with units in the header or in SI, interpolated linearly,
+    "sheet": its sheet, if it is a workbook}.
     All but the flows from u and v are exactly free of divergence in every cell. Raises ValueError or TypeError for a
     wrong expression or stream function, MeshError for a wrong file.
     """
@@ -292,8 +293,8 @@ def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.where(still, 0.0, normal * mesh.length)
 
 
-def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
-    columns = _columns(Path(file))
+def _by_file(mesh: Mesh, file: str | Path, sheet: str | None = None) -> np.ndarray:
+    columns = _columns(Path(file), sheet)
     places = np.stack([columns["x"], columns["y"]], axis=1)
     if "psi" in columns:
         return _by_corners(mesh, _interpolated(file, places, columns["psi"], mesh.points))
@@ -302,10 +303,10 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
     return velocity_flows(mesh, *velocities.T)
 
 
-def _columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV file of velocities or of a stream function : name -> float64[rows], in SI units."""
+def _columns(path: Path, sheet: str | None) -> dict[str, np.ndarray]:
+    """Columns of a table file of velocities or of a stream function : name -> float64[rows], in SI units."""
     try:
-        rows = read_rows(path)
+        rows = read_rows(path, sheet)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
             header = show(", ".join(rows.header))
             raise CsvError(

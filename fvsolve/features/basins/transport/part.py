@@ -29,7 +29,7 @@ class Velocity:
 
     form : "u, v", "stream", "expression" or "file"
     given : {"u": formula, "v": formula}, {"stream": formula}, {"expression": name, and its parameters}
-        or {"file": path}
+        or {"file": path, "sheet": name of the sheet, if stated}
     period : period of the factor cos(pi t / period) on the velocity [s], None for a constant velocity
     stated : the table of the case file, with the period in seconds and the file as the name of its copy
     """
@@ -86,7 +86,9 @@ class VelocityValue(Value):
         if "period" in given:
             period = stated["period"] = Quantity("time", positive).read(given["period"], setting)
         way = "u, v" if forms[0] in "uv" else forms[0]
-        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(keys))
+        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file", "sheet")}.get(
+            way, tuple(keys)
+        )
         faults = [
             ((key,), f"unknown key; expected {listing([*known, 'period'])}")
             for key in keys
@@ -102,7 +104,8 @@ class VelocityValue(Value):
             keys |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
         elif way == "file":
             stated["file"] = File("").read(keys["file"], setting)
-            keys = {"file": setting.files[stated["file"]]}
+            keys |= read_keys(keys, {key: (Text(), None) for key in keys}, setting)
+            keys["file"] = setting.files[stated["file"]]
         return Velocity(way, keys, period, stated)
 
 
