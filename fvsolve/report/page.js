@@ -133,10 +133,10 @@
     if (first) to(0);
   };
   for (const player of document.querySelectorAll(".player[data-for]")) {
-    const id = player.dataset.for, { trace, times, heads } = figures[id].moving;
+    const id = player.dataset.for, { trace, times, heads, dates } = figures[id].moving;
     addPlayer(player, times, (k) => {
       Plotly.restyle(chart(id), { y: [heads[k]] }, [trace]);
-      return `t = ${numberText(times[k])} s`;
+      return dates ? dates[k] : `t = ${numberText(times[k])} s`;
     });
   }
   const maps = typeof drawMaps === "function" ? Promise.all(drawn).then(() => drawMaps({ figures, chart, addPlayer, numberText })) : [];

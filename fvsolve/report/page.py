@@ -94,7 +94,21 @@ def _page(result, ways: list[SectionPath]) -> str:
         "happened": all_with_dates(events, start),
         "versions": tables.versions(result),
     }
+    add_dates(figures, start)
     return render_page("page", filled, figures)
+
+
+def add_dates(figures: dict[str, Any], start: Any) -> None:
+    """Add the dates of the frames of all sliders to the data of figures; none without a start time.
+
+    start : instant of t = 0, or None
+    """
+    for figure in figures.values() if start is not None else ():
+        moving, frames = figure.get("moving"), figure.get("map", {}).get("frames")
+        if moving is not None:
+            moving["dates"] = [start.text(t) for t in moving["times"]]
+        if frames is not None:
+            frames["dates"] = [start.text(t) for t in frames["seconds"]]
 
 
 def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
@@ -273,7 +287,10 @@ def _study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -
         "version": first.summary["versions"]["fvsolve"],
         "description": visible(first.case.description),
         "words": study_sentences(study, runs),
-        "matrix": [run_matrix(runs), *filter(None, [extreme_pressures(runs)])],
+        "matrix": [
+            run_matrix(runs),
+            *filter(None, [with_dates(extreme_pressures(runs), first.start_time)]),
+        ],
         "events": events,
         "failing": failing_limits(runs),
         "changes": change_tables(study),

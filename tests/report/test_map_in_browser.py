@@ -116,6 +116,16 @@ def test_the_map_fits_the_window(width, scheme, report, chromium):
     assert bar == pytest.approx(1.0, abs=0.01) and not said
 
 
+def test_with_a_start_time_the_slider_shows_dates(chromium, tmp_path):
+    case = pool()
+    case["numerics"]["start_time"] = "2026-03-01T06:00:00Z"
+    fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    page, said, _ = browser.opened(chromium, write_report(tmp_path / "run")[0], 1000)
+    page.locator(SLIDER).fill("5")
+    until(page, "document.querySelector('#maps .player output').textContent !== ''")
+    assert "2026-03-01T06:00:04Z" in page.locator("#maps .player output").inner_text() and not said
+
+
 def test_the_printed_map_is_large(report, chromium):
     page, _, _ = browser.opened(chromium, report, 1280)
     page.emulate_media(media="print")

@@ -182,7 +182,7 @@ const drawMaps = ({ figures, chart, addPlayer, numberText }) => {
           legend({ ...frames, source: `Values of ${series.length} of ${frames.stored} stored frames.` });
         }
         show(series[k], frames);
-        return `t = ${numberText(frames.times[k])} ${map.clock}`;
+        return frames.dates ? frames.dates[k] : `t = ${numberText(frames.times[k])} ${map.clock}`;
       }, false);
     }
 
