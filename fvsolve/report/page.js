@@ -1,6 +1,7 @@
 "use strict";
 (() => {
-  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const figures = JSON.parse(document.getElementById("figures").textContent), { scene } = figures;
+  delete figures.scene;  // pictures, which Plotly does not draw
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   const ids = Object.keys(figures), histories = ids.filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
@@ -136,6 +137,13 @@
     const id = player.dataset.for, { trace, times, heads, dates } = figures[id].moving;
     addPlayer(player, times, (k) => {
       Plotly.restyle(chart(id), { y: [heads[k]] }, [trace]);
+      return dates ? dates[k] : `t = ${numberText(times[k])} s`;
+    });
+  }
+  if (scene) {
+    const picture = document.querySelector("img.scene"), { times, dates } = scene.moving;
+    addPlayer(document.getElementById("scene-player"), times, (k) => {
+      picture.src = scene.pictures[k];
       return dates ? dates[k] : `t = ${numberText(times[k])} s`;
     });
   }

@@ -32,6 +32,7 @@ from fvsolve.report.maps.flood_map import flood_map, mapped_basins
 from fvsolve.report.maps.map_figure import map_figure
 from fvsolve.report.maps.network_figure import network_figure
 from fvsolve.report.maps.network_map import network_map
+from fvsolve.report.moving_scenes import moving_scene
 from fvsolve.report.report_table import picture_address, report_table
 from fvsolve.report.tables import ERROR_HEADER, Sentence, in_unit, open_reason, value_text
 from fvsolve.units import span
@@ -74,6 +75,7 @@ def _page(result, ways: list[SectionPath]) -> str:
     events = (tables.cavities(result), tables.events(result))
     filled = {
         **_words(result),
+        "scene": _moving_scene(result, figures),
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]),
         "run": result.summary,
@@ -224,6 +226,21 @@ def _maps(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
             }
         )
     return entries
+
+
+def _moving_scene(result, figures: dict[str, Any]) -> dict[str, Any] | None:
+    """Values for the template on the scene of bodies, if any; its pictures are added to `figures` under "scene"."""
+    scene = moving_scene(result)
+    if scene is None:
+        return None
+    if scene.pictures:
+        figures["scene"] = {"pictures": scene.pictures, "moving": {"times": scene.times}}
+    return {
+        "frames": len(scene.pictures),
+        "stored": scene.stored,
+        "fault": visible(scene.fault),
+        "first": scene.pictures[0] if scene.pictures else "",
+    }
 
 
 def _network_plans(result, figures: dict[str, Any]) -> list[dict[str, Any]]:

@@ -134,6 +134,15 @@ def test_without_maxima_the_map_shows_the_greatest_of_the_frames(tmp_path):
     assert "6 stored frames" in layer.source and "stored" in layer.name
 
 
+def test_a_basin_that_is_never_dry_has_classes_of_equal_width(tmp_path):
+    case = pool()
+    case["nodes"]["valley"] |= {"bed": "-1", "start": {"level": "where(x < 6, 0.3, 0)"}}
+    plan = flood_map(fvsolve.run(case, out=tmp_path / "run", pictures=False), "valley")
+    limits = plan.layers[0].classes.limits
+    assert limits == plan.frames.classes.limits and len(limits) >= 4
+    assert np.ptp(np.diff(limits)) == pytest.approx(0.0, abs=1e-12) and limits[0] <= 1.0
+
+
 def test_classes_in_feet_and_in_metres_draw_equal_maps(tmp_path):
     pixels = []
     for name, classes, units in (

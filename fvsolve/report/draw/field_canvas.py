@@ -28,6 +28,7 @@ from fvsolve.report.draw.sheet import (
     PictureSheet,
     colour_range,
     write_animation,
+    write_frames,
 )
 
 # height over width below which bodies are drawn in plan, or depth over width for a profile
@@ -539,11 +540,13 @@ def boundary_edges(mesh: Any) -> Any:
 
 
 def main() -> None:
-    """Read a pickled (scene, path) from standard input and write its picture or animation."""
+    """Read a pickled (scene, path) from standard input and write its picture, animation, or frames into a folder."""
     scene, out = pickle.load(sys.stdin.buffer)
     canvas = FieldCanvas(scene, len(scene.frames) > 1)
     if Path(out).suffix == ".html":
         return canvas.write_page(out)
+    if Path(out).is_dir():
+        return write_frames(canvas, len(scene.frames), Path(out))
     return write_animation(canvas, len(scene.frames), Path(out))
 
 

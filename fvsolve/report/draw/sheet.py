@@ -32,6 +32,7 @@ EVEN_TOLERANCE = 1e-9  # relative range of a uniform field
 ZERO_TOLERANCE = 1e-3  # end of a range that is shown as zero, as a fraction of the range
 LEGEND_ROWS = 4  # rows of the legend
 FRAME_TIME = 100  # duration of a frame [ms]
+FRAME_COLOURS = 96  # of a frame of a page
 
 
 def symbol_of(kinds: Sequence[str], link: bool) -> str:
@@ -211,6 +212,19 @@ def colour_range(low: float, high: float) -> tuple[float, float]:
         )
     middle, half = 0.5 * (low + high), EVEN_RANGE * most or 0.5
     return middle - half, middle + half
+
+
+def write_frames(stage: Any, count: int, folder: Path) -> None:
+    """Write all frames as files 0000.png, 0001.png, ... of few colours into a folder, for a page with a slider.
+
+    stage, count : as for `write_animation`
+    """
+    from PIL import Image
+
+    for k in range(count):
+        stage.show(k)
+        picture = Image.fromarray(stage.sheet.picture()).quantize(FRAME_COLOURS)
+        picture.save(folder / f"{k:04d}.png", optimize=True)
 
 
 def write_animation(stage: Any, count: int, out: Path) -> None:

@@ -4,6 +4,7 @@ import pickle
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 from fvsolve.compile.child_process import python_command, python_environment
@@ -56,6 +57,16 @@ def view(scene: DrawnScene, out: Path) -> None:
         except (OSError, ValueError) as error:
             raise FvsolveError(f"{out} could not be drawn: {error}") from None
     return _draw_in_process(scene, out)
+
+
+def frame_pictures(scene: DrawnScene) -> list[bytes]:
+    """Pictures of all frames of a scene of basins or bodies, as the contents of .png files.
+
+    Raises FvsolveError as `view` does.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        _draw_in_process(scene, Path(folder))
+        return [path.read_bytes() for path in sorted(Path(folder).glob("*.png"))]
 
 
 def _draw_in_process(scene: DrawnScene, out: Path) -> None:

@@ -195,7 +195,7 @@ def flood_map(result: Any, basin: str) -> FloodMap:
         found.frames = _water_frames(case, frames, settings)
         recorded = result.maxima.get(basin) or {}
         found.layers = (
-            _recorded_layers(result, recorded, settings)
+            _recorded_layers(result, recorded, settings, found.frames)
             if recorded
             else _layers_of_frames(found.frames)
         )
@@ -286,20 +286,39 @@ def _depth_classes(case: Any, settings: ReportTable) -> tuple[Classes, float]:
 def _water_frames(
     case: Any, frames: list[tuple[float, Path]], settings: ReportTable
 ) -> MapFrames | None:
-    """Depths over time; None without frames."""
+    """Depths over time; None without frames.
+
+    Where all cells are wet in all frames, as in a tank, classes of equal width show more than those of floods.
+    """
     if not frames:
         return None
     classes, factor = _depth_classes(case, settings)
     times, files = [t for t, _ in frames], [path for _, path in frames]
-    return MapFrames(
-        "depth", "depth", classes, DrawnUnit("depth", classes.unit, factor), times, files
-    )
+    shown = DrawnUnit("depth", classes.unit, factor)
+    found = MapFrames("depth", "depth", classes, shown, times, files)
+    if settings.depth_classes is None:
+        low, high = _range_of(found)
+        if low >= classes.limits[0]:
+            equal = map_classes.equal_classes(low, high, classes.unit, map_classes.BLUES)
+            found = found._replace(classes=equal)
+    return found
+
+
+def _range_of(frames: MapFrames) -> tuple[float, float]:
+    """Least and greatest value of all frames."""
+    ends = [
+        (float(own.min()), float(own.max())) for own in map(frames.values, range(len(frames.files)))
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _recorded_layers(
-    result: Any, recorded: dict[str, np.ndarray], settings: ReportTable
+    result: Any, recorded: dict[str, np.ndarray], settings: ReportTable, frames: MapFrames | None
 ) -> list[MapLayer]:
-    """Layers of the greatest values over all accepted steps, of arrival and of duration."""
+    """Layers of the greatest values over all accepted steps, of arrival and of duration.
+
+    frames : of the depth, whose classes hold for the greatest depth too; None without frames
+    """
     case = result.case
     depth = recorded["max_depth"]
     wet = depth >= settings.least_depth
@@ -307,6 +326,7 @@ def _recorded_layers(
     above = f"{value_text(float(wet_depth.from_si(case.output.wet_depth)))} {wet_depth.unit}"
     source = "Greatest values over all accepted steps of the run."
     depths, factor = _depth_classes(case, settings)
+    depths = depths if frames is None else frames.classes
     speed_factor, speed_unit = _unit(case, "velocity")
     hazard_factor, hazard_unit = _unit(case, "unit_flow")
     speeds = map_classes.stated_classes(
@@ -385,8 +405,7 @@ def _field_frames(
     shown = unit_of(case, key)
     times, files = [t for t, _ in frames], [path for _, path in frames]
     found = MapFrames(key, key.replace("_", " "), Classes((), (), ""), shown, times, files)
-    ends = [(float(own.min()), float(own.max())) for own in map(found.values, range(len(files)))]
-    low, high = min(low for low, _ in ends), max(high for _, high in ends)
+    low, high = _range_of(found)
     classes = map_classes.equal_classes(low, high, shown.unit, map_classes.HEAT)
     layer = MapLayer(
         key,
