@@ -37,7 +37,7 @@ def test_a_report_of_bodies_has_a_picture_of_each_frame(lifted):
         assert not said and [item for item in asked if item.startswith("http")] == []
 
 
-def test_without_pyvista_the_report_says_why_it_has_no_scene(lifted, monkeypatch):
+def test_without_pyvista_the_report_names_the_missing_library(lifted, monkeypatch):
     def failed(scene):
         raise FvsolveError("PyVista is missing")
 
