@@ -28,7 +28,7 @@ from fvsolve.report.long_section import (
     section_of,
     section_paths,
 )
-from fvsolve.report.maps.flood_map import flood_map, mapped_basins
+from fvsolve.report.maps.flood_map import basins_without_values, flood_map, mapped_basins
 from fvsolve.report.maps.map_figure import map_figure
 from fvsolve.report.maps.network_figure import network_figure
 from fvsolve.report.maps.network_map import network_map
@@ -83,7 +83,8 @@ def _page(result, ways: list[SectionPath]) -> str:
         "source": visible(result.case.source),
         "ended": result.summary.get("ended", ""),
         "words": tables.top_sentences(result),
-        "maps": [*_maps(result, figures), *_network_plans(result, figures)],
+        "maps": (maps := [*_maps(result, figures), *_network_plans(result, figures)]),
+        "unmapped": [] if maps else basins_without_values(result),
         "limits": with_dates(tables.verdict_table(result), start),
         "worst": with_dates(tables.extremes_of_pipes(result, ways), start) or probes,
         "sections": _sections(result, sections, figures),

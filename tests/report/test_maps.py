@@ -81,6 +81,18 @@ def test_equal_classes_have_round_limits(low, high, limits):
     assert equal_classes(low, high, "min", ("#000000", "#ffffff")).limits == limits
 
 
+def test_a_value_below_zero_by_rounding_needs_no_class():
+    assert equal_classes(-1e-15, 0.8, "mg/l", ("#000000", "#ffffff")).limits[0] == 0.0
+
+
+def test_a_basin_without_stored_values_is_named(tmp_path):
+    case = pool()
+    case["output"] = {"probes": ["valley.volume"], "fields": 0}
+    result = fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    page = write_report(result.directory)[0].read_text()
+    assert "No map of valley: neither greatest values nor frames were stored." in page
+
+
 def test_limits_in_feet_are_round_numbers():
     feet = [round_limit(limit / 0.3048) for limit in (0.05, 0.1, 0.3, 0.5, 1.0, 2.0)]
     assert feet == [0.15, 0.3, 1.0, 1.5, 3.0, 7.0]

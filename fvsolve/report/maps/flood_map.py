@@ -52,7 +52,11 @@ class MapLayer(NamedTuple):
 
 
 class MapFrames(NamedTuple):
-    """Values of a quantity over time, in the unit `shown`. times : of the frames [s]; files : of each frame"""
+    """Values of a quantity over time, in the unit `shown`.
+
+    times : of the frames [s]; files : of each frame
+    least : lower values are raised to it, which differ from it by rounding; -inf for none
+    """
 
     key: str
     name: str
@@ -60,10 +64,12 @@ class MapFrames(NamedTuple):
     shown: DrawnUnit
     times: list[float]
     files: list[Path]
+    least: float = -math.inf
 
     def values(self, k: int) -> np.ndarray:
         """Values of frame `k` : float64[cells]."""
-        return self.shown.factor * frame_field(self.files[k], self.key) + self.shown.shift
+        values = self.shown.factor * frame_field(self.files[k], self.key) + self.shown.shift
+        return np.maximum(values, self.least)
 
 
 @dataclass
@@ -169,6 +175,14 @@ def mapped_basins(result: Any) -> list[str]:
         for name in result.case.meshes
         if name not in result.case.links  # the water of a conduit
         and (frames.get(name) or result.maxima.get(name))
+    ]
+
+
+def basins_without_values(result: Any) -> list[str]:
+    """Names of the basins of which a run stored neither greatest values nor frames, so that they have no map."""
+    mapped = mapped_basins(result)
+    return [
+        name for name in result.case.meshes if name not in result.case.links and name not in mapped
     ]
 
 
@@ -300,7 +314,7 @@ def _water_frames(
         low, high = _range_of(found)
         if low >= classes.limits[0]:
             equal = map_classes.equal_classes(low, high, classes.unit, map_classes.BLUES)
-            found = found._replace(classes=equal)
+            found = found._replace(classes=equal, least=equal.limits[0])
     return found
 
 
@@ -407,6 +421,7 @@ def _field_frames(
     found = MapFrames(key, key.replace("_", " "), Classes((), (), ""), shown, times, files)
     low, high = _range_of(found)
     classes = map_classes.equal_classes(low, high, shown.unit, map_classes.HEAT)
+    found = found._replace(classes=classes, least=classes.limits[0])
     layer = MapLayer(
         key,
         f"{found.name} at the end",
@@ -414,4 +429,4 @@ def _field_frames(
         classes,
         "Values of the last stored frame.",
     )
-    return found._replace(classes=classes), layer
+    return found, layer

@@ -15,6 +15,7 @@ HAZARD = ("#a6d96a", "#fee08b", "#fdae61", "#e0522f", "#7b1fa2")
 TIMES = ("#3b1f6b", "#3f4f9a", "#2f7f9f", "#2aa787", "#7ac55a", "#d3d63f", "#fdeb6b")
 STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0)  # round numbers in a decade, for limits in any unit
 MOST_EQUAL = 7  # greatest number of equal classes
+NEAR = 1e-6  # of the width of a class, by which values may lie below the first class
 
 
 class Classes(NamedTuple):
@@ -97,7 +98,8 @@ def equal_classes(low: float, high: float, unit: str, anchors: Sequence[str]) ->
     width = next(
         step * power for step in (1.0, 2.0, 2.5, 5.0, 10.0) if step * power >= raw * (1 - 1e-9)
     )
-    first = math.floor(low / width * (1.0 + 1e-12))
-    last = max(math.ceil(high / width * (1.0 - 1e-12)), first + 1)
+    # an end that lies beyond a limit by rounding needs no class of its own
+    first = math.floor(low / width + NEAR)
+    last = max(math.ceil(high / width - NEAR), first + 1)
     limits = tuple(float(f"{width * k:.12g}") for k in range(first, last))
     return Classes(limits, colours_between(anchors, len(limits)), unit)

@@ -182,6 +182,8 @@ def _layers(result: Any, plan: NetworkMap) -> list[PlanLayer]:
         unit = unit_of(case, key).unit
         classes = map_classes.equal_classes(float(values.min()), float(values.max()), unit, colours)
         worst = int(values.argmax() if reduce is np.maximum else values.argmin())
+        # values that rounding brings below the first class belong to it
+        values = np.maximum(values, classes.limits[0])
         found.append(PlanLayer(name, values, classes, source, worst))
     used = _utilisation(result, plan, found[0].values)
     if used is not None:
@@ -225,7 +227,9 @@ def _add_frames(result: Any, plan: NetworkMap) -> None:
         plan.frames.append(shown.factor * _means(plan, pressure, owner) + shown.shift)
     low = min(float(values.min()) for values in plan.frames)
     high = max(float(values.max()) for values in plan.frames)
-    plan.frame_classes = map_classes.equal_classes(low, high, shown.unit, map_classes.HEAT)
+    classes = map_classes.equal_classes(low, high, shown.unit, map_classes.HEAT)
+    plan.frames = [np.maximum(values, classes.limits[0]) for values in plan.frames]
+    plan.frame_classes = classes
 
 
 def _means(plan: NetworkMap, values: np.ndarray, owner: np.ndarray) -> np.ndarray:
