@@ -194,7 +194,7 @@ def test_a_slope_that_faces_the_sun_is_bright(flooded):
 
 def test_conduits_lie_between_the_shafts_below_their_manholes():
     case = fvsolve.load(pool())
-    places = node_places(case)
+    places = node_places(case, "valley")
     assert places.at["upper"].tolist() == [15.5, 6.5] and places.at["lower"].tolist() == [20.5, 6.5]
     assert places.at["river"].tolist() == [28.5, 6.5] and places.assumed == {"river"}
     shapes = {(shape.kind, shape.name): shape for shape in shapes_of(case, "valley")}
@@ -206,6 +206,35 @@ def test_conduits_lie_between_the_shafts_below_their_manholes():
     }
 
 
+def test_a_structure_ends_at_the_edge_of_a_map_if_the_place_of_the_next_basin_is_unknown():
+    """Both basins of the road culvert begin at (0, 0), although they lie behind each other."""
+    case = fvsolve.load("road-culvert")
+    for basin, x in (("above", 28.0), ("below", 0.0)):
+        shapes = {shape.name: shape for shape in shapes_of(case, basin)}
+        assert shapes["under"].points.tolist() == [[x, 6.0]]
+    beside = fvsolve.load(
+        "road-culvert",
+        set={"nodes.above.position": [0.0, 0.0], "nodes.below.position": [40.0, 0.0]},
+    )
+    shapes = {shape.name: shape for shape in shapes_of(beside, "below")}
+    assert shapes["under"].points.tolist() == [[-12.0, 6.0], [0.0, 6.0]]
+
+
+def test_a_pipe_without_stated_end_leads_out_of_the_basin():
+    case = pool()
+    case["nodes"]["sea"] = {"type": "reservoir", "elevation": "-1 m", "head": "-0.5 m"}
+    case["nodes"]["valley"]["patches"]["west"] = {"side": "west"}
+    case["links"]["drain"] = {
+        "type": "rigid-column",
+        "from": "valley.west",
+        "to": "sea",
+        "length": "10 m",
+        "diameter": "0.3 m",
+    }
+    places = node_places(fvsolve.load(case), "valley")
+    assert places.at["sea"].tolist() == [-10.0, 6.0] and "sea" in places.assumed
+
+
 def test_places_do_not_depend_on_the_order_and_direction_of_links():
     case = pool()
     turned = pool()
@@ -214,7 +243,7 @@ def test_places_do_not_depend_on_the_order_and_direction_of_links():
         link["from"], link["to"] = link["to"], link["from"]
         if "inverts" in link:
             link["inverts"] = link["inverts"][::-1]
-    first, second = (node_places(fvsolve.load(each)) for each in (case, turned))
+    first, second = (node_places(fvsolve.load(item), "valley") for item in (case, turned))
     assert first.assumed == second.assumed and first.at.keys() == second.at.keys()
     for name, place in first.at.items():
         assert second.at[name] == pytest.approx(place)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.core.output.network_layout import link_bends, link_path, place
-from fvsolve.core.output.node_places import NodePlaces, node_places, patch_middle
+from fvsolve.core.output.node_places import NodePlaces, end_place, node_places
 
 BEND_POINTS = 9  # points of a bent link
 
@@ -28,8 +28,7 @@ class MapShape(NamedTuple):
 
 def shapes_of(case: Any, basin: str) -> list[MapShape]:
     """Shapes on the map of a basin, in the order in which they are drawn, in its own coordinates [m]."""
-    places = node_places(case)
-    shift = np.array(case.nodes[basin].position or (0.0, 0.0))
+    places, shift = node_places(case, basin), _shift(case, basin)
     found = [
         *_patches(case, basin),
         *_sections(case, basin),
@@ -87,17 +86,24 @@ def _gauges(case: Any, basin: str) -> Iterator[MapShape]:
 
 
 def _links(case: Any, places: NodePlaces) -> Iterator[MapShape]:
-    """Conduits and pipes between nodes with places."""
+    """Conduits, pipes and other links with a length between nodes with places."""
     bends = link_bends(case.links)
     for name, link in case.links.items():
-        if link.kind not in ("pipe", "conduit"):
+        if not is_line(case, link):
             continue
         points = link_points(case, places, name, bends[name])
         if points is not None:
             ends = [place(port) for port in link.ports.values()]
-            yield MapShape(
-                link.kind, name, points, link.kind, any(end in places.assumed for end in ends)
-            )
+            kind = "conduit" if link.kind == "conduit" else "pipe"
+            assumed = any(end in places.assumed for end in ends)
+            yield MapShape(kind, name, points, link.kind.replace("-", " "), assumed)
+
+
+def is_line(case: Any, link: Any) -> bool:
+    """True if a link is drawn as a line between nodes: it has a length, and does not join two patches of basins."""
+    ports = [place(port) for port in link.ports.values()]
+    in_basins = all(port in case.meshes for port in ports)
+    return bool(getattr(link, "length", None)) and len(ports) == 2 and not in_basins
 
 
 def link_points(case: Any, places: NodePlaces, name: str, bend: float) -> np.ndarray | None:
@@ -116,17 +122,11 @@ def link_points(case: Any, places: NodePlaces, name: str, bend: float) -> np.nda
     return link_path(ends[0], ends[-1], fractions, bend)
 
 
-def end_place(case: Any, places: NodePlaces, port: str) -> np.ndarray | None:
-    """Place of the end of a link : float64[2] [m]; None if it is unknown."""
-    middle = patch_middle(case, port)
-    return places.at.get(place(port)) if middle is None else middle
-
-
 def _structures(case: Any, basin: str, places: NodePlaces) -> Iterator[MapShape]:
-    """Links other than pipes and conduits that end at a patch of the basin."""
+    """Links without a length, or between two patches, that end at a patch of the basin."""
     for name, link in case.links.items():
         ports = list(link.ports.values())
-        if link.kind in ("pipe", "conduit") or basin not in map(place, ports):
+        if is_line(case, link) or basin not in map(place, ports):
             continue
         ends = [spot for port in ports if (spot := end_place(case, places, port)) is not None]
         yield MapShape("structure", name, np.array(ends), link.kind.replace("-", " "))
