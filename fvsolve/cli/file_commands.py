@@ -52,6 +52,10 @@ def report(
     """Write an offline HTML page of a run or a study: verdicts, maps, long sections, histories, model, numerics."""
     from fvsolve.report.report_files import write_report
 
+    if pdf and out is not None and out.suffix == ".pdf":
+        raise FvsolveError(
+            f"--out {out} is the name of the PDF; expected --out FILE.html with --pdf"
+        )
     paths = write_report(directory, out, xlsx)
     for path in paths:
         print(path)

@@ -147,7 +147,9 @@
       return dates ? dates[k] : `t = ${numberText(times[k])} s`;
     });
   }
-  const maps = typeof drawMaps === "function" ? Promise.all(drawn).then(() => drawMaps({ figures, chart, addPlayer, numberText })) : [];
+  const maps = typeof drawMaps === "function" ? Promise.all(drawn).then(() => drawMaps({ figures, chart, addPlayer, numberText })).catch((error) => {
+    for (const note of document.querySelectorAll(".map .source")) note.textContent = `The map is not drawn by this browser (${error}); expected a browser of 2023 or later.`;
+  }) : [];
 
   // Printed pages have light colours and their own sizes [px], without the animated line; other content follows the figures.
   // A section fills the rest of its page, or starts on the next page if the rest is too small.

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from fvsolve.errors import FvsolveError
+from fvsolve.file_replacement import write_file
 
 # commands of browsers that print without a window, and their places on Windows and macOS
 BROWSERS = (
@@ -74,7 +75,10 @@ def write_pdf(page: Path) -> Path:
         if done.returncode or not fresh.is_file():
             lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no message"]
             raise FvsolveError(_failed(page, browser, lines[-1]))
-        shutil.move(fresh, out)
+        try:
+            write_file(out, fresh.read_bytes())
+        except OSError as error:
+            raise FvsolveError(f"{out}: cannot be written: {error.strerror or error}") from None
     return out
 
 

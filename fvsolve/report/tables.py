@@ -385,7 +385,8 @@ def top_sentences(result) -> list[Sentence]:
     ):
         if claims := [item for item in result.expectations if item.state == state]:
             first = claims[0]
-            text = f"{first.text}: expected {first.claimed:.6g}, computed {value_text(first.found)} {first.unit}"
+            claimed, found = value_text(first.claimed), value_text(first.found)
+            text = f"{first.text}: expected {claimed}, computed {found} {first.unit}"
             more = f"; and {len(claims) - 1} more, under Numerics" if len(claims) > 1 else ""
             rows.append(Sentence(level, head, text + more))
     return rows

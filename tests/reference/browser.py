@@ -47,6 +47,15 @@ def opened(started, path, width: int, height: int = 1000, **settings):
     return page, said, asked
 
 
+def until(page, expression: str) -> None:
+    """Wait until a JavaScript expression is true; the function of Playwright evaluates text, which the page forbids."""
+    for _ in range(200):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"it never came: {expression}")
+
+
 MM = 72.0 / 25.4  # points per millimetre
 
 

@@ -46,15 +46,6 @@ def heads(page) -> list:
     return page.evaluate("id => document.querySelector(id).data.at(-1).y.slice()", "#section-0")
 
 
-def until(page, what: str) -> None:
-    """Wait until a JavaScript expression is true; the function of Playwright evaluates text, which the page forbids."""
-    for _ in range(200):
-        if page.evaluate(what):
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError(f"it never came: {what}")
-
-
 def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, chromium):
     page, said, asked = browser.opened(chromium, report, 1000)
     assert page.title() == TITLE and page.inner_text("h1") == TITLE
@@ -85,12 +76,12 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     )
     before = heads(page)
     page.click(".player button")
-    until(page, "Number(document.querySelector('.player input').value) >= 2")
+    browser.until(page, "Number(document.querySelector('.player input').value) >= 2")
     assert heads(page) != before and "Pause" in page.inner_text(".player button")
-    until(page, "document.querySelector('.player button').textContent == 'Play'")
+    browser.until(page, "document.querySelector('.player button').textContent == 'Play'")
     assert "t = 3 s" in page.inner_text(".player output")
     page.evaluate("Plotly.relayout('history-0', {'xaxis.range[0]': 0.4, 'xaxis.range[1]': 1.2})")
-    until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
+    browser.until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
     name = "a <b>bold</b> & $x$ &lt; </script>"
     page.evaluate(
         "name => Plotly.relayout('history-1', {'xaxis.title.text': name})", escape_markup(name)
@@ -175,10 +166,10 @@ def test_a_dark_screen_has_a_dark_page_and_paper_stays_light(report, chromium):
     assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "dark")
     ground = "document.querySelector('#section-0').layout.paper_bgcolor"
     page.emulate_media(color_scheme="light")
-    until(page, f"{ground} == '#ffffff'")
+    browser.until(page, f"{ground} == '#ffffff'")
     assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "light")
     page.emulate_media(color_scheme="dark")
-    until(page, f"{ground} != '#ffffff'")
+    browser.until(page, f"{ground} != '#ffffff'")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print")
     assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "light")

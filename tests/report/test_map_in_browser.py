@@ -29,15 +29,6 @@ def chromium():
         yield started
 
 
-def until(page, expression: str) -> None:
-    """Wait until a JavaScript expression is true."""
-    for _ in range(200):
-        if page.evaluate(expression):
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError(f"it never came: {expression}")
-
-
 def test_layers_and_slider_change_the_picture_without_network_or_messages(report, chromium):
     page, said, asked = browser.opened(chromium, report, 1280)
     layers = page.locator("#maps .layers button")
@@ -52,14 +43,14 @@ def test_layers_and_slider_change_the_picture_without_network_or_messages(report
     pictures = [page.evaluate(IMAGE)]
     for k in range(1, 5):
         layers.nth(k).click()
-        until(page, f"{IMAGE} !== {pictures[-1]!r}")
+        browser.until(page, f"{IMAGE} !== {pictures[-1]!r}")
         pictures.append(page.evaluate(IMAGE))
     assert len(set(pictures)) == 5
     assert (
         page.locator("#maps .classes").inner_text().lower().startswith("duration of flooding [s]")
     )
     page.locator(SLIDER).fill("3")
-    until(page, f"{IMAGE} !== {pictures[-1]!r}")
+    browser.until(page, f"{IMAGE} !== {pictures[-1]!r}")
     assert layers.nth(5).get_attribute("aria-pressed") == "true"
     assert page.locator("#maps .player output").inner_text() == "t = 1.5 s"
     assert not said and asked == [report.as_uri()]
@@ -68,8 +59,8 @@ def test_layers_and_slider_change_the_picture_without_network_or_messages(report
 def test_the_map_plays_to_the_last_frame(report, chromium):
     page, said, _ = browser.opened(chromium, report, 1000)
     page.locator("#maps .player button").click()
-    until(page, f"document.querySelector('{SLIDER}').value === '8'")
-    until(page, "document.querySelector('#maps .player button').textContent === 'Play'")
+    browser.until(page, f"document.querySelector('{SLIDER}').value === '8'")
+    browser.until(page, "document.querySelector('#maps .player button').textContent === 'Play'")
     assert page.locator("#maps .player output").inner_text() == "t = 4 s" and not said
 
 
@@ -84,7 +75,7 @@ def test_a_click_on_a_cell_shows_its_depth_over_time(flooded, report, chromium):
         "return [box.left + xaxis._offset + xaxis.d2p(3.4), box.top + yaxis._offset + yaxis.d2p(6.3)]; }"
     )
     page.mouse.click(x, y)
-    until(page, "document.querySelector('#maps .cell').data?.length === 1")
+    browser.until(page, "document.querySelector('#maps .cell').data?.length === 1")
     shown = page.evaluate("[...document.querySelector('#maps .cell').data[0].y]")
     files = basin_frames(flooded)["valley"]
     depths = [float(frame_field(path, "depth")[6 * 24 + 3]) for _, path in files]
@@ -122,7 +113,7 @@ def test_with_a_start_time_the_slider_shows_dates(chromium, tmp_path):
     fvsolve.run(case, out=tmp_path / "run", pictures=False)
     page, said, _ = browser.opened(chromium, write_report(tmp_path / "run")[0], 1000)
     page.locator(SLIDER).fill("5")
-    until(page, "document.querySelector('#maps .player output').textContent !== ''")
+    browser.until(page, "document.querySelector('#maps .player output').textContent !== ''")
     assert "2026-03-01T06:00:04Z" in page.locator("#maps .player output").inner_text() and not said
 
 

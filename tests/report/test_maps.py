@@ -176,6 +176,16 @@ def test_classes_in_feet_and_in_metres_draw_equal_maps(tmp_path):
     assert np.array_equal(*pixels) and (pixels[0] == 2).any()
 
 
+def test_a_stated_least_depth_is_kept_to_the_digit_in_feet(tmp_path):
+    case = pool(report={"least_depth": "0.04 ft"})
+    case["output"] = case["output"] | {"units": {"level": "ft", "length": "ft"}}
+    result = fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    plan = flood_map(result, "valley")
+    assert plan.layers[0].classes.limits == (0.04, 0.15, 0.3, 1.0, 1.5, 3.0, 7.0)
+    wet = (result.maxima["valley"]["max_depth"] >= 0.04 * 0.3048).sum()
+    assert plan.areas(plan.layers[0]).sum() == plan.areas(plan.layers[1]).sum() == wet
+
+
 def test_coordinates_are_those_of_the_reference_system(tmp_path):
     case = pool()
     case["nodes"]["valley"] |= {"origin": [500000.0, 5300000.0], "crs": "EPSG:32632"}

@@ -113,6 +113,11 @@ def test_the_images_of_pages_are_of_a4_and_show_the_curves_of_each_event(study, 
     assert sum(count > 500 for count in curves) >= 2
 
 
+def test_the_pdf_replaces_no_page_of_the_same_name(study, fvs, tmp_path):
+    code, _, said = fvs("report", study, "--out", tmp_path / "page.pdf", "--pdf")
+    assert code == 2 and "expected --out FILE.html" in said
+
+
 def test_without_a_browser_the_message_is_how_to_print(study, fvs, monkeypatch):
     monkeypatch.setenv("FVSOLVE_BROWSER", "no-such-browser")
     code, out, said = fvs("report", study, "--pdf")

@@ -6,18 +6,29 @@ import numpy as np
 
 from fvsolve.report.draw import style
 
-LINES = {  # kind of a shape -> colour, width [points] and dashes
-    "patch": ("#0f8069", 2.2, "-"),
-    "section": ("#7d3f98", 1.3, (0, (5, 3))),
-    "pipe": ("#1d2730", 1.4, "-"),
-    "conduit": ("#1d2730", 2.0, "-"),
-    "wall": ("#7a1f1f", 2.2, "-"),
-    "structure": ("#c9571f", 2.6, "-"),
+# colours of the kinds of shapes, also on maps of a page; other than those that a page changes on dark screens
+SHAPE_COLOURS = {
+    "patch": "#0f8069",
+    "section": "#7d3f98",
+    "pipe": "#1d2730",
+    "conduit": "#1d2730",
+    "wall": "#7a1f1f",
+    "structure": "#c9571f",
+    "node": "#1d2730",
+    "gauge": "#9c2c45",
 }
-POINTS = {  # kind of a shape -> marker, colour, size, and shift of its name [points]
-    "node": ("o", "#1d2730", 5.0, (0, 5)),
-    "structure": ("s", "#c9571f", 4.0, (0, -11)),
-    "gauge": ("D", "#9c2c45", 5.0, (8, -3)),
+LINES = {  # kind of a shape -> width [points] and dashes
+    "patch": (2.2, "-"),
+    "section": (1.3, (0, (5, 3))),
+    "pipe": (1.4, "-"),
+    "conduit": (2.0, "-"),
+    "wall": (2.2, "-"),
+    "structure": (2.6, "-"),
+}
+POINTS = {  # kind of a shape -> marker, size, and shift of its name [points]
+    "node": ("o", 5.0, (0, 5)),
+    "structure": ("s", 4.0, (0, -11)),
+    "gauge": ("D", 5.0, (8, -3)),
 }
 ASSUMED_DASHES = (0, (2, 2))  # of lines whose place is not stated
 MAX_NAMES = 60  # greatest number of names of a kind
@@ -81,14 +92,14 @@ def painted(plan, layer) -> np.ndarray:
 def _draw_line(axes, plan, shape) -> None:
     if shape.kind not in LINES or len(shape.points) < 2:
         return
-    colour, width, dashes = LINES[shape.kind]
+    colour, (width, dashes) = SHAPE_COLOURS[shape.kind], LINES[shape.kind]
     x, y = (shape.points + np.array(plan.origin)).T
     dashes = ASSUMED_DASHES if shape.assumed else dashes
     axes.plot(x, y, color=colour, linewidth=width, linestyle=dashes, zorder=2)
 
 
 def _draw_points(axes, plan, kind: str) -> None:
-    marker, colour, size, shift = POINTS[kind]
+    colour, (marker, size, shift) = SHAPE_COLOURS[kind], POINTS[kind]
     own = [shape for shape in plan.shapes if shape.kind == kind]
     for shape in own:
         x, y = np.nanmean(shape.points, axis=0) + plan.origin
@@ -153,10 +164,10 @@ def _legend(axes, plan, layer) -> None:
     handles = _class_handles(classes, texts)
     kinds = dict.fromkeys(shape.kind for shape in plan.shapes)
     for kind in [kind for kind in LINES if kind in kinds and kind not in POINTS]:
-        colour, width, dashes = LINES[kind]
+        colour, (width, dashes) = SHAPE_COLOURS[kind], LINES[kind]
         handles.append(Line2D([], [], color=colour, linewidth=width, linestyle=dashes, label=kind))
     for kind in [kind for kind in POINTS if kind in kinds]:
-        marker, colour, size, _ = POINTS[kind]
+        colour, (marker, size, _) = SHAPE_COLOURS[kind], POINTS[kind]
         face = "white" if kind == "node" else colour
         handles.append(
             Line2D(
@@ -197,9 +208,9 @@ def network_figure(plan, layer, extent):
             LineCollection(plan.ends[numbers == k], colors=colour, linewidths=2.6, zorder=2)
         )
     for name, points in plan.others.items():
-        axes.plot(*points.T, color=LINES["structure"][0], linewidth=1.2, zorder=1)
+        axes.plot(*points.T, color=SHAPE_COLOURS["structure"], linewidth=1.2, zorder=1)
         spot = points.mean(axis=0)
-        axes.plot(*spot, "s", color=LINES["structure"][0], markersize=4, zorder=3)
+        axes.plot(*spot, "s", color=SHAPE_COLOURS["structure"], markersize=4, zorder=3)
         if len(plan.others) <= MAX_NAMES:
             _name_point(axes, name, spot, (0, -11))
     for name, spot in plan.nodes.items():

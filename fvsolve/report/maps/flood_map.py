@@ -291,10 +291,13 @@ def _unit(case: Any, dimension: str) -> tuple[float, str]:
 def _depth_classes(case: Any, settings: ReportTable) -> tuple[Classes, float]:
     """Classes of depth, and factor of their unit. The lowest class begins at the least depth that is drawn."""
     factor, unit = _unit(case, "level")
-    limits = settings.depth_classes or DEPTHS
-    limits = (settings.least_depth, *(limit for limit in limits if limit > settings.least_depth))
-    given = settings.depth_classes is not None
-    return map_classes.stated_classes(limits, factor, unit, map_classes.BLUES, not given), factor
+    least, given = settings.least_depth, settings.depth_classes is not None
+    above = [limit for limit in settings.depth_classes or DEPTHS if limit > least]
+    limits = (least, *above)
+    classes = map_classes.stated_classes(limits, factor, unit, map_classes.BLUES, not given)
+    # the least depth is that of the case to the digit, also in units in which other limits are rounded
+    exact = float(f"{factor * least:.12g}")
+    return classes._replace(limits=(exact, *classes.limits[1:])), factor
 
 
 def _water_frames(

@@ -56,7 +56,8 @@ const drawMaps = ({ figures, chart, addPlayer, numberText }) => {
   };
 
   // Pieces of pipes: a line for each class.
-  const piecePainter = async (plot, { lines }) => {
+  const piecePainter = async (plot, { lines, extent }) => {
+    const middle = 0.5 * (extent[0] + extent[1]);
     const numbers = ({ bdata }) => new Float64Array(Uint8Array.from(atob(bdata), (letter) => letter.charCodeAt(0)).buffer);
     const x = numbers(lines.x), y = numbers(lines.y), { pipe, names, classes } = lines;
     const worst = plot.data.length - 2;
@@ -78,6 +79,7 @@ const drawMaps = ({ figures, chart, addPlayer, numberText }) => {
       const change = {
         x: [...across, [place ? place.x : null]], y: [...along, [place ? place.y : null]],
         "line.color": [...shown, "#000000"], text: [...Array(classes).fill(null), [place ? place.text : ""]],
+        textposition: [...Array(classes).fill("top center"), place && place.x > middle ? "bottom left" : "bottom right"],
       };
       return Plotly.restyle(plot, change, [...Array(classes).keys(), worst]);
     };

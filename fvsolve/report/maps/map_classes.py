@@ -11,6 +11,8 @@ from fvsolve.report.tables import value_text
 # Colours of the lowest to the highest class.
 BLUES = ("#cfe8f7", "#9ecae9", "#6aaed6", "#3d8dc4", "#1f6aae", "#0d4a8b", "#072f5f")
 HEAT = ("#fff0b8", "#fdd271", "#fba94a", "#f27a31", "#d8481f", "#a81d1a", "#6b0f1a")
+# visible as lines on light and on dark pages
+SPECTRUM = ("#3a78c3", "#2fa39b", "#7fb84d", "#d9b62c", "#ee8730", "#e0452f", "#c2187a")
 HAZARD = ("#a6d96a", "#fee08b", "#fdae61", "#e0522f", "#7b1fa2")
 TIMES = ("#3b1f6b", "#3f4f9a", "#2f7f9f", "#2aa787", "#7ac55a", "#d3d63f", "#fdeb6b")
 STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0)  # round numbers in a decade, for limits in any unit
@@ -77,12 +79,10 @@ def stated_classes(
     factor : of the unit, so that a value in it is factor times the value in SI
     rounded : True to replace each limit by a round number in the unit, if the unit is not decimal
     """
-    scaled = [factor * limit for limit in limits]
+    scaled = [float(f"{factor * limit:.12g}") for limit in limits]
     is_decimal = abs(math.log10(factor) - round(math.log10(factor))) < 1e-9
     if rounded and not is_decimal:
         scaled = [round_limit(limit) if limit > 0.0 else limit for limit in scaled]
-    else:
-        scaled = [float(f"{limit:.12g}") for limit in scaled]
     return Classes(tuple(scaled), colours_between(anchors, len(scaled)), unit)
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.report.draw.map_picture import SHAPE_COLOURS
 from fvsolve.report.draw.style import DOUBT, INK
 from fvsolve.report.figures import FONT, chart_layout, escape_markup
 from fvsolve.report.maps.flood_map import FloodMap, MapFrames, MapLayer, map_clock
@@ -22,18 +23,18 @@ from fvsolve.report.tables import decimal_sign
 MAX_FRAMES = 90  # of a map
 MAX_RAW = 24_000_000  # greatest number of bytes of the frames of a map in the browser
 MAX_PACKED = 5_000_000  # greatest number of bytes of the frames of a map in the page
-LOOKS = {  # kind of a shape -> colour, width [px] and dash
-    "patch": ("#0f8069", 3.0, "solid"),
-    "section": ("#7d3f98", 2.0, "6px,4px"),
-    "pipe": ("#1d2730", 2.0, "solid"),
-    "conduit": ("#1d2730", 3.0, "solid"),
-    "wall": ("#7a1f1f", 3.0, "solid"),
-    "structure": ("#c9571f", 4.0, "solid"),
+LOOKS = {  # kind of a shape -> width [px] and dash
+    "patch": (3.0, "solid"),
+    "section": (2.0, "6px,4px"),
+    "pipe": (2.0, "solid"),
+    "conduit": (3.0, "solid"),
+    "wall": (3.0, "solid"),
+    "structure": (4.0, "solid"),
 }
-POINTS = {  # kind of a shape -> symbol of Plotly, colour, size [px], position of its name
-    "node": ("circle-open-dot", "#1d2730", 9, "top center"),
-    "structure": ("square", "#c9571f", 7, "bottom center"),
-    "gauge": ("diamond", "#9c2c45", 9, "middle right"),
+POINTS = {  # kind of a shape -> symbol of Plotly, size [px], position of its name
+    "node": ("circle-open-dot", 9, "top center"),
+    "structure": ("square", 7, "bottom center"),
+    "gauge": ("diamond", 9, "middle right"),
 }
 # the cell that a reader has clicked; the script sets its place
 CHOSEN_CELL = {
@@ -190,7 +191,7 @@ def _lines(plan: FloodMap) -> list[dict[str, Any]]:
     for shape in plan.shapes:
         if shape.kind not in LOOKS or len(shape.points) < 2:
             continue
-        colour, width, dash = LOOKS[shape.kind]
+        colour, (width, dash) = SHAPE_COLOURS[shape.kind], LOOKS[shape.kind]
         x, y = _shifted(plan, shape)
         traces.append(
             {
@@ -219,7 +220,8 @@ def hover_name(shape: MapShape) -> str:
 
 def _points(plan: FloodMap) -> list[dict[str, Any]]:
     traces = []
-    for kind, (symbol, colour, size, position) in POINTS.items():
+    for kind, (symbol, size, position) in POINTS.items():
+        colour = SHAPE_COLOURS[kind]
         own = [shape for shape in plan.shapes if shape.kind == kind]
         if not own:
             continue

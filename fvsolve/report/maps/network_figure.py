@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.report.draw.map_picture import SHAPE_COLOURS
+from fvsolve.report.draw.style import DOUBT
 from fvsolve.report.figures import chart_layout, escape_markup, packed_array
 from fvsolve.report.maps.flood_map import map_clock
 from fvsolve.report.maps.map_figure import CELL_HEIGHT, CHOSEN_CELL, plan_layout
@@ -21,7 +23,7 @@ from fvsolve.report.tables import value_text
 MARGIN = 0.06  # around the network, as a fraction of its size
 LEAST_SHARE = 0.25  # least height of a plan over its width
 MAX_NAMES = 45  # greatest number of nodes with names
-LINK_COLOUR, NODE_COLOUR, WORST_COLOUR = "#c9571f", "#52606d", "#c2410c"
+LINK_COLOUR, NODE_COLOUR, WORST_COLOUR = SHAPE_COLOURS["structure"], "#52606d", DOUBT
 
 
 def network_figure(plan: NetworkMap, case: Any) -> dict[str, Any]:

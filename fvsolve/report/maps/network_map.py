@@ -22,7 +22,7 @@ MAX_PIECES = 12_000  # of all pipes together
 PIECES_PER_PIPE = 60  # greatest number of pieces of a pipe
 MAX_FRAMES = 60
 UTILISATIONS = (0.0, 50.0, 70.0, 80.0, 90.0, 100.0)  # limits of classes of the utilisation [%]
-USED = ("#b7dfb9", "#7fc48a", "#fee08b", "#fdae61", "#e8703a", "#9c0f2e")
+USED = ("#3a78c3", "#2fa39b", "#7fb84d", "#d9b62c", "#ee8730", "#d8124f")
 
 
 class PlanLayer(NamedTuple):
@@ -173,10 +173,10 @@ def _layers(result: Any, plan: NetworkMap) -> list[PlanLayer]:
     case, source = result.case, "Extremes over all accepted steps of the run."
     found = []
     for key, name, reduce, colours in (
-        ("max_pressure", "greatest pressure", np.maximum, map_classes.HEAT),
-        ("min_pressure", "least pressure", np.minimum, map_classes.HEAT[::-1]),
-        ("max_head", "greatest head", np.maximum, map_classes.HEAT),
-        ("min_head", "least head", np.minimum, map_classes.HEAT[::-1]),
+        ("max_pressure", "greatest pressure", np.maximum, map_classes.SPECTRUM),
+        ("min_pressure", "least pressure", np.minimum, map_classes.SPECTRUM[::-1]),
+        ("max_head", "greatest head", np.maximum, map_classes.SPECTRUM),
+        ("min_head", "least head", np.minimum, map_classes.SPECTRUM[::-1]),
     ):
         values = extremes_of_pieces(result, plan, key, reduce)
         unit = unit_of(case, key).unit
@@ -227,7 +227,7 @@ def _add_frames(result: Any, plan: NetworkMap) -> None:
         plan.frames.append(shown.factor * _means(plan, pressure, owner) + shown.shift)
     low = min(float(values.min()) for values in plan.frames)
     high = max(float(values.max()) for values in plan.frames)
-    classes = map_classes.equal_classes(low, high, shown.unit, map_classes.HEAT)
+    classes = map_classes.equal_classes(low, high, shown.unit, map_classes.SPECTRUM)
     plan.frames = [np.maximum(values, classes.limits[0]) for values in plan.frames]
     plan.frame_classes = classes
 
