@@ -176,7 +176,7 @@ def test_classes_in_feet_and_in_metres_draw_equal_maps(tmp_path):
     assert np.array_equal(*pixels) and (pixels[0] == 2).any()
 
 
-def test_a_stated_least_depth_is_kept_to_the_digit_in_feet(tmp_path):
+def test_a_stated_least_depth_is_exact_in_feet(tmp_path):
     case = pool(report={"least_depth": "0.04 ft"})
     case["output"] = case["output"] | {"units": {"level": "ft", "length": "ft"}}
     result = fvsolve.run(case, out=tmp_path / "run", pictures=False)

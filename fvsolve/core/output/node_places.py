@@ -12,7 +12,7 @@ class NodePlaces(NamedTuple):
 
     at : node -> float64[2] [m]
     assumed : nodes whose place no key gives, which lie at the end of a link of known length
-    basins : names of the basins that lie in the same plane, see `basins_beside`
+    basins : names of the basins that lie in the same plane, see `basins_in_plane`
     """
 
     at: dict[str, np.ndarray]
@@ -20,7 +20,7 @@ class NodePlaces(NamedTuple):
     basins: set[str]
 
 
-def basins_beside(case: Any, basin: str) -> set[str]:
+def basins_in_plane(case: Any, basin: str) -> set[str]:
     """Names of the basins of which the place beside a basin is known, with this basin.
 
     Basins without a stated position all begin at (0, 0), and have no place beside each other.
@@ -36,7 +36,7 @@ def node_places(case: Any, basin: str) -> NodePlaces:
     A node has its stated position, or that of a patch that a link without length joins to it. Behind these, a node lies
     at the end of its link, in the direction in which the links before it lead.
     """
-    found = NodePlaces({}, set(), basins_beside(case, basin))
+    found = NodePlaces({}, set(), basins_in_plane(case, basin))
     at = found.at
     for name, node in case.nodes.items():
         if node.position is not None and name not in case.meshes:
