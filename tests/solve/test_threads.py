@@ -4,6 +4,7 @@ import importlib
 import os
 import signal
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,22 @@ from fvsolve.core.output.memory_sink import MemorySink
 from fvsolve.core.solve import initial_state
 from fvsolve.core.solve.partition import divisible_rows, single_thread_reason
 from fvsolve.core.solve.run_loop import RunLoop
-from fvsolve.core.solve.solve import Run
+from fvsolve.core.solve.solve import MemoryMismatch, Run, solve
 from fvsolve.errors import FvsolveError
+
+
+def band_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name.startswith("band")]
+
+
+@pytest.fixture(autouse=True)
+def no_thread_outlives_a_test():
+    yield
+    # They return by themselves, on a busy machine a little later than the run.
+    for thread in band_threads():
+        thread.join(10.0)
+    assert not band_threads()
+
 
 DYED_MESH = {"cells": [60, 48], "holes": [[1.8, 1.25, 2.6, 1.875]]}
 
@@ -189,6 +204,18 @@ def test_handles_of_threads_are_formed_again_only_where_an_array_has_grown():
     for _ in range(5):
         loop.run(4.0)
     assert [len(worker.run_data.kept) for worker in loop.team.members] == kept
+    loop.close()
+
+
+def test_a_run_that_cannot_begin_ends_its_threads():
+    """A sink without methods, and restart data of another run, are found after the threads have been started."""
+    model = fvsolve.build(fvsolve.load(water(end=1.0)))
+    state = initial_state(model)
+    with pytest.raises(FvsolveError, match="is not a sink"):
+        solve(model, state, object(), threads=2)
+    with pytest.raises(MemoryMismatch):
+        solve(model, replace(state, memory={"run": np.zeros(3)}), MemorySink(model), threads=2)
+    assert not band_threads()
 
 
 def test_a_run_is_resumed_by_another_number_of_threads_to_the_same_bits(tmp_path, monkeypatch):
@@ -228,11 +255,6 @@ def test_ctrl_c_while_threads_march_ends_a_run_cleanly(tmp_path):
     timer.join()
     assert found.reason.startswith("interrupted")
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    # They return by themselves, on a busy machine a little later than the run.
-    for thread in threading.enumerate():
-        if thread.name.startswith("band"):
-            thread.join(10.0)
-            assert not thread.is_alive()
 
 
 NETWORK = scene(

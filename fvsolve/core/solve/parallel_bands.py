@@ -205,12 +205,14 @@ class ThreadTeam:
         self.stale = True  # True where the workers do not have the present rows of the loop
         self.requests = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
-        tasks = zip(self.members, self.requests, strict=True)
-        self.threads = [
-            threading.Thread(target=self.serve, args=task, daemon=True, name="band")
-            for task in tasks
-        ]
-        for thread in self.threads:
+        # They start at the first call, so that a run that cannot begin has none to end.
+        self.threads: list[threading.Thread] = []
+
+    def start_threads(self) -> None:
+        """Start a thread for each worker."""
+        for task in zip(self.members, self.requests, strict=True):
+            thread = threading.Thread(target=self.serve, args=task, daemon=True, name="band")
+            self.threads.append(thread)
             thread.start()
 
     def serve(self, member: BandWorker, requests: SimpleQueue) -> None:
@@ -237,6 +239,8 @@ class ThreadTeam:
             member.copy_from_loop(alike + (member.own if self.stale else []))
         self.stale = False
         with postponed_interrupts():
+            if not self.threads:
+                self.start_threads()
             for requests in self.requests:
                 requests.put((functions, where))
             answers = [self.answers.get() for _ in self.members]

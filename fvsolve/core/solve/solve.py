@@ -146,8 +146,6 @@ class Run:
                 self.restore(state.memory)
             except (KeyError, TypeError, ValueError, IndexError, OverflowError):
                 # damaged checkpoint, or from another solver
-                if comm is None:
-                    self.loop.close()
                 numbers = sum(map(np.size, state.memory.values()))
                 raise MemoryMismatch(
                     f"the checkpoint does not match this run ({numbers} numbers of restart data); "
