@@ -406,7 +406,9 @@ def section_kinds(
             (key, f"{name} is also a name in `{group}`; expected another name") for group in groups
         ]
         found += _basin_faults((*key, "basin"), section.basin, kinds["nodes"], True)
-        found += [((*key, end), text) for end, text in _end_faults(section, pool, True)]
+        # The ends of a polyline, as of a wall, may lie outside the basin.
+        if section.line is None:
+            found += [((*key, end), text) for end, text in _end_faults(section, pool, True)]
         if isinstance(pool, BasinFields) and not found:
             if pool.basin.on is not None or moving_walls(pool.basin):
                 found.append(

@@ -20,7 +20,13 @@ from fvsolve.case import (
 )
 from fvsolve.case.case import Case, wave_speed
 from fvsolve.case.conduits import water_of_conduits
-from fvsolve.case.declared_tables import DECLARED, read_declared_tables
+from fvsolve.case.declared_tables import (
+    DECLARED,
+    KEYS,
+    add_declared_parts,
+    is_declared,
+    read_declared_tables,
+)
 from fvsolve.case.part_reading import Parts
 from fvsolve.case.pipe_routes import legs, read_routes
 from fvsolve.case.probe import default_probes, read_probe
@@ -67,31 +73,6 @@ NAME_TABLES = (
     "defaults",
 )
 STUDY_KEYS = {"events", "protections"}
-KEYS = (
-    "schema",
-    "title",
-    "description",
-    "source",
-    "ambient_pressure",
-    "gravity",
-    "fluid",
-    "nodes",
-    "links",
-    "signals",
-    "controls",
-    "scalars",
-    "reactions",
-    "defaults",
-    "numerics",
-    "output",
-    "energy",
-    "expect",
-    "compare",
-    "routes",
-    "limits",
-    "exact",
-    "validation",
-)
 TOP = {
     "schema": (val.Whole(val.between(SCHEMA, SCHEMA)), SCHEMA),
     "title": (val.Text(changes=val.VALUE), ""),
@@ -148,7 +129,16 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
 
     settings : overrides, see `load`. Raises CaseError with all faults.
     """
-    refused = override(raw, chainage.settings(raw.table, settings), alternatives_of)
+    # Overrides of tables that stand for parts come before these parts, all others may name them.
+    first = {key: value for key, value in settings.items() if is_declared(split_key(str(key))[0])}
+    refused = override(raw, first, alternatives_of) if first else []
+    added = add_declared_parts(raw)
+    settings = {key: value for key, value in settings.items() if key not in first}
+    refused += override(raw, chainage.settings(raw.table, settings), alternatives_of)
+    if added:
+        reading = Reading(raw, refused)
+        reading.add(added)
+        refused = reading.faults
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:
@@ -297,7 +287,7 @@ def read_general(reading: Reading) -> dict[str, Any]:
             )
         reading.setting.ambient = ambient
     values = {key: default for key, (_, default) in TOP.items()}
-    values["declared"] = read_declared_tables(reading, KEYS)
+    values["declared"] = read_declared_tables(reading)
     for key, value in TOP.items():
         with reading.catch():
             if key in table:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import shipped, text
+from fvsolve.case.declared_tables import add_declared_parts
 from fvsolve.case.text import KeyPath, key_lines
 from fvsolve.errors import CaseError, Fault, article, did_you_mean, listing, nearest
 from fvsolve.parts import KINDS
@@ -190,6 +191,7 @@ def locate_faults(error: CaseError, case: Any) -> CaseError:
         return CaseError(error.faults, case.name)
     try:
         source = read_raw(case.path)
+        add_declared_parts(source)  # their faults are those of the case
     except CaseError:  # the file has gone since
         return error
     now = Raw(case.raw)

@@ -27,6 +27,7 @@ from fvsolve.parts.value import (
     VALUE,
     Choice,
     Number,
+    PointList,
     Quantity,
     ReadContext,
     positive,
@@ -676,32 +677,50 @@ class Gauges(NamedTables):
 class OutputSection(Table):
     """Table of a section: a line across a basin of water, with the probe `SECTION.flow` of the flow through it."""
 
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("from", "line"), ("to", "line"))
+
     basin: Annotated[str, val.Text("name of the basin")]
     from_: Annotated[
-        tuple[float, float],
+        tuple[float, float] | None,
         val.Rows(
             "length",
             length=2,
-            about="x, y of the start of the line [m]",
+            about="x, y of the start of a straight line [m]",
             changes=SHAPE,
         ),
         Field(alias="from"),
-    ]
+    ] = None
     to: Annotated[
-        tuple[float, float],
+        tuple[float, float] | None,
         val.Rows(
             "length",
             length=2,
             about="x, y of the end of the line [m]; flow to the left of it is positive",
             changes=SHAPE,
         ),
-    ]
+    ] = None
+    line: Annotated[
+        tuple[tuple[float, float], ...] | None,
+        PointList(2, "points of the line, instead of `from` and `to`"),
+    ] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
+        faults = super().key_faults(given)
+        if "line" in given:
+            return faults
+        return faults + [((), f"{key} is missing") for key in ("from", "to") if key not in given]
+
+    @property
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Points of the line [m]."""
+        return self.line or (self.from_, self.to)
 
     def chain(self, mesh: Any) -> Any:
         """`FaceChain` of the section in a mesh."""
         from fvsolve.core.mesh.face_chains import chain_along
 
-        return chain_along(mesh, (self.from_, self.to))
+        return chain_along(mesh, self.points)
 
 
 class OutputGrid(Table):

@@ -472,6 +472,34 @@ class Rows(Value):
         }
 
 
+class PointList(Value):
+    """Value of a case file: a list of points of a plane. least : least number of points"""
+
+    takes = "list of [x, y], m"
+
+    def __init__(self, least: int, about: str) -> None:
+        self.least, self.about = least, about
+
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(given, (list, tuple)) or len(given) < self.least:
+            text = f"{show(given)} is not a list of {self.least} or more points"
+            raise ValueError(
+                f"{text}; expected for example {show([[0, 0], [2, 0], [2, 1]][: self.least])}"
+            )
+        read_point = Rows("length", length=2).read
+        points = tuple(
+            read_each(enumerate(given), lambda point: read_point(point, setting)).values()
+        )
+        if any(start == stop for start, stop in zip(points, points[1:], strict=False)):
+            raise ValueError(
+                f"{show(given)} has two equal points in succession; expected different points"
+            )
+        return points
+
+    def json(self) -> dict[str, Any]:
+        return {"type": "array", "items": Rows("length", length=2).json(), "minItems": self.least}
+
+
 @dataclass(frozen=True)
 class Matrix(Value):
     """Value of a case file: a matrix of quantities, three rows of three."""

@@ -73,7 +73,7 @@ def _walls(case: Any, basin: str) -> Iterator[MapShape]:
 def _sections(case: Any, basin: str) -> Iterator[MapShape]:
     for name, section in case.output.sections.items():
         if section.basin == basin:
-            points = np.array([section.from_, section.to], float) + _shift(case, basin)
+            points = np.array(section.points, float) + _shift(case, basin)
             yield MapShape("section", name, points, "section")
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, PointList, VelocityStart
+from fvsolve.parts.basin import MANNING_RANGE, VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.field_series import ScheduledField, SpatialSeries
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.mesh_fields import NODES, NodeElevations
@@ -17,6 +17,7 @@ from fvsolve.parts.value import (
     VALUE,
     Choice,
     Number,
+    PointList,
     Quantity,
     ReadContext,
     Text,
