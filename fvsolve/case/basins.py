@@ -282,7 +282,10 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
             }
             grading = basin.grading or (1.0, 1.0)
             lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
-            mesh = rectangle(size, cells, corner, grading, sides, basin.holes or (), lacks)
+            holes = basin.holes or ()
+            if hasattr(holes, "lacks"):  # by polygons
+                holes, lacks = (), [*lacks, holes.lacks]
+            mesh = rectangle(size, cells, corner, grading, sides, holes, lacks)
             mesh = replace(
                 mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting)
             )

@@ -278,15 +278,22 @@ class Cells(Value):
 class Holes(Value):
     """Rectangles cut out of a rectangular basin."""
 
-    about = "rectangles cut out of the basin, on grid lines"
-    takes = "list of [x0, y0, x1, y1], m"
+    about = (
+        "rectangles cut out of the basin, on grid lines, or polygons of a file, such as buildings"
+    )
+    takes = 'list of [x0, y0, x1, y1], m; `{ polygons = "FILE" }`'
 
-    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
+    def read(self, given: Any, setting: ReadContext) -> Any:
+        if isinstance(given, dict) and "polygons" in given:
+            from fvsolve.parts.polygon_values import read_polygon_holes  # few basins have some
+
+            return read_polygon_holes(given, setting)
         if not isinstance(given, (list, tuple)) or (
             given and not isinstance(given[0], (list, tuple))
         ):
             raise ValueError(
-                f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...]"
+                f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...], "
+                'or { polygons = "NAME.gpkg" }'
             )
         return tuple(Rows("length", length=4).read(hole, setting) for hole in given)
 
@@ -676,7 +683,8 @@ class Basin(PlaceOnBody, kind="basin"):
         )
         if "mesh" in given:
             text = "is a key of rectangles, but this basin has a `mesh`; remove this key or `mesh`"
-            faults += [((key,), text) for key in RECTANGLE_KEYS if key in given]
+            keys = [key for key in RECTANGLE_KEYS if key in given]
+            faults += [((key,), text) for key in keys if not (key == "holes" and rectangle)]
         else:
             faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in (

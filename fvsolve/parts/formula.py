@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -290,6 +291,11 @@ def bracket_fault(text: str) -> str:
 
 
 RASTER_SUFFIXES = (".asc", ".nc", ".tif", ".tiff")
+# key of a table -> module and function that read such a field; few cases have some
+FIELD_READERS = {
+    "groups": ("fvsolve.parts.mesh_fields", "read_group_values"),
+    "polygons": ("fvsolve.parts.polygon_values", "read_polygon_values"),
+}
 BLOCK = 2**16  # points per evaluation: limits the memory of intermediate values
 # Three Gauss points in each direction of a rectangle, at 0 and +-sqrt(3 / 5) of its half: centre, corners, sides.
 GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
@@ -366,12 +372,10 @@ class SpatialFieldKey(Value):
             return SpatialField(given, Arithmetic(given, str(error)))
 
     def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
-        if "groups" in given:
-            from fvsolve.parts.mesh_fields import read_group_values  # few meshes have groups
-
-            return SpatialField(
-                *read_group_values(given, Quantity(self.dimension, self.range), setting)
-            )
+        for key, (module, name) in FIELD_READERS.items():
+            if key in given:
+                read = getattr(import_module(module), name)
+                return SpatialField(*read(given, Quantity(self.dimension, self.range), setting))
         if "raster" in given:
             try:
                 from fvsolve.parts.raster import read_raster  # only fields of files need it
@@ -383,7 +387,7 @@ class SpatialFieldKey(Value):
                 raise ValueFault([(("raster",), str(error))]) from None
         if "file" not in given:
             text = f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
-            raise ValueError(f'{text}, or {{ raster = "NAME.tif" }}')
+            raise ValueError(f'{text}, {{ raster = "NAME.tif" }} or {{ polygons = "NAME.gpkg" }}')
         if isinstance(name := given["file"], str) and Path(name).suffix.lower() in RASTER_SUFFIXES:
             text = f"{show(name)} is a raster; expected {{ raster = {show(name)} }}"
             raise ValueFault([(("file",), text)])

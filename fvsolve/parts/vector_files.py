@@ -115,7 +115,9 @@ def _read(path: Path, changed: int, size: int, layer: str) -> Features:
         except ValueError as error:
             raise ValueError(f"{name}, feature {number} {error}") from None
     values = [[plain(value) for value in column] for column in columns]
-    rows = [dict(zip(map(str, about["fields"]), row, strict=True)) for row in zip(*values, strict=True)]
+    rows = [
+        dict(zip(map(str, about["fields"]), row, strict=True)) for row in zip(*values, strict=True)
+    ]
     return Features(name, str(about["crs"] or ""), numbers, found, rows or [{} for _ in found])
 
 
