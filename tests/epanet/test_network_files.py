@@ -706,6 +706,9 @@ SET = {
     "TCV 40": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 12\nLINK v CLOSED AT TIME 20",
     # minor loss 20
     "TCV 40 20 ;": "LINK v 100 AT TIME 4\nLINK v 10 AT TIME 8\nLINK v OPEN AT TIME 15",
+    # minor loss 20, with a curve of the area
+    "PCV 60 20 c ;": "LINK v 90 AT TIME 4\nLINK v 30 AT TIME 12\nLINK v CLOSED AT TIME 20\n"
+    "[CURVES]\n;VALVE:\nc 0 0\nc 50 20\nc 100 100",
     "PRV 41": "LINK v 35 IF NODE tower ABOVE 8\nLINK v 42 IF NODE tower BELOW 6",
 }
 

@@ -1,5 +1,6 @@
 """Pipes along an elevation profile: a straight pipe plus the weight of the fluid, and a chain of pipes."""
 
+import meshio
 import numpy as np
 import pytest
 from reference.refusals import refused
@@ -18,6 +19,7 @@ from reference.scenes import (
 )
 
 import fvsolve
+from fvsolve.report.maps.network_map import network_map
 
 LENGTH, DIAMETER, SPEED, CELLS = 3000.0, 0.4, 1000.0, 60
 STEEL = {"model": "quasi-steady", "roughness": 2e-4}
@@ -244,3 +246,21 @@ def test_pressure_at_ambient_is_at_the_ground() -> None:
     assert np.allclose(
         found["min_pressure"], AMBIENT + RHO * GRAVITY * (110.0 - found["elevation"]), rtol=1e-12
     )
+
+
+def test_frames_and_maps_show_a_pipe_at_its_points_in_space(tmp_path):
+    """Points between cells of a pipe with `x, y, z` lie on its axis in frames, and in the plan of the network."""
+    length = float(np.sqrt(3000.0**2 - 10.0**2))
+    points = {"x": [0.0, 1000.0, 1000.0], "y": [0.0, 0.0, length - 1000.0], "z": [30.0, 30.0, 20.0]}
+    route = profiled(points)
+    del route["main"]["length"]
+    found = fvsolve.run(line(route), out=tmp_path / "run", pictures=False)
+    assert found.ok
+    frame = meshio.read(sorted((tmp_path / "run" / "fields").glob("*.vtu"))[0]).points
+    on_first = np.isclose(frame[:, 1], 0.0) & (frame[:, 0] <= 1000.0 + 1e-9)
+    on_second = np.isclose(frame[:, 0], 1000.0) & (frame[:, 1] <= length)
+    assert on_first.sum() > 10 and on_second.sum() > 30
+    assert (on_first | on_second).sum() >= len(frame) - 1  # the sea states no position
+    plan = network_map(found).ends.reshape(-1, 2)
+    corner = np.abs(plan - (1000.0, 0.0)).max(axis=1).min()
+    assert corner < 60.0  # half a cell

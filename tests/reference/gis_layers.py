@@ -56,6 +56,6 @@ def write_layer(path: Path, kind: str, features: list, crs: str = HOME, layer: s
         geometry_type=kind,
         crs=crs,
         layer=layer,
-        append=path.exists(),
+        append=layer is not None and path.exists(),
     )
     return path

@@ -305,7 +305,7 @@ def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nd
         z = low + fractions * (high - low)
         if pipe.profile is not None:
             z = pipe.profile.at(pipe.edges[1:-1])
-            inner = inner if pipe.profile.plan is None else pipe.profile.seen(pipe.edges[1:-1])
+            inner = inner if pipe.profile.plan is None else pipe.profile.plan_at(pipe.edges[1:-1])
         points.append(np.column_stack([inner, z]))
         chain = [index[pipe.from_], *range(count, count + pipe.cells - 1), index[pipe.to]]
         lines.append(np.column_stack([chain[:-1], chain[1:]]))

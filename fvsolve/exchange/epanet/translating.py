@@ -401,8 +401,12 @@ class Translation:
             return self.regulating(link, ends, diameter, setting)
         if kind == "TCV":  # its setting replaces the minor loss, and may be below it
             return part_tables.valve(ends, link.diameter if setting else self.bore(link), setting)
-        share = curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)  # of a PCV
+        share = self.position_share(link, setting)
         return part_tables.valve(ends, diameter, link.minor_loss, opening=share)
+
+    def position_share(self, link: EpanetLink, setting: float) -> float:
+        """Share of the area of a PCV at a setting [%], by its curve."""
+        return curve_value(link.curve or [[0.0, 0.0], [1.0, 1.0]], 0.01 * setting)
 
     def regulating(
         self, link: EpanetLink, ends: tuple[str, str], diameter: float, setting: float

@@ -42,6 +42,10 @@ class Profile:
         """Elevation [m] at given distances from the first point [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
+    def plan_at(self, distance: Any) -> np.ndarray:
+        """x and y at given distances from the first point, of a profile in space : float64[m, 2] [m]."""
+        return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
+
     def part(self, begin: float, end: float) -> Profile:
         """Part of the profile between two distances from the first point [m]; its chainages are unchanged."""
         d = self.distance
@@ -49,11 +53,7 @@ class Profile:
         cut = np.concatenate([[begin], d[inside], [end]])
         chainage, elevation = cut + self.chainage[0], self.at(cut)
         table = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
-        plan = (
-            None
-            if self.plan is None
-            else np.column_stack([np.interp(cut, d, axis) for axis in self.plan.T])
-        )
+        plan = None if self.plan is None else self.plan_at(cut)
         return Profile(chainage, elevation, table, plan)
 
     def table(self) -> dict[str, Any]:

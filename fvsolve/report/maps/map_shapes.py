@@ -114,7 +114,7 @@ def link_points(case: Any, places: NodePlaces, name: str, bend: float) -> np.nda
     link = case.links[name]
     profile = getattr(link, "profile", None)
     if profile is not None and profile.plan is not None:
-        return np.asarray(profile.seen(profile.chainage), float)
+        return np.asarray(profile.plan_at(profile.distance), float)
     ends = [end_place(case, places, port) for port in link.ports.values()]
     if any(end is None for end in ends):
         return None

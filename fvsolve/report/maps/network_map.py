@@ -126,7 +126,7 @@ def _path(case: Any, plan: dict, name: str, edges: np.ndarray, bend: float) -> n
     """Points of a pipe in plan at distances along it : float64[n, 2] [m]."""
     link = case.links[name]
     if link.profile is not None and link.profile.plan is not None:
-        return np.asarray(link.profile.seen(edges), float)
+        return np.asarray(link.profile.plan_at(edges), float)
     start, end = (
         np.asarray(plan[network_layout.place(port)], float) for port in (link.from_, link.to)
     )
