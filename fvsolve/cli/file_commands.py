@@ -48,6 +48,13 @@ def report(
             help="also print the page to a PDF on A4, by an installed Chromium, Chrome or Edge",
         ),
     ] = False,
+    gpkg: Annotated[
+        bool,
+        Option(
+            "--gpkg",
+            help="also write a GeoPackage of nodes, links, gauges, sections and walls with their extremes, of a run",
+        ),
+    ] = False,
 ) -> None:
     """Write an offline HTML page of a run or a study: verdicts, maps, long sections, histories, model, numerics."""
     from fvsolve.report.report_files import write_report
@@ -63,6 +70,11 @@ def report(
         from fvsolve.report.pdf_file import write_pdf
 
         print(write_pdf(paths[0]))
+    if gpkg:
+        from fvsolve.report.maps.result_layers import write_layers
+        from fvsolve.report.report_files import open_checked_run
+
+        print(write_layers(open_checked_run(directory), paths[0].with_suffix(".gpkg")))
 
 
 @command("plot", order=220)

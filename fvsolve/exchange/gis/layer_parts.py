@@ -95,6 +95,9 @@ class PartBuilder:
         if not self.crs:
             return
         self.raw.table["gis"]["crs"] = self.crs
+        origin = self.origin().tolist()
+        if any(origin):
+            self.raw.table["gis"]["origin"] = origin
         for node in self.basins.values():
             node.setdefault("crs", self.crs)
 
