@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import pyvista
 from reference.gis_layers import EAST, HOME, NORTH
 
 import fvsolve
 from fvsolve.errors import RunError
 from fvsolve.parts.vector_files import read_features
+from fvsolve.report.maps.network_figure import network_figure
+from fvsolve.report.maps.network_map import network_map
 from fvsolve.report.maps.result_layers import column_name, write_layers
 
 pytest.importorskip("pyogrio.raw")
@@ -83,6 +86,17 @@ def test_a_network_has_its_nodes_links_and_pieces_with_extremes(tmp_path):
     pieces = rows(path, "pipe_pieces")
     greatest = [row["greatest_pressure_barg"] for _, row in pieces.values()]
     assert max(greatest) == pytest.approx(values["max_pressure_barg"], rel=1e-9)
+
+
+def test_frames_and_plans_of_a_network_state_its_reference_system(tmp_path):
+    result = fvsolve.run(MAIN, out=tmp_path / "run", pictures=False)
+    frame = pyvista.read(sorted((tmp_path / "run" / "fields").glob("*.vtu"))[0])
+    assert frame.field_data["epsg"].tolist() == [25833]
+    assert frame.field_data["origin"].tolist() == [EAST, NORTH]
+    plan = network_map(result)
+    assert plan.crs == HOME and plan.nodes["gate"].tolist() == [EAST + 600.0, NORTH + 800.0]
+    figure = network_figure(plan, result.case)
+    assert figure["layout"]["xaxis"]["title"]["text"] == f"easting ({HOME}) [m]"
 
 
 def test_a_basin_has_its_gauges_sections_walls_and_shafts(tmp_path):

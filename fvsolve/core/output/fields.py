@@ -11,11 +11,13 @@ import base64
 import html
 import re
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fvsolve.core.assembly.features import frames_of
+from fvsolve.core.output.node_places import plane_of
 from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 
@@ -80,6 +82,9 @@ class FieldSeries:
             for basin in model.meshed
         }
         self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
+        plane = plane_of(model.case)
+        if plane.crs:  # of the pipes
+            self.references[""] = place_xml(plane.origin.tolist(), plane.crs)
         self.drawn = next(
             (own for feature in model.features if (own := feature.drawn(model)) is not None), None
         )
@@ -213,8 +218,13 @@ def reference_xml(basin) -> str:
     part = basin.part
     if part.origin is None and part.crs is None:
         return ""
-    arrays = [("Float64", "origin", part.origin or (0.0, 0.0))]
-    arrays += [("Int32", "epsg", (int(part.crs.removeprefix("EPSG:")),))] if part.crs else []
+    return place_xml(part.origin or (0.0, 0.0), part.crs)
+
+
+def place_xml(origin: Sequence[float], crs: str | None) -> str:
+    """XML text of an easting and northing [m] and of the number of a reference system."""
+    arrays: list[tuple[str, str, Sequence]] = [("Float64", "origin", origin)]
+    arrays += [("Int32", "epsg", (int(crs.removeprefix("EPSG:")),))] if crs else []
     text = "".join(
         f'<DataArray type="{kind}" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
         f"{' '.join(map(repr, values))}</DataArray>\n"

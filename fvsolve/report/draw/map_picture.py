@@ -225,7 +225,8 @@ def network_figure(plan, layer, extent):
     axes.tick_params(colors=style.MUTED, labelcolor=style.INK, labelsize=7.5, width=0.6, length=3)
     axes.ticklabel_format(style="plain", useOffset=False)
     if plan.scaled:
-        style.name_axes(axes, "x [m]", "y [m]")
+        names = (f"easting [m] ({plan.crs})", "northing [m]") if plan.crs else ("x [m]", "y [m]")
+        style.name_axes(axes, *names)
         _scale_bar(axes, extent)
     elif not plan.stated:
         axes.set_axis_off()

@@ -47,7 +47,7 @@ def network_figure(plan: NetworkMap, case: Any) -> dict[str, Any]:
         for _ in range(count)
     ]
     traces = [*pieces, *_links(plan, case), _nodes(plan, case), WORST, CHOSEN_CELL]
-    labels = ("x [m]", "y [m]") if plan.scaled else ("x", "y") if plan.stated else ("", "")
+    labels = axis_names(plan)
     layout = plan_layout(extent_of(plan), labels, plan.stopped)
     if not plan.stated:  # distances between nodes have a rough meaning, coordinates have none
         for axis in (layout["xaxis"], layout["yaxis"]):
@@ -69,6 +69,14 @@ WORST = {
         "line": {"width": 3, "color": WORST_COLOUR},
     },
 }
+
+
+def axis_names(plan: NetworkMap) -> tuple[str, str]:
+    """Names of the axes of a plan, with units only if its positions agree with the lengths of pipes."""
+    if not plan.stated:
+        return "", ""
+    names = (f"easting ({plan.crs})", "northing") if plan.crs else ("x", "y")
+    return (f"{names[0]} [m]", f"{names[1]} [m]") if plan.scaled or plan.crs else names
 
 
 def extent_of(plan: NetworkMap) -> tuple[float, float, float, float]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.core.output import network_layout
 from fvsolve.core.output.fields import read_pipe_lines, read_series
+from fvsolve.core.output.node_places import PlaneReference, plane_of
 from fvsolve.core.run.plot_scene import unit_of
 from fvsolve.report.draw.scene import PLAUSIBLE_SCALE, STRAIGHT_TOLERANCE
 from fvsolve.report.long_section import envelope_column
@@ -49,6 +50,7 @@ class NetworkMap:
     nodes : node -> float64[2] [m]; others : link without pieces -> float64[k, 2] [m]
     stated : True if all nodes have stated positions; scaled : True if these also agree with the lengths of pipes
     stopped : sentence if the run stopped early, else ""
+    crs : reference system of the coordinates, "" if they are positions
     """
 
     title: str
@@ -61,10 +63,18 @@ class NetworkMap:
     stated: bool
     scaled: bool
     stopped: str
+    crs: str = ""
     layers: list[PlanLayer] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
     frames: list[np.ndarray] = field(default_factory=list)
     frame_classes: Classes | None = None
+
+    def move(self, reference: PlaneReference) -> None:
+        """Change positions to eastings and northings."""
+        self.crs = reference.crs
+        self.ends = self.ends + reference.origin
+        self.nodes = {name: spot + reference.origin for name, spot in self.nodes.items()}
+        self.others = {name: points + reference.origin for name, points in self.others.items()}
 
 
 def network_map(result: Any) -> NetworkMap | None:
@@ -102,6 +112,9 @@ def network_map(result: Any) -> NetworkMap | None:
         stated and _is_to_scale(np.concatenate(ends), np.concatenate(span)),
         stopped_text(result),
     )
+    reference = plane_of(case)
+    if stated and reference.crs:
+        found.move(reference)
     if not stated and _is_straight(found.ends.reshape(-1, 2)):
         return None  # a long section shows more
     found.layers = _layers(result, found)

@@ -153,7 +153,7 @@ def _pieces(result: Any, origin: np.ndarray) -> Iterator[Row]:
         values = {"pipe": plan.names[plan.pipe[k]]}
         for layer in plan.layers:
             values[column_name(layer.name, layer.classes.unit)] = float(layer.values[k])
-        yield Row(ends + origin, values)
+        yield Row(ends if plan.crs else ends + origin, values)
 
 
 def extremes_by_part(result: Any) -> dict[str, dict[str, Any]]:
