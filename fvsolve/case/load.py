@@ -138,7 +138,7 @@ def read_case(raw: Raw, settings: Mapping[str, Any], previous: Case | None = Non
     if added:
         reading = Reading(raw, refused)
         reading.add(added)
-        refused = reading.faults
+        reading.stop()  # parts that are missing would bring further faults
     if previous is not None and not refused:
         case = update_values(Reading(raw), previous)
         if case is not None:

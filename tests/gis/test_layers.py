@@ -207,6 +207,16 @@ def test_ends_further_than_snap_are_a_fault_with_the_nearest_node(tmp_path):
     assert fvsolve.load(given).links["a"].from_ == "source"
 
 
+def test_two_nodes_at_the_same_end_are_a_fault(tmp_path):
+    """Networks of EPANET often have the inlet and the outlet of a pump at a single place."""
+    given = network(tmp_path)
+    given["nodes"]["inlet"] = given["nodes"]["source"] | {"type": "junction"}
+    del given["nodes"]["inlet"]["head"]
+    with pytest.raises(CaseError) as error:
+        fvsolve.load(given)
+    assert "inlet, source lie at the end `from` of pipes.shp, feature 0" in str(error.value)
+
+
 def test_a_reversed_line_is_a_reversed_link(tmp_path):
     """The direction of a line is that of its link: the flow changes its sign, nothing else."""
     found = {}

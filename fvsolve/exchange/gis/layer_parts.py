@@ -14,7 +14,7 @@ from fvsolve.parts.basin import ORIGIN
 from fvsolve.parts.csv_rows import find_file
 from fvsolve.parts.raster import Raster
 from fvsolve.parts.raster_files import import_library, read_pixels
-from fvsolve.parts.value import ReadContext, faults_of
+from fvsolve.parts.value import ReadContext, ValueFault, faults_of
 from fvsolve.parts.vector_files import (
     DEGREES,
     Features,
@@ -28,7 +28,8 @@ from fvsolve.units import show
 # Layers are read in this order: links end at nodes that other layers bring.
 ORDER = ("nodes", "patches", "walls", "gauges", "sections", "links")
 PIXELS = 4.0  # default distance of points of profiles and crests [pixels]
-MOST_NAMED = 5  # features that a message names
+MOST_FAULTS = 20  # of a layer that are listed
+SAME_PLACE = 1e-6  # distance between two nodes at the same place [m]
 ABSENT = object()  # value of a template whose attribute is empty
 ATTRIBUTE = re.compile(r"\{([^{}]*)\}")
 Faults = list[tuple[tuple[Any, ...], str]]
@@ -244,19 +245,38 @@ class FeatureReader:
             raise LayerFault("becomes", f"{text} {' or '.join(kind + 's' for kind in kinds)}")
 
     def parts(self, basin: str) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Yield (name, keys) of each part. Raises LayerFault."""
+        """Yield (name, keys) of each part. Raises ValueFault with the faults of all features."""
         names: dict[str, int] = {}
+        faults: dict[tuple, None] = {}  # each text counts a single time
         for count, k in enumerate(self.chosen(), 1):
-            shape, attributes = self.features.shapes[k], self.features.attributes[k]
-            around = {**shape_values(shape), **attributes}
-            name = self.part_name(k, around, count)
-            if name in names:
-                first, second = (self.features.numbers[i] for i in (names[name], k))
-                text = f"features {first} and {second} of {self.features.name} are both named"
-                raise LayerFault("name", f"{text} {show(name)}; expected a name for each")
-            names[name] = k
-            keys = self.filled(self.layer.templates, around, k)
-            yield from getattr(self, self.layer.becomes)(name, shape, keys, basin, k)
+            try:
+                yield from self.parts_of(k, count, names, basin)
+            except LayerFault as error:
+                faults |= dict.fromkeys(error.faults)
+        if faults:
+            shown = list(faults)[:MOST_FAULTS]
+            if len(faults) > len(shown):
+                key = shown[-1][0]
+                shown.append((key, f"{len(faults) - len(shown)} further features have such faults"))
+            raise ValueFault(shown)
+
+    def parts_of(
+        self, k: int, count: int, names: dict[str, int], basin: str
+    ) -> list[tuple[str, dict[str, Any]]]:
+        """Names and keys of the parts of a feature, whose name is added to `names`; count : of the features so far
+
+        Raises LayerFault.
+        """
+        shape, attributes = self.features.shapes[k], self.features.attributes[k]
+        around = {**shape_values(shape), **attributes}
+        name = self.part_name(k, around, count)
+        if name in names:
+            first, second = (self.features.numbers[i] for i in (names[name], k))
+            text = f"features {first} and {second} of {self.features.name} are both named"
+            raise LayerFault("name", f"{text} {show(name)}; expected a name for each")
+        names[name] = k
+        keys = self.filled(self.layer.templates, around, k)
+        return list(getattr(self, self.layer.becomes)(name, shape, keys, basin, k))
 
     def chosen(self) -> list[int]:
         """Indices of the features that fulfil the conditions."""
@@ -439,6 +459,11 @@ class FeatureReader:
             distance = np.hypot(*(np.array([*self.ends.values()]) - point[:2]).T)
             near = int(np.argmin(distance))
             if distance[near] <= self.layer.snap:
+                alike = np.flatnonzero(distance <= distance[near] + SAME_PLACE)
+                if alike.size > 1:  # such as inlet and outlet of a pump
+                    text = f"{listing([names[i] for i in alike])} lie at the end `{key}` of"
+                    text = f"{text} {self.features.place(k)}, at the same place"
+                    raise LayerFault("keys", f"{text}; expected the key `{key}` by an attribute")
                 return names[near]
         if not self.layer.junctions:
             x, y = point[:2]

@@ -67,7 +67,7 @@ def result_layers(result: Any) -> dict[str, list[Row]]:
     case = result.case
     extremes = extremes_by_part(result)
     layers: dict[str, list[Row]] = {"nodes": [], "links": []}
-    drawn: set[str] = set()
+    drawn: set[tuple[str, str]] = set()
     basins = [name for name, node in case.nodes.items() if node.kind == "basin"]
     origin = plane_of(case).origin
     for basin in basins:
@@ -93,26 +93,26 @@ def _add_parts(
     shift: np.ndarray,
     extremes: dict[str, dict[str, Any]],
     layers: dict[str, list[Row]],
-    drawn: set[str],
+    drawn: set[tuple[str, str]],
 ) -> None:
     """Add the nodes and links with places that no earlier basin has; shift : from their places to the system [m]"""
     case = result.case
     for name, spot in places.at.items():
-        if name in drawn:
+        if ("nodes", name) in drawn:
             continue
-        drawn.add(name)
+        drawn.add(("nodes", name))
         node = case.nodes[name]
         values = {"name": name, "type": node.kind, "elevation_m": case.elevations.get(name)}
         values["place"] = "assumed" if name in places.assumed else "stated"
         layers["nodes"].append(Row(spot[None] + shift, values | extremes.get(name, {})))
     bends = link_bends(case.links)
     for name, link in case.links.items():
-        if name in drawn or not is_line(case, link):
+        if ("links", name) in drawn or not is_line(case, link):
             continue
         points = link_points(case, places, name, bends[name])
         if points is None:
             continue
-        drawn.add(name)
+        drawn.add(("links", name))
         values = {"name": name, "type": link.kind, "from": link.from_, "to": link.to}
         for key in ("length", "diameter"):
             values[f"{key}_m"] = getattr(link, key, None)
