@@ -178,6 +178,11 @@ FAULTS = [
         "value_at(model.tables, target.schedule, t, np.inf) * target.scale",
     ),
     Fault(
+        "exchange/gis/layer_parts.py",
+        "0.5 * (z[i] + z[i + 1])",
+        "0.5 * (z[i] - z[i + 1])",
+    ),
+    Fault(
         "exchange/fmi/variables.py",
         "inputs + list({variable.name",
         "inputs[:-1] + list({variable.name",

@@ -4,13 +4,10 @@
 class ReportTable(Table): ...
 """
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from fvsolve.declarations import Declarations
 from fvsolve.parts.table_model import Table
-
-if TYPE_CHECKING:
-    from fvsolve.case.reading import Raw, Reading
 
 # tables and keys of a case that no other folder declares
 KEYS = (
@@ -55,12 +52,12 @@ class DeclaredTable(Table):
     changes_results: ClassVar[bool] = True
 
     @classmethod
-    def add_parts(cls, raw: "Raw") -> list[tuple[tuple[Any, ...], str]]:
+    def add_parts(cls, raw: Any) -> list[tuple[tuple[Any, ...], str]]:
         """Write the parts that the table stands for into a raw case; returns faults as (key path, text)."""
         return []
 
 
-def add_declared_parts(raw: "Raw") -> list[tuple[tuple[Any, ...], str]]:
+def add_declared_parts(raw: Any) -> list[tuple[tuple[Any, ...], str]]:
     """Write the parts that tables of other folders stand for into a raw case; returns faults as (key path, text)."""
     names = [name for name in raw.table if is_declared(name)]
     return [fault for name in names for fault in DECLARED.load(name).add_parts(raw)]
@@ -71,7 +68,7 @@ def is_declared(name: str) -> bool:
     return name not in KEYS and name in DECLARED
 
 
-def read_declared_tables(reading: "Reading") -> dict[str, Any]:
+def read_declared_tables(reading: Any) -> dict[str, Any]:
     """Tables of a case that headers declare : name -> `DeclaredTable`, without faulty tables."""
     found = {}
     for name in reading.raw.table:

@@ -31,9 +31,9 @@ def read_polygons(given: dict[str, Any], setting: ReadContext) -> tuple[str, Fea
         copy = copy_name(path, setting)
         if path.suffix.lower() == ".shp":
             for suffix in SIDECARS:
-                for beside in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
-                    if beside.is_file():
-                        find_file(str(beside), setting)
+                for companion in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
+                    if companion.is_file():
+                        find_file(str(companion), setting)
         (east, north), crs = setting.frame
         features = read_features(path, str(given.get("layer", "")))
         features = reprojected(features, crs, str(given.get("crs", "")))
@@ -113,10 +113,9 @@ class PolygonValues:
         if self.adds or (own < 0).any():
             others = self._outside(mesh, np.flatnonzero((own < 0).any(axis=0)))
             share = 1.0 if self.adds else 1.0 - covered
+            mixed = total + share * np.where(share > 0.0, others, 0.0)
             # without a polygon the cell has exactly the value of the other field
-            total = np.where(
-                (own >= 0).any(axis=0), total + share * np.where(share > 0.0, others, 0.0), others
-            )
+            total = np.where((own >= 0).any(axis=0), mixed, others)
         self.last[:] = [mesh, total]
         return total
 
@@ -126,8 +125,8 @@ class PolygonValues:
 
         if self.outside is None:
             x, y = mesh.centre[cells[0]]
-            text = f"{self.features.name} does not cover {cells.size} of {len(mesh.cells)} cells,"
-            text = f"{text} first at {x:.6g}, {y:.6g} m"
+            text = f"{self.features.name} does not cover {cells.size}"
+            text = f"{text} of {len(mesh.cells)} cells, first at {x:.6g}, {y:.6g} m"
             raise ValueError(
                 f"{text}; expected polygons over the whole basin, or the key `outside`"
             )
@@ -163,12 +162,12 @@ def points_in_cells(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
         return x, y
     corners = mesh.points[mesh.cells[:, :3]]
     first = np.einsum("pk,nkd->dpn", CENTRES, corners)
-    halves = mesh.cells[:, 3] >= 0
-    if not halves.any():
+    with_four = mesh.cells[:, 3] >= 0
+    if not with_four.any():
         return first[0], first[1]
     second = first.copy()
-    second[..., halves] = np.einsum(
-        "pk,nkd->dpn", CENTRES, mesh.points[mesh.cells[halves][:, [0, 2, 3]]]
+    second[..., with_four] = np.einsum(
+        "pk,nkd->dpn", CENTRES, mesh.points[mesh.cells[with_four][:, [0, 2, 3]]]
     )
     both = np.concatenate([first, second], axis=1)
     return both[0], both[1]
@@ -230,7 +229,8 @@ def read_polygon_values(
     if adds and keys["outside"] is None:
         raise ValueFault([((), "outside is missing, to which `add` is added")])
     name, features = read_polygons(given, setting)
-    values = polygon_numbers(keys[stated[0]], features, keys["classes"], value, stated[0], setting)
+    key = stated[0]
+    values = polygon_numbers(keys[key], features, keys["classes"], value, key, setting)
     table = {**given, "polygons": name}
     if keys["outside"] is not None:
         table["outside"] = keys["outside"].table()
@@ -259,7 +259,8 @@ def polygon_numbers(
     read: dict[Any, float] = {}
     for k, attributes in enumerate(features.attributes):
         if any(attributes[name] in (None, "") for name in names):
-            text = f"{features.place(k)} has no {listing(names)}; expected a value for each polygon"
+            text = f"{features.place(k)} has no {listing(names)}"
+            text = f"{text}; expected a value for each polygon"
             raise ValueFault([((key,), text)])
         item = template
         if names and template == f"{{{names[0]}}}":
@@ -283,7 +284,8 @@ def _number(
 ) -> float:
     if classes is not None:
         if str(item) not in classes:
-            text = f"{features.place(k)} has the class {show(str(item))}, which `classes` does not have"
+            text = f"{features.place(k)} has the class {show(str(item))}"
+            text = f"{text}, which `classes` does not have"
             known = (
                 did_you_mean(str(item), classes)
                 or f"; classes are {listing([*classes], MOST_NAMES)}"

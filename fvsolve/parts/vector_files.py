@@ -12,7 +12,6 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.raster_files import import_library
 from fvsolve.units import show
 
-SUFFIXES = (".geojson", ".json", ".gpkg", ".shp", ".fgb", ".gml", ".kml", ".tab", ".dxf", ".sqlite")
 # code of well-known binary (OGC 06-103r4) -> kind of shape
 KINDS = {
     1: "point",
@@ -115,10 +114,12 @@ def _read(path: Path, changed: int, size: int, layer: str) -> Features:
         except ValueError as error:
             raise ValueError(f"{name}, feature {number} {error}") from None
     values = [[plain(value) for value in column] for column in columns]
-    rows = [
-        dict(zip(map(str, about["fields"]), row, strict=True)) for row in zip(*values, strict=True)
-    ]
-    return Features(name, str(about["crs"] or ""), numbers, found, rows or [{} for _ in found])
+    fields = [str(field) for field in about["fields"]]
+    rows = [dict(zip(fields, row, strict=True)) for row in zip(*values, strict=True)]
+    crs = str(about["crs"] or "")
+    if not rows:  # without attributes
+        rows = [{} for _ in found]
+    return Features(name, crs, numbers, found, rows)
 
 
 def chosen_layer(path: Path, layers: dict[str, str], layer: str) -> str:
@@ -222,9 +223,11 @@ def reprojected(features: Features, crs: str, stated: str = "") -> Features:
     except rasterio.errors.CRSError:
         text = f"{features.name} has an unknown reference system {show(source[:80])}"
         raise ValueError(f'{text}; expected the key `crs`, such as crs = "EPSG:32633"') from None
-    if own.is_geographic and (np.abs(xy) > DEGREES).any():
-        text = f"{features.name} is in degrees ({crs_name(own)}), but has coordinates such as "
-        text += f"{', '.join(f'{value:.6g}' for value in xy[np.argmax((np.abs(xy) > DEGREES).any(axis=1))])}"
+    beyond = (np.abs(xy) > DEGREES).any(axis=1)
+    if own.is_geographic and beyond.any():
+        x, y = xy[np.argmax(beyond)]
+        text = f"{features.name} is in degrees ({crs_name(own)})"
+        text = f"{text}, but has coordinates such as {x:.6g}, {y:.6g}"
         raise ValueError(f"{text}; expected the key `crs` with its true system")
     if not crs:
         if own.is_geographic or own.linear_units_factor[1] != 1.0:

@@ -138,7 +138,7 @@ def test_a_run_without_places_is_refused(tmp_path):
         write_layers(result, tmp_path / "run.gpkg")
 
 
-def test_the_command_writes_the_layers_beside_the_report(tmp_path, fvs):
+def test_the_command_report_writes_the_layers_next_to_its_page(tmp_path, fvs):
     fvsolve.run(MAIN, out=tmp_path / "run", pictures=False)
     code, printed, _ = fvs("report", tmp_path / "run", "--gpkg")
     assert code == 0 and "report.gpkg" in printed and (tmp_path / "run" / "report.gpkg").is_file()

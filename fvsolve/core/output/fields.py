@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.core.assembly.features import frames_of
-from fvsolve.core.output.node_places import plane_of
 from fvsolve.errors import RunError
 from fvsolve.file_replacement import write_file
 
@@ -62,8 +61,13 @@ class FieldSeries:
         # file name of a part -> `grid_xml` of points that do not move
         self.fixed_grids: dict[str, str] = {}
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.meshed}
+        pipe_reference = ""
         if model.pipes:
             from fvsolve.core.output import network_layout
+
+            plane = network_layout.plane_of(model.case)
+            if plane.crs:
+                pipe_reference = place_xml(plane.origin.tolist(), plane.crs)
 
             places = network_layout.plan_positions(
                 model.case, {pipe.name: pipe.length for pipe in model.pipes}
@@ -82,9 +86,7 @@ class FieldSeries:
             for basin in model.meshed
         }
         self.references = {basin.name: reference_xml(basin) for basin in model.meshed}
-        plane = plane_of(model.case)
-        if plane.crs:  # of the pipes
-            self.references[""] = place_xml(plane.origin.tolist(), plane.crs)
+        self.references[""] = pipe_reference
         self.drawn = next(
             (own for feature in model.features if (own := feature.drawn(model)) is not None), None
         )

@@ -6,6 +6,7 @@ then stress majorization; Gansner, Koren and North 2004). The layout of a networ
 """
 
 import heapq
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,31 @@ MAJORIZATION_ROUNDS = 200  # iterations of the stress majorization
 MAX_DENSE_NODES = 400
 SHORT_LINK = 0.02  # drawn length of a link without length, as a fraction of the longest pipe
 BEND_SIZE = 0.15  # sideways bend of parallel links, as a fraction of their length
+
+
+class PlaneReference(NamedTuple):
+    """Reference of the plane in which nodes have positions.
+
+    crs : coordinate reference system, such as "EPSG:32633", or ""; origin : float64[2]  easting and northing of the
+    position (0, 0) [m]
+    """
+
+    crs: str
+    origin: np.ndarray
+
+
+def plane_of(case: Any) -> PlaneReference:
+    """Reference of the positions of a case: as a table of the case states it, else that of its first basin with one."""
+    basins = [node for node in case.nodes.values() if node.kind == "basin"]
+    tables = [table for table in case.declared.values() if getattr(table, "crs", None)]
+    crs = next((part.crs for part in (*tables, *basins) if part.crs), "")
+    for table in tables:
+        if table.origin is not None:
+            return PlaneReference(crs, np.array(table.origin, float))
+    for basin in basins:
+        if basin.origin is not None:
+            return PlaneReference(crs, np.array(basin.origin) - (basin.position or (0.0, 0.0)))
+    return PlaneReference(crs, np.zeros(2))
 
 
 def plan_positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:

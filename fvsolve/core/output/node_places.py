@@ -20,31 +20,6 @@ class NodePlaces(NamedTuple):
     basins: set[str]
 
 
-class PlaneReference(NamedTuple):
-    """Reference of the plane in which nodes have positions.
-
-    crs : coordinate reference system, such as "EPSG:32633", or ""; origin : float64[2]  easting and northing of the
-    position (0, 0) [m]
-    """
-
-    crs: str
-    origin: np.ndarray
-
-
-def plane_of(case: Any) -> PlaneReference:
-    """Reference of the positions of a case: as a table of the case states it, else that of its first basin with one."""
-    basins = [node for node in case.nodes.values() if node.kind == "basin"]
-    tables = [table for table in case.declared.values() if getattr(table, "crs", None)]
-    crs = next((part.crs for part in (*tables, *basins) if part.crs), "")
-    for table in tables:
-        if table.origin is not None:
-            return PlaneReference(crs, np.array(table.origin, float))
-    for basin in basins:
-        if basin.origin is not None:
-            return PlaneReference(crs, np.array(basin.origin) - (basin.position or (0.0, 0.0)))
-    return PlaneReference(crs, np.zeros(2))
-
-
 def basins_in_plane(case: Any, basin: str) -> set[str]:
     """Names of the basins of which the place beside a basin is known, with this basin.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.reading import Raw, class_of_type, with_defaults
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.exchange.gis.gis_table import IN_BASINS, PARTS, SHAPE_HEIGHTS, GisLayer
+from fvsolve.exchange.gis.layer_keys import IN_BASINS, PARTS, SHAPE_HEIGHTS, GisLayer
 from fvsolve.parts.basin import ORIGIN
 from fvsolve.parts.csv_rows import find_file
 from fvsolve.parts.raster import Raster
@@ -75,7 +75,9 @@ class PartBuilder:
     """
 
     def __init__(self, raw: Raw, table: Any) -> None:
-        self.raw, self.table, self.faults = raw, table, []
+        self.raw = raw
+        self.table = table
+        self.faults: Faults = []
         self.setting = ReadContext(folder=raw.folder)
         nodes = raw.table.get("nodes")
         nodes = nodes if isinstance(nodes, dict) else {}
@@ -105,7 +107,8 @@ class PartBuilder:
     def origin(self, basin: str = "") -> np.ndarray:
         """Easting and northing of the point (0, 0) of a basin, or of the positions of nodes [m]."""
         if basin:
-            return np.array(ORIGIN.read(self.basins[basin].get("origin", (0.0, 0.0)), self.setting))
+            given = self.basins[basin].get("origin", (0.0, 0.0))
+            return np.array(ORIGIN.read(given, self.setting))
         if self.table.origin is not None:
             return np.array(self.table.origin)
         for node in self.basins.values():
@@ -152,7 +155,8 @@ class PartBuilder:
             name = crs_name(rasterio.crs.CRS.from_user_input(stated))
             self.crs = name if name.startswith("EPSG:") else ""
         if not stated and self.crs and self.is_in_degrees(features):
-            text = f"{features.name} states no reference system, and its numbers look like degrees"
+            text = f"{features.name} states no reference system"
+            text = f"{text}, and its numbers look like degrees"
             raise LayerFault("file", f'{text}; expected the key `crs`, such as crs = "EPSG:4326"')
         return features
 
@@ -232,7 +236,10 @@ class FeatureReader:
     def __init__(
         self, name: str, layer: GisLayer, features: Features, builder: PartBuilder
     ) -> None:
-        self.name, self.layer, self.features, self.builder = name, layer, features, builder
+        self.name = name
+        self.layer = layer
+        self.features = features
+        self.builder = builder
         self.dem = builder.heights(layer)
         self.ends: dict[str, np.ndarray] = {}
         if layer.becomes == "links":
@@ -267,11 +274,12 @@ class FeatureReader:
 
         Raises LayerFault.
         """
-        shape, attributes = self.features.shapes[k], self.features.attributes[k]
-        around = {**shape_values(shape), **attributes}
+        shape = self.features.shapes[k]
+        around = {**shape_values(shape), **self.features.attributes[k]}
         name = self.part_name(k, around, count)
         if name in names:
-            first, second = (self.features.numbers[i] for i in (names[name], k))
+            first = self.features.numbers[names[name]]
+            second = self.features.numbers[k]
             text = f"features {first} and {second} of {self.features.name} are both named"
             raise LayerFault("name", f"{text} {show(name)}; expected a name for each")
         names[name] = k
@@ -439,7 +447,8 @@ class FeatureReader:
             return z + self.layer.offset
         try:
             z = self.dem(points[:, 0], points[:, 1])
-            j, i = self.dem.row(points[:, 1]).astype(int), self.dem.column(points[:, 0]).astype(int)
+            i = self.dem.column(points[:, 0]).astype(int)
+            j = self.dem.row(points[:, 1]).astype(int)
             values = self.dem.pixels.values
             lacks = np.isnan(
                 values[np.minimum(j, len(values) - 1), np.minimum(i, len(values[0]) - 1)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from fvsolve.core.output import network_layout
 from fvsolve.core.output.fields import read_pipe_lines, read_series
-from fvsolve.core.output.node_places import PlaneReference, plane_of
+from fvsolve.core.output.network_layout import PlaneReference, plane_of
 from fvsolve.core.run.plot_scene import unit_of
 from fvsolve.report.draw.scene import PLAUSIBLE_SCALE, STRAIGHT_TOLERANCE
 from fvsolve.report.long_section import envelope_column

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.core.output.network_layout import link_bends
-from fvsolve.core.output.node_places import NodePlaces, node_places, plane_of
+from fvsolve.core.output.network_layout import link_bends, plane_of
+from fvsolve.core.output.node_places import NodePlaces, node_places
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.parts.raster_files import import_library
 from fvsolve.report.long_section import envelope_column
@@ -26,7 +26,7 @@ ENVELOPE = {
 KINDS = {"Point": 1, "MultiLineString": 5, "LineString": 2}  # codes of well-known binary
 
 
-class Row(NamedTuple):
+class LayerFeature(NamedTuple):
     """Feature of a layer.
 
     points : float64[n, 2] [m], rows of NaN between separate lines; values : name of a column -> number or text
@@ -62,11 +62,11 @@ def write_layers(result: Any, path: Path) -> Path:
     return path
 
 
-def result_layers(result: Any) -> dict[str, list[Row]]:
+def result_layers(result: Any) -> dict[str, list[LayerFeature]]:
     """Layers of a run : name -> rows, with places in the reference system of the case."""
     case = result.case
     extremes = extremes_by_part(result)
-    layers: dict[str, list[Row]] = {"nodes": [], "links": []}
+    layers: dict[str, list[LayerFeature]] = {"nodes": [], "links": []}
     drawn: set[tuple[str, str]] = set()
     basins = [name for name, node in case.nodes.items() if node.kind == "basin"]
     origin = plane_of(case).origin
@@ -92,7 +92,7 @@ def _add_parts(
     places: NodePlaces,
     shift: np.ndarray,
     extremes: dict[str, dict[str, Any]],
-    layers: dict[str, list[Row]],
+    layers: dict[str, list[LayerFeature]],
     drawn: set[tuple[str, str]],
 ) -> None:
     """Add the nodes and links with places that no earlier basin has; shift : from their places to the system [m]"""
@@ -104,7 +104,8 @@ def _add_parts(
         node = case.nodes[name]
         values = {"name": name, "type": node.kind, "elevation_m": case.elevations.get(name)}
         values["place"] = "assumed" if name in places.assumed else "stated"
-        layers["nodes"].append(Row(spot[None] + shift, values | extremes.get(name, {})))
+        values |= extremes.get(name, {})
+        layers["nodes"].append(LayerFeature(spot[None] + shift, values))
     bends = link_bends(case.links)
     for name, link in case.links.items():
         if ("links", name) in drawn or not is_line(case, link):
@@ -117,7 +118,7 @@ def _add_parts(
         for key in ("length", "diameter"):
             values[f"{key}_m"] = getattr(link, key, None)
         values |= envelope_extremes(result, name) | extremes.get(name, {})
-        layers["links"].append(Row(points + shift, values))
+        layers["links"].append(LayerFeature(points + shift, values))
 
 
 def _add_shapes(
@@ -125,7 +126,7 @@ def _add_shapes(
     basin: str,
     origin: np.ndarray,
     extremes: dict[str, dict[str, Any]],
-    layers: dict[str, list[Row]],
+    layers: dict[str, list[LayerFeature]],
 ) -> None:
     """Add gauges, sections, walls, patches and structures of a basin; origin : of its coordinates [m]"""
     names = {
@@ -141,10 +142,10 @@ def _add_shapes(
         values = {"name": shape.name, "basin": basin, "about": shape.text}
         key = f"@{shape.name}" if shape.kind == "gauge" else shape.name
         rows = layers.setdefault(names[shape.kind], [])
-        rows.append(Row(shape.points + origin, values | extremes.get(key, {})))
+        rows.append(LayerFeature(shape.points + origin, values | extremes.get(key, {})))
 
 
-def _pieces(result: Any, origin: np.ndarray) -> Iterator[Row]:
+def _pieces(result: Any, origin: np.ndarray) -> Iterator[LayerFeature]:
     """Pieces of pipes with the layers of the plan of the network, where all positions are stated."""
     plan = network_map(result)
     if plan is None or not plan.stated:
@@ -153,7 +154,7 @@ def _pieces(result: Any, origin: np.ndarray) -> Iterator[Row]:
         values = {"pipe": plan.names[plan.pipe[k]]}
         for layer in plan.layers:
             values[column_name(layer.name, layer.classes.unit)] = float(layer.values[k])
-        yield Row(ends if plan.crs else ends + origin, values)
+        yield LayerFeature(ends if plan.crs else ends + origin, values)
 
 
 def extremes_by_part(result: Any) -> dict[str, dict[str, Any]]:
@@ -195,7 +196,9 @@ def column_name(name: str, unit: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", f"{name} {sign}").strip("_")
 
 
-def _write_layer(raw: Any, path: Path, name: str, rows: list[Row], crs: str, about: str) -> None:
+def _write_layer(
+    raw: Any, path: Path, name: str, rows: list[LayerFeature], crs: str, about: str
+) -> None:
     """Append a layer to a GeoPackage; about : sentence for its description"""
     is_point = all(len(row.points) == 1 for row in rows)
     kind = "Point" if is_point else "MultiLineString"
