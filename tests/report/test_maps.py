@@ -14,7 +14,7 @@ from fvsolve.core.output.grid_files import frame_field
 from fvsolve.core.output.node_places import node_places
 from fvsolve.report.maps.flood_map import basin_frames, flood_map
 from fvsolve.report.maps.map_classes import Classes, equal_classes, round_limit
-from fvsolve.report.maps.map_figure import map_figure
+from fvsolve.report.maps.map_figure import inward, map_figure
 from fvsolve.report.maps.map_shapes import shapes_of
 from fvsolve.report.maps.packed_levels import LEVELS, levels_of
 from fvsolve.report.report_files import write_pictures, write_report
@@ -325,3 +325,11 @@ def test_files_of_grids_state_the_end_of_the_run(numerics, text, tmp_path):
     with netcdf_file(tmp_path / "run/grids/b.nc", mmap=False) as file:
         assert file.comment.decode() == tags["RUN"]
     assert result.reason == "finished" or result.reason in tags["RUN"]
+
+
+@pytest.mark.parametrize(
+    ("x", "expected"),
+    [(0.0, "top right"), (0.5, "top right"), (10.0, "top center"), (19.9, "top left")],
+)
+def test_names_near_an_edge_of_a_map_point_inward(x, expected):
+    assert inward("top center", x, (0.0, 20.0, 0.0, 8.0)) == expected

@@ -31,6 +31,7 @@ LOOKS = {  # kind of a shape -> width [px] and dash
     "wall": (3.0, "solid"),
     "structure": (4.0, "solid"),
 }
+EDGE = 0.08  # share of the width of a map from an edge at which a name would be cut
 POINTS = {  # kind of a shape -> symbol of Plotly, size [px], position of its name
     "node": ("circle-open-dot", 9, "top center"),
     "structure": ("square", 7, "bottom center"),
@@ -218,6 +219,18 @@ def hover_name(shape: MapShape) -> str:
     return f"{escape_markup(shape.name)} ({escape_markup(shape.text or shape.kind)}{assumed})"
 
 
+def inward(position: str, x: float, extent: tuple[float, float, float, float]) -> str:
+    """Position of a name beside its point, such as "top center"; to the left or right near the edges of a map.
+
+    x : of the point; extent : of the map [m]
+    """
+    west, east = extent[:2]
+    share = (x - west) / (east - west)
+    if EDGE < share < 1.0 - EDGE:
+        return position
+    return position.replace("center", "right" if share <= EDGE else "left")
+
+
 def _points(plan: FloodMap) -> list[dict[str, Any]]:
     traces = []
     for kind, (symbol, size, position) in POINTS.items():
@@ -237,7 +250,7 @@ def _points(plan: FloodMap) -> list[dict[str, Any]]:
                 "text": [escape_markup(shape.name) for shape in own],
                 "hovertext": [hover_name(shape) for shape in own],
                 "hoverinfo": "text",
-                "textposition": position,
+                "textposition": [inward(position, float(at[0]), plan.extent) for at in places],
                 "textfont": {"size": 11, "color": "#111820"},
                 "marker": {
                     "symbol": symbol,
