@@ -262,6 +262,7 @@ def probe_kinds(
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
     """Mesh of a basin, from its keys or its mesh file. Raises ValueFault with all faults of the mesh."""
     from fvsolve.core.mesh import read, rectangle
+    from fvsolve.core.mesh.rectangles import HOLES
 
     try:
         if basin.is_rectangle:
@@ -281,14 +282,14 @@ def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
                 if not item.is_interior
             }
             grading = basin.grading or (1.0, 1.0)
-            lacks = [raster.lacks for raster in rasters_with_holes(basin, setting)]
+            rasters = rasters_with_holes(basin, setting)
+            lacks = [("cells without data", raster.lacks) for raster in rasters]
             holes = basin.holes or ()
             if hasattr(holes, "lacks"):  # by polygons
-                holes, lacks = (), [*lacks, holes.lacks]
+                holes, lacks = (), [*lacks, (HOLES, holes.lacks)]
             mesh = rectangle(size, cells, corner, grading, sides, holes, lacks)
-            mesh = replace(
-                mesh, notes=terrace_notes(basin, mesh.grid) + stretch_notes(basin, mesh, setting)
-            )
+            notes = (*terrace_notes(basin, mesh.grid), *stretch_notes(basin, mesh, setting))
+            mesh = replace(mesh, notes=(*notes, *getattr(basin.holes, "notes", ())))
             return replace(mesh, interior=interior_patches(basin, mesh))
         if rasters_with_holes(basin, setting):
             raise ValueFault(

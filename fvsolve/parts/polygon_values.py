@@ -1,5 +1,6 @@
 """Fields and holes of a basin by polygons of a GIS file, such as land use, soils and buildings."""
 
+import math
 import re
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,7 @@ from fvsolve.units import show
 SIDECARS = (".shx", ".dbf", ".prj", ".cpg")  # files of a shapefile beside it
 ATTRIBUTE = re.compile(r"\{([^{}]*)\}")
 POINTS = 4  # points along each side of a rectangular cell at which polygons are looked up
+POINTS_PER_STRIP = 0.25  # strips over the root of the number of points
 MOST_NAMES = 10  # of classes in a message
 
 
@@ -52,19 +54,32 @@ def read_polygons(given: dict[str, Any], setting: ReadContext) -> tuple[str, Fea
 
 def owners(features: Features, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Index of the last polygon that contains each point, -1 where none does : int64[n]; x, y : float64[n] [m]"""
-    order = np.argsort(y, kind="stable")
-    x, y = x[order], y[order]
     found = np.full(x.size, -1)
+    if not x.size:
+        return found
+    # Points sorted by strips of equal height, and by x in each strip: a polygon then looks at few of them.
+    count = max(int(POINTS_PER_STRIP * math.sqrt(x.size)), 1)
+    south, north = y.min(), y.max()
+    height = max((north - south) / count, np.finfo(float).tiny)
+    strip = np.minimum(((y - south) / height).astype(int), count - 1)
+    width = float(x.max() - x.min()) + 1.0
+    order = np.argsort(strip * width + (x - x.min()), kind="stable")
+    starts = np.searchsorted(strip[order], np.arange(count + 1))
+    sorted_x = x[order]
     for k, shape in enumerate(features.shapes):
         points = np.concatenate(shape.pieces)[:, :2]
-        (west, south), (east, north) = points.min(axis=0), points.max(axis=0)
-        rows = np.arange(np.searchsorted(y, south), np.searchsorted(y, north, "right"))
-        rows = rows[(x[rows] >= west) & (x[rows] <= east)]
-        if rows.size:
-            found[rows[_inside(shape.pieces, x[rows], y[rows])]] = k
-    result = np.empty_like(found)
-    result[order] = found
-    return result
+        low, high = points.min(axis=0), points.max(axis=0)
+        first, last = np.clip((np.array([low[1], high[1]]) - south) / height, 0, count - 1)
+        rows = []
+        for number in range(int(first), int(last) + 1):
+            own = sorted_x[starts[number] : starts[number + 1]]
+            begin, end = np.searchsorted(own, low[0]), np.searchsorted(own, high[0], "right")
+            rows.append(order[starts[number] + begin : starts[number] + end])
+        near = np.concatenate(rows)
+        near = near[(y[near] >= low[1]) & (y[near] <= high[1])]
+        near = near[np.argsort(y[near], kind="stable")]
+        found[near[_inside(shape.pieces, x[near], y[near])]] = k
+    return found
 
 
 def _inside(rings: list[np.ndarray], x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -302,23 +317,38 @@ def _number(
 class PolygonHoles:
     """Cells of a rectangle that are cut out, because their centres lie in polygons.
 
-    given : table for the resolved case
+    given : table for the resolved case; notes : texts on the last mesh
     """
 
     given: dict[str, Any]
     features: Features
+    notes: list[str] = field(default_factory=list)
 
     def lacks(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """True for cells in polygons, and for cells that these enclose : bool[ny, nx]; x, y : grid lines [m]"""
+        """True for cells in polygons, and for courtyards : bool[ny, nx]; x, y : grid lines [m]
+
+        A courtyard is a part of the remaining cells that polygons enclose, away from the sides of the rectangle.
+        """
         from scipy.ndimage import label
 
         across, along = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
         inside = owners(self.features, across.ravel(), along.ravel()) >= 0
         inside = inside.reshape(across.shape)
         piece, count = label(~inside)
-        if count > 1:  # courtyards: no water can reach them
-            sizes = np.bincount(piece[~inside])
-            inside = piece != np.argmax(sizes)
+        if count > 1:
+            sizes = np.bincount(piece.ravel(), minlength=count + 1)
+            sizes[0] = 0
+            at_sides = np.concatenate([piece[0], piece[-1], piece[:, 0], piece[:, -1]])
+            kept = np.union1d(at_sides, [int(np.argmax(sizes))])
+            courtyards = ~inside & ~np.isin(piece, kept)
+            area = np.outer(np.diff(y), np.diff(x))[courtyards].sum()
+            if courtyards.any():
+                number = count - np.setdiff1d(kept, [0]).size
+                text = f"holes enclose {area:.6g} m2 in {number} courtyards"
+                if number == 1:
+                    text = f"holes enclose a courtyard of {area:.6g} m2"
+                self.notes[:] = [f"{text}, cut out too: no water reaches it, and its rain is lost"]
+            inside |= courtyards
         return inside
 
     def table(self) -> dict[str, Any]:

@@ -7,7 +7,10 @@ import pytest
 from reference.gis_layers import EAST, HOME, NORTH, write_layer
 
 import fvsolve
+from fvsolve.case.interior_patches import in_polygon
 from fvsolve.errors import CaseError
+from fvsolve.parts.polygon_values import owners
+from fvsolve.parts.vector_files import read_features
 
 pytest.importorskip("pyogrio.raw")
 pytest.importorskip("rasterio")
@@ -72,6 +75,7 @@ def test_buildings_are_holes_or_raise_the_bed(tmp_path):
     cut = np.zeros((10, 20), bool)
     cut[2:8, 5:11] = cut[1:3, 14:16] = True
     assert ((index < 0) == cut).all()
+    assert any("a courtyard of 4 m2" in note for note in case.meshes["pool"].notes)
     raised = {"polygons": str(path), "add": "{H} m", "outside": "0.01*x"}
     case = fvsolve.load(pool(bed=raised))
     bed = case.nodes["pool"].bed.rule.over(case.meshes["pool"]).reshape(10, 20)
@@ -80,6 +84,34 @@ def test_buildings_are_holes_or_raise_the_bed(tmp_path):
     height[4:6, 7:9] = 0.0  # the courtyard
     assert np.allclose(bed, 0.01 * (np.arange(20) + 0.5) + height, atol=1e-14)
     assert fvsolve.run(pool(bed=raised, level=0.5)).ok
+
+
+def test_houses_from_side_to_side_are_a_fault_and_no_courtyard(tmp_path):
+    """Holes that cut the basin in two leave both halves for the user to decide on."""
+    path = write_layer(tmp_path / "row.gpkg", "Polygon", [(square(-1.0, 4.0, 21.0, 6.0), {"H": 1})])
+    with pytest.raises(CaseError, match="the holes leave 2 pieces that share no face"):
+        fvsolve.load(pool(holes={"polygons": str(path)}))
+
+
+def test_owners_of_points_are_those_of_each_polygon_by_itself(tmp_path):
+    """Random points and overlapping polygons with many corners, against a test of every point with every polygon."""
+    rng = np.random.default_rng(3)
+    features = []
+    for _ in range(30):
+        angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, 40))
+        radius = rng.uniform(0.5, 4.0, 40)
+        middle = rng.uniform(0.0, 20.0, 2)
+        ring = np.column_stack(
+            [middle[0] + radius * np.cos(angle), middle[1] + radius * np.sin(angle)]
+        )
+        features.append(([[*ring.tolist(), ring[0].tolist()]], {"N": 1}))
+    path = write_layer(tmp_path / "stars.gpkg", "Polygon", features)
+    found = read_features(path)
+    x, y = rng.uniform(-5.0, 25.0, (2, 3000)) + np.array([[EAST], [NORTH]])
+    expected = np.full(x.size, -1)
+    for k, shape in enumerate(found.shapes):
+        expected[in_polygon(np.column_stack([x, y]), shape.pieces[0][:-1, :2])] = k
+    assert (owners(found, x, y) == expected).all() and (expected >= 0).sum() > 300
 
 
 def test_soils_by_polygons_infiltrate_as_typed_soils(tmp_path):

@@ -11,6 +11,7 @@ from fvsolve.errors import Fault, MeshError, did_you_mean
 SIDES = {"west": 1, "east": 1, "south": 0, "north": 0}  # axis along each side
 LINE_TOLERANCE = 1e-6  # of the size: greatest distance of a number from its grid line
 
+HOLES = "the holes"  # words for messages
 Side = str | tuple[str, float, float]
 
 
@@ -21,7 +22,7 @@ def rectangle(
     grading: Sequence[float] = (1.0, 1.0),
     patches: Mapping[str, Side] | None = None,
     holes: Sequence[Sequence[float]] = (),
-    lacks: Sequence[Callable[[np.ndarray, np.ndarray], np.ndarray]] = (),
+    lacks: Sequence[tuple[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]] = (),
 ) -> Mesh:
     """Mesh of a rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
 
@@ -29,7 +30,8 @@ def rectangle(
     grading : ratio of last to first spacing of grid lines; it changes geometrically between them
     patches : name -> a side ("west", "east", "south" or "north"), or (side, from, to) with coordinates along it [m]
     holes : rectangles (x0, y0, x1, y1) [m] on grid lines, without cells; faces must connect the remaining cells
-    lacks : functions of the grid lines along x and y : bool[ny, nx], True for cells that are holes too
+    lacks : (words for messages, function of the grid lines along x and y : bool[ny, nx]), True for cells that are
+    holes too
     Raises MeshError with all faults.
     """
     faults = _bad_numbers(size, cells, origin, grading)
@@ -42,8 +44,9 @@ def rectangle(
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
-    gaps, place = ("cells without data", "") if lacks else ("the holes", "holes")
-    for empty in lacks:
+    gaps = " and ".join(dict.fromkeys(words for words, _ in lacks)) or HOLES
+    place = "holes" if gaps == HOLES else ""
+    for _, empty in lacks:
         solid &= ~empty(*lines)
     if faults or not solid.any():
         text = f"{gaps} leave no cell; expected {'smaller cells' if lacks else 'smaller holes'}"
