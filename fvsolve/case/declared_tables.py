@@ -53,7 +53,7 @@ class DeclaredTable(Table):
 
     @classmethod
     def add_parts(cls, raw: Any) -> list[tuple[tuple[Any, ...], str]]:
-        """Write the parts that the table stands for into a raw case; returns faults as (key path, text)."""
+        """Write the parts that the table stands for into a raw case; returns faults (key path, text)."""
         return []
 
 

@@ -41,7 +41,8 @@ def read_polygons(given: dict[str, Any], setting: ReadContext) -> tuple[str, Fea
         features = reprojected(features, crs, str(given.get("crs", "")))
         for k, shape in enumerate(features.shapes):
             if shape.kind != "polygon":
-                raise ValueError(f"{features.place(k)} is a {shape.kind}; expected polygons")
+                text = f"{features.place(k)} is a {shape.kind}; expected polygons"
+                raise ValueError(text)
     except ValueError as error:
         raise ValueFault(faults_of(error, "polygons")) from None
     shift = np.array([east, north, 0.0])
@@ -157,7 +158,8 @@ class PolygonValues:
         if self.outside is None:
             k = int(np.argmax(others))
             text = f"{self.features.name} does not cover x = {x[k]:.6g} m, y = {y[k]:.6g} m"
-            raise ValueError(f"{text}; expected polygons there, or the key `outside`")
+            text = f"{text}; expected polygons there, or the key `outside`"
+            raise ValueError(text)
         values[others] += self.outside.at(x[others], y[others])
         return values
 

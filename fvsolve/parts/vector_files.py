@@ -101,18 +101,22 @@ def _read(path: Path, changed: int, size: int, layer: str) -> Features:
     try:
         about, numbers, shapes, columns = raw.read(path, layer=layer, return_fids=True)
     except (pyogrio.errors.DataSourceError, ValueError, RuntimeError) as error:
-        raise ValueError(f"{name} cannot be read: {error}") from None
+        text = f"{name} cannot be read: {error}"
+        raise ValueError(text) from None
     if not len(shapes):
-        raise ValueError(f"{name} has no features; expected a layer with features")
+        text = f"{name} has no features; expected a layer with features"
+        raise ValueError(text)
     if len(shapes) > MOST_SHAPES:
-        raise ValueError(f"{name} has {len(shapes)} features; expected at most {MOST_SHAPES}")
+        text = f"{name} has {len(shapes)} features; expected at most {MOST_SHAPES}"
+        raise ValueError(text)
     numbers = [int(number) for number in numbers]
     found = []
     for number, shape in zip(numbers, shapes, strict=True):
         try:
             found.append(read_shape(shape))
         except ValueError as error:
-            raise ValueError(f"{name}, feature {number} {error}") from None
+            text = f"{name}, feature {number} {error}"
+            raise ValueError(text) from None
     values = [[plain(value) for value in column] for column in columns]
     fields = [str(field) for field in about["fields"]]
     rows = [dict(zip(fields, row, strict=True)) for row in zip(*values, strict=True)]
@@ -132,10 +136,12 @@ def chosen_layer(path: Path, layers: dict[str, str], layer: str) -> str:
         return next(iter(layers))
     if not layer:
         text = f"{path.name} has {len(layers)} layers: {listing([*map(show, layers)])}"
-        raise ValueError(f"{text}; expected the key `layer`")
+        text = f"{text}; expected the key `layer`"
+        raise ValueError(text)
     if layer not in layers:
         known = did_you_mean(layer, layers) or f"; layers are {listing([*map(show, layers)])}"
-        raise ValueError(f"{path.name} has no layer {show(layer)}{known}")
+        text = f"{path.name} has no layer {show(layer)}{known}"
+        raise ValueError(text)
     return layer
 
 
@@ -222,25 +228,29 @@ def reprojected(features: Features, crs: str, stated: str = "") -> Features:
         own = rasterio.crs.CRS.from_user_input(source)
     except rasterio.errors.CRSError:
         text = f"{features.name} has an unknown reference system {show(source[:80])}"
-        raise ValueError(f'{text}; expected the key `crs`, such as crs = "EPSG:32633"') from None
+        text = f'{text}; expected the key `crs`, such as crs = "EPSG:32633"'
+        raise ValueError(text) from None
     beyond = (np.abs(xy) > DEGREES).any(axis=1)
     if own.is_geographic and beyond.any():
         x, y = xy[np.argmax(beyond)]
         text = f"{features.name} is in degrees ({crs_name(own)})"
         text = f"{text}, but has coordinates such as {x:.6g}, {y:.6g}"
-        raise ValueError(f"{text}; expected the key `crs` with its true system")
+        text = f"{text}; expected the key `crs` with its true system"
+        raise ValueError(text)
     if not crs:
         if own.is_geographic or own.linear_units_factor[1] != 1.0:
             unit = "degrees" if own.is_geographic else own.linear_units_factor[0]
             text = f"{features.name} is in {unit} ({crs_name(own)}), and the case states no system"
-            raise ValueError(f'{text}; expected `crs` of the case in metres, such as "EPSG:32633"')
+            text = f'{text}; expected `crs` of the case in metres, such as "EPSG:32633"'
+            raise ValueError(text)
         return features
     target = rasterio.crs.CRS.from_user_input(crs)
     if own == target:
         return features
     x, y = (np.array(values) for values in warp.transform(own, target, *xy.T))
     if not (np.isfinite(x) & np.isfinite(y)).all():
-        raise ValueError(f"{features.name} has points outside {crs}; expected another system")
+        text = f"{features.name} has points outside {crs}; expected another system"
+        raise ValueError(text)
     shapes, at = [], 0
     for shape in features.shapes:
         pieces = []

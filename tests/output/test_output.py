@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 import pytest
+from reference.folders import CASES
 from reference.scenes import AMBIENT, BRANCHED_PROBES, branched, scene, still
 
 import fvsolve
@@ -524,3 +525,32 @@ def test_studies_share_no_folder(tmp_path):
     written = {path.name for path in tmp_path.iterdir()}
     # sweep.parquet needs pyarrow
     assert written - {"sweep.parquet"} == {"points.jsonl", "sweep.csv"}
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_conduits_in_frames_lie_between_their_ends(tmp_path, stated):
+    """Each is drawn in its length and width where nodes state positions, else where the layout has its nodes."""
+    case = tomllib.loads((CASES / "storm-sewer.toml").read_text(encoding="utf-8"))
+    case["numerics"]["end"] = "1 s"
+    del case["expect"]
+    at = {"street": (0.0, 0.0), "upper": (60.0, 0.0), "lower": (60.0, 120.0)}
+    at |= {"joint": (120.0, 120.0), "river": (120.0, 60.0)}
+    for name, node in case["nodes"].items():
+        if stated:
+            node["position"] = list(at[name])
+    assert fvsolve.run(case, out=tmp_path / "run", pictures=False).ok
+    middles = {}
+    for name, link in case["links"].items():
+        frame = meshio.read(next((tmp_path / "run" / "fields").glob(f"{name}-*.vtu")))
+        cells = frame.points[frame.cells[0].data][:, :, :2]
+        west, east = cells[0].mean(axis=0), cells[-1].mean(axis=0)
+        step = (east - west) / (len(cells) - 1)
+        middles[name] = west - 0.5 * step, east + 0.5 * step
+        if stated:
+            for spot, end in zip(middles[name], ("from", "to"), strict=True):
+                assert spot == pytest.approx(at[link[end]], abs=1e-4)
+            area = abs(np.cross(cells[0][1] - cells[0][0], cells[0][3] - cells[0][0]))
+            width = float(link["diameter"].removesuffix(" mm")) * 1e-3
+            assert area == pytest.approx(width * np.hypot(*step), rel=1e-3)
+    for first, second in (("head", "collector"), ("collector", "main"), ("main", "outfall")):
+        assert middles[first][1] == pytest.approx(middles[second][0], abs=1e-4)

@@ -51,7 +51,7 @@ class Limit(NamedTuple):
 # 53 characters, 1 circle.
 LIMITS = {
     "files imported by run valve-closure": Limit(limit=180, goal=130, slack=7),
-    "lines of these files": Limit(limit=45_100, goal=35_000, slack=1500),
+    "lines of these files": Limit(limit=45_110, goal=35_000, slack=1500),
     "files of features among them": Limit(limit=0, goal=0, slack=0),
     "cells of the hub matrix": Limit(limit=155, goal=70, slack=6),
     "cells of the hub matrix, code alone": Limit(limit=115, goal=70, slack=6),

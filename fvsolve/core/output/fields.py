@@ -13,6 +13,7 @@ import re
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,11 @@ class FieldSeries:
             self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.meshed if basin.part.on is not None}
         self.places = places | moving  # a basin on a body is drawn in world axes
+        lines = [basin for basin in model.meshed if getattr(basin, "table", "") == "links"]
+        if lines:
+            from fvsolve.core.output.link_frames import link_frames
+
+            self.places |= link_frames(model.case, lines)
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {
             basin.name: basin.units | basin.units_of_maxima | (carried if basin.scalars else {})
@@ -354,7 +360,7 @@ def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
     return owner
 
 
-def basin_geometry(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
+def basin_geometry(basin, origin: Any) -> tuple[np.ndarray, list]:
     """Corners of the cells of a basin at bed level [m], float64[p, 3], and blocks of successive cells of equal type."""
     mesh = basin.mesh
     points = drawn_points(basin, origin, mesh.points)
@@ -365,9 +371,11 @@ def basin_geometry(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     return points, [(named[three[b[0]]][0], mesh.cells[b, : named[three[b[0]]][1]]) for b in blocks]
 
 
-def drawn_points(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points of a basin mesh at bed level, shifted in plan by `origin` : float64[p, 3] [m]."""
+def drawn_points(basin, origin: Any, points: np.ndarray) -> np.ndarray:
+    """Points of a basin mesh at bed level : float64[p, 3] [m]; origin : shift in plan [m], or a `PlanFrame`"""
     x, y = np.ascontiguousarray(points.T)
+    if hasattr(origin, "along"):  # along a link
+        return np.column_stack([origin.points(x, y), basin.ground(x, y)])
     return np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
 
 

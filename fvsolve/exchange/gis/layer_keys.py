@@ -42,7 +42,8 @@ class Templates(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
             text = f"{show(given)} is not a table; expected keys of the parts"
-            raise ValueError(f'{text}, such as {{ diameter = "{{DN}} mm" }}')
+            text = f'{text}, such as {{ diameter = "{{DN}} mm" }}'
+            raise ValueError(text)
         return given
 
 
@@ -57,7 +58,8 @@ class AttributeValues(Value):
     def read(self, given: Any, setting: ReadContext) -> dict[str, list[Any]]:
         if not isinstance(given, dict):
             text = f"{show(given)} is not a table of attributes"
-            raise ValueError(f'{text}; expected for example {{ STATUS = "active" }}')
+            text = f'{text}; expected for example {{ STATUS = "active" }}'
+            raise ValueError(text)
         values = {}
         for name, value in given.items():
             values[name] = value if isinstance(value, list) else [value]
@@ -72,7 +74,8 @@ class SourceSystem(Text):
         code = text.removeprefix("EPSG:")
         if code == text or not code.isdigit():
             text = f"{show(given)} is not a coordinate reference system"
-            raise ValueError(f'{text}; expected for example "EPSG:4326"')
+            text = f'{text}; expected for example "EPSG:4326"'
+            raise ValueError(text)
         return text
 
 

@@ -127,7 +127,8 @@ class PartBuilder:
         for part, keys in reader.parts(basin):
             if part in target:
                 text = f"{show(part)} is already in the case"
-                raise LayerFault("name", f"{text}; expected a name of its own for each feature")
+                text = f"{text}; expected a name of its own for each feature"
+                raise LayerFault("name", text)
             target[part] = keys
             self.mark(name, (*key, part))
 
@@ -157,14 +158,20 @@ class PartBuilder:
         if not stated and self.crs and self.is_in_degrees(features):
             text = f"{features.name} states no reference system"
             text = f"{text}, and its numbers look like degrees"
-            raise LayerFault("file", f'{text}; expected the key `crs`, such as crs = "EPSG:4326"')
+            text = f'{text}; expected the key `crs`, such as crs = "EPSG:4326"'
+            raise LayerFault("file", text)
         return features
 
     def is_in_degrees(self, features: Features) -> bool:
         """True if numbers can be degrees, while the origin of the case lies at greater numbers."""
         far = any((np.abs(self.origin(name)) > DEGREES).any() for name in ("", *self.basins))
-        points = (piece[:, :2] for shape in features.shapes for piece in shape.pieces)
-        return far and all((np.abs(xy) <= DEGREES).all() for xy in points)
+        if not far:
+            return False
+        for shape in features.shapes:
+            for piece in shape.pieces:
+                if (np.abs(piece[:, :2]) > DEGREES).any():
+                    return False
+        return True
 
     def basin(self, layer: GisLayer) -> str:
         """Name of the basin of a layer. Raises LayerFault if it is unknown, or not stated among several."""
@@ -178,7 +185,8 @@ class PartBuilder:
             )
         if layer.basin not in names:
             near = did_you_mean(layer.basin, names) or f"; basins are {listing(names)}"
-            raise LayerFault("basin", f"no basin named {show(layer.basin)}{near}")
+            text = f"no basin named {show(layer.basin)}{near}"
+            raise LayerFault("basin", text)
         return layer.basin
 
     def target(self, layer: GisLayer, basin: str) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -193,7 +201,8 @@ class PartBuilder:
         for key in path:
             table = table.setdefault(key, {})
             if not isinstance(table, dict):
-                raise LayerFault("becomes", f"{'.'.join(path)} is not a table; expected a table")
+                text = f"{'.'.join(path)} is not a table; expected a table"
+                raise LayerFault("becomes", text)
         return table, path
 
     def heights(self, layer: GisLayer) -> Raster | None:
@@ -249,7 +258,8 @@ class FeatureReader:
         if wrong:
             kind = features.shapes[wrong[0]].kind
             text = f"{features.place(wrong[0])} is a {kind}; {layer.becomes} are"
-            raise LayerFault("becomes", f"{text} {' or '.join(kind + 's' for kind in kinds)}")
+            text = f"{text} {' or '.join(kind + 's' for kind in kinds)}"
+            raise LayerFault("becomes", text)
 
     def parts(self, basin: str) -> Iterator[tuple[str, dict[str, Any]]]:
         """Yield (name, keys) of each part. Raises ValueFault with the faults of all features."""
@@ -281,7 +291,8 @@ class FeatureReader:
             first = self.features.numbers[names[name]]
             second = self.features.numbers[k]
             text = f"features {first} and {second} of {self.features.name} are both named"
-            raise LayerFault("name", f"{text} {show(name)}; expected a name for each")
+            text = f"{text} {show(name)}; expected a name for each"
+            raise LayerFault("name", text)
         names[name] = k
         keys = self.filled(self.layer.templates, around, k)
         return list(getattr(self, self.layer.becomes)(name, shape, keys, basin, k))
@@ -292,14 +303,15 @@ class FeatureReader:
         for name in self.layer.where:
             if name not in known:
                 raise LayerFault("where", self.unknown(name, known))
-        chosen = [
-            k
-            for k, attributes in enumerate(self.features.attributes)
-            if all(attributes[name] in values for name, values in self.layer.where.items())
-        ]
+        chosen = []
+        for k, attributes in enumerate(self.features.attributes):
+            where = self.layer.where.items()
+            if all(attributes[name] in values for name, values in where):
+                chosen.append(k)
         if not chosen:
             text = f"no feature of {self.features.name} fulfils it"
-            raise LayerFault("where", f"{text}; expected values of the file")
+            text = f"{text}; expected values of the file"
+            raise LayerFault("where", text)
         return chosen
 
     def unknown(self, name: str, known: Any) -> str:
@@ -315,7 +327,8 @@ class FeatureReader:
         text = "" if value is ABSENT else re.sub(r"[^A-Za-z0-9_-]+", "_", str(value)).strip("_")
         if not text:
             place = f"{self.features.place(k)} has no {self.layer.name}"
-            raise LayerFault("name", f"{place}; expected a name for each feature")
+            text = f"{place}; expected a name for each feature"
+            raise LayerFault("name", text)
         return text
 
     def filled(self, given: dict[str, Any], around: dict[str, Any], k: int) -> dict[str, Any]:
@@ -412,7 +425,8 @@ class FeatureReader:
         """Points of a shape of a single piece : float64[n, 3]."""
         if len(shape.pieces) > 1:
             text = f"{self.features.place(k)} has {len(shape.pieces)} pieces or rings"
-            raise LayerFault("file", f"{text}; expected a single one in each feature")
+            text = f"{text}; expected a single one in each feature"
+            raise LayerFault("file", text)
         return shape.pieces[0]
 
     def known_keys(self, keys: dict[str, Any]) -> set[str]:
@@ -456,9 +470,11 @@ class FeatureReader:
             if lacks.any():
                 x, y = points[np.argmax(lacks), :2]
                 text = f"{self.dem.name} has no data at x = {x:.6g} m, y = {y:.6g} m"
-                raise ValueError(f"{text}; expected a raster with data there")
+                text = f"{text}; expected a raster with data there"
+                raise ValueError(text)
         except ValueError as error:
-            raise LayerFault("heights", f"{self.features.place(k)}: {error}") from None
+            text = f"{self.features.place(k)}: {error}"
+            raise LayerFault("heights", text) from None
         return z + self.layer.offset
 
     def node_at(self, point: np.ndarray, k: int, key: str) -> str:
@@ -472,7 +488,8 @@ class FeatureReader:
                 if alike.size > 1:  # such as inlet and outlet of a pump
                     text = f"{listing([names[i] for i in alike])} lie at the end `{key}` of"
                     text = f"{text} {self.features.place(k)}, at the same place"
-                    raise LayerFault("keys", f"{text}; expected the key `{key}` by an attribute")
+                    text = f"{text}; expected the key `{key}` by an attribute"
+                    raise LayerFault("keys", text)
                 return names[near]
         if not self.layer.junctions:
             x, y = point[:2]

@@ -50,7 +50,8 @@ def write_layers(result: Any, path: Path) -> Path:
     layers = {name: rows for name, rows in result_layers(result).items() if rows}
     if not layers:
         text = f"{result.directory}: no part of the case has a place"
-        raise RunError(f"{text}; expected nodes with `position`, or a basin")
+        text = f"{text}; expected nodes with `position`, or a basin"
+        raise RunError(text)
     crs = plane_of(result.case).crs
     about = f"{result.case.title}. {stopped_text(result)}".strip(". ")
     try:
@@ -58,7 +59,8 @@ def write_layers(result: Any, path: Path) -> Path:
         for name, rows in layers.items():
             _write_layer(raw, path, name, rows, crs, about)
     except (OSError, errors.DataSourceError, errors.DataLayerError) as error:
-        raise FvsolveError(f"{path}: cannot be written: {error}") from None
+        text = f"{path}: cannot be written: {error}"
+        raise FvsolveError(text) from None
     return path
 
 
