@@ -223,6 +223,7 @@ SOILS = {
     "constant": {"infiltration": {"model": "constant", "rate": "1e-5*(2 + sin(x))"}},
     "horton": {"infiltration": HORTON},
     "green-ampt": {"infiltration": GREEN_AMPT},
+    "curve-number": {"infiltration": {"model": "curve-number", "number": "80 + 10*sin(x)"}},
 }
 
 

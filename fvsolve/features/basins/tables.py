@@ -90,7 +90,7 @@ BASIN = record(
     # offset in `work` of the present numbers of rain and soil, see `free_surface.water_sources`
     present=i8,
     rained=i8,  # state: height of rain since the start [m]
-    soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON or GREEN_AMPT
+    soil=i8,  # NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT or CURVE_NUMBER
     # offset in `plane` of numbers of the soil in cells, see `free_surface.water_sources`
     soil_numbers=i8,
     # length of each row of these numbers: the number of cells, or less for a uniform soil
@@ -114,7 +114,7 @@ BASIN = record(
     sections=i8,  # 1 if there are sections, whose flows rows need
 )
 GN = 14  # index of g_n among the numbers of a frame, see `basin_frames`
-NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT = range(4)
+NO_SOIL, CONSTANT_RATE, HORTON, GREEN_AMPT, CURVE_NUMBER = range(5)
 NO_DRAG, MANNING, DARCY = 0, 1, 2
 PATCHES = record(
     basin=i8,  # row of its basin

@@ -58,6 +58,7 @@ DRIVEN_TERMS = RhsTerms(
 )
 DEPTH_SCALE = 0.1  # [m] of depth
 HEIGHT_SCALE = 1e-3  # [m] of rain and infiltrated water
+INCH = 0.0254  # unit of the potential storage 1000 / CN - 10 of the SCS [m]
 TIME_SCALE = 10.0  # [s] of condensed times of soils
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
@@ -88,6 +89,10 @@ def soil_numbers(model: str, fields: list[np.ndarray]) -> tuple[int, np.ndarray]
         return records.GREEN_AMPT, np.array(
             [conductivity, store, np.sqrt(2.0 * store * ponded) + ponded]
         )
+    if model == "curve-number":
+        number, *loss = fields
+        storage = INCH * (1000.0 / number - 10.0)
+        return records.CURVE_NUMBER, np.array([storage, *(loss or [np.zeros_like(number)])])
     initial, final, decay = fields
     return records.HORTON, np.array([final, initial - final, decay])
 
@@ -204,7 +209,9 @@ class FreeSurfaceRows(RowsWithFriction):
 
     @property
     def soil_states(self) -> int:
-        return 0 if self.soil is None else 1 if self.soil.model == "constant" else 2
+        return (
+            0 if self.soil is None else 1 if self.soil.model in ("constant", "curve-number") else 2
+        )
 
     def lower_sources(self, draft, row) -> None:
         row["present"] = draft.to_work(water_sources.PRESENT_NUMBERS)

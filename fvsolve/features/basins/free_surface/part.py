@@ -58,7 +58,10 @@ SOIL_KEYS = {  # model of infiltration -> its keys
     "constant": ("rate",),
     "horton": ("initial", "final", "decay"),
     "green-ampt": ("conductivity", "suction", "deficit"),
+    "curve-number": ("number", "initial_loss"),
 }
+OPTIONAL_SOIL_KEYS = ("initial_loss",)
+SOIL_RANGES = {"deficit": (0.0, 1.0), "number": (1.0, 100.0)}  # key of a soil -> its range
 
 
 class Infiltration(Table):
@@ -96,19 +99,33 @@ class Infiltration(Table):
             "number", "moisture deficit, porosity minus water content [-]", between(0, 1)
         ),
     ] = None
+    number: Annotated[
+        SpatialField | None,
+        SpatialFieldKey("number", "curve number of the SCS [-]", between(1, 100)),
+    ] = None
+    initial_loss: Annotated[
+        SpatialField | None,
+        SpatialFieldKey(
+            "length",
+            "height of rain that infiltrates before the curve number limits it [m]; default 0",
+            nonnegative,
+        ),
+    ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         own = SOIL_KEYS.get(str(given.get("model")), ())
         others = {key for keys in SOIL_KEYS.values() for key in keys} - {*own}
-        faults = [((), f"{key} is missing") for key in own if key not in given]
+        faults = [
+            ((), f"{key} is missing") for key in own if key not in {*given, *OPTIONAL_SOIL_KEYS}
+        ]
         text = f"is not a key of the model {show(given.get('model'))}, which has {listing(own)}"
         return faults + [((key,), text) for key in given if own and key in others]
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Keys of its model."""
-        return SOIL_KEYS[self.model]
+        """Keys of its model that are given."""
+        return tuple(key for key in SOIL_KEYS[self.model] if getattr(self, key) is not None)
 
     @property
     def shapes(self) -> list[SpatialField]:
@@ -267,10 +284,11 @@ class FreeSurface(Physics, name="free-surface"):
     def value_faults(cls, basin, place, shape, mesh):
         if place[0] not in ("infiltration", "manning", "rain") or shape is None:
             return
-        values, greatest = samples(shape, mesh), 1.0 if place[-1] == "deficit" else np.inf
-        if not (values.min() >= 0.0 and values.max() <= greatest):
-            worst = values.min() if values.min() < 0.0 else values.max()
-            yield f"is {worst:g} in a cell; expected {'0 to 1' if greatest == 1.0 else 'no values below 0'}"
+        values, (least, greatest) = samples(shape, mesh), SOIL_RANGES.get(place[-1], (0.0, np.inf))
+        if not (values.min() >= least and values.max() <= greatest):
+            worst = values.min() if values.min() < least else values.max()
+            expected = f"{least:g} to {greatest:g}" if greatest < np.inf else "no values below 0"
+            yield f"is {worst:g} in a cell; expected {expected}"
         elif place[-1] == "initial" and (values < samples(basin.infiltration.final, mesh)).any():
             yield "is below `final` in a cell; expected a capacity that decreases"
 

@@ -14,12 +14,15 @@ step could follow f_p(F). While T is below EARLY, the rate is therefore multipli
 the next DRAIN_TIME needs, by the bound F(T) <= sqrt(2 S K T) + K T. A supply s, above this bound, limits the
 infiltration in the first instant only, until F = K S / s: time then lags by K S / (2 s^2). From EARLY on F alone gives
 the capacity, and T stays as it is.
+
+A curve number gives F = P S / (P + S) of the rain P, with the potential storage S. So f = R (1 - F / S)^2, without P.
+The rain fills an initial loss first. Water that stands does not infiltrate by this law.
 """
 
 from math import exp, log1p, sqrt
 
 from fvsolve.core.kernels.schedule_pieces import schedule_value
-from fvsolve.features.basins.tables import CONSTANT_RATE, GREEN_AMPT, HORTON, NO_SOIL
+from fvsolve.features.basins.tables import CONSTANT_RATE, CURVE_NUMBER, GREEN_AMPT, HORTON, NO_SOIL
 from fvsolve.jit import njit
 
 DRAIN_TIME = 10.0  # [s]
@@ -114,6 +117,22 @@ def limit_by_horton(soil, supply, times, rates, aging):
 
 
 @njit
+def limit_by_curve_number(soil, rain, heights, rates):
+    """Write rates of infiltration [m/s] by the curve number of the SCS.
+
+    soil : potential storage S, initial loss, both [m]; rain : rates of rain [m/s]; heights : infiltrated [m]
+    """
+    storage, loss, _ = soil
+    for i in range(rates.size):
+        height = heights[i] - loss[i]  # above the initial loss
+        if storage[i] > 0.0:
+            free = min(max(1.0 - height / storage[i], 0.0), 1.0)
+        else:
+            free = 1.0 if height < 0.0 else 0.0
+        rates[i] = rain[i] * free * free
+
+
+@njit
 def limit_by_green_ampt(soil, supply, heights, times, rates, aging):
     """Write rates of infiltration [m/s] and of condensed times by Green and Ampt's law.
 
@@ -179,14 +198,17 @@ def most_early(k, s, time, height):
 def limit_infiltration(kind, soil, states, supply, rates, aging):
     """Write rates of infiltration [m/s] in cells, and the rates of their condensed times.
 
-    kind : CONSTANT_RATE, HORTON or GREEN_AMPT; soil : three arrays, the constant rate in the first
-    states : infiltrated heights [m], condensed times [s]; supply : rain plus the water that can drain [m/s]
+    kind : CONSTANT_RATE, HORTON, GREEN_AMPT or CURVE_NUMBER; soil : three arrays, the constant rate in the first
+    states : infiltrated heights [m], condensed times [s]; supply : rain plus the water that can drain
+    [m/s], the rain alone for CURVE_NUMBER
     """
     heights, times = states
     if kind == GREEN_AMPT:
         limit_by_green_ampt(soil, supply, heights, times, rates, aging)
     elif kind == HORTON:
         limit_by_horton(soil, supply, times, rates, aging)
+    elif kind == CURVE_NUMBER:
+        limit_by_curve_number(soil, supply, heights, rates)
     elif kind == CONSTANT_RATE:
         for i in range(rates.size):
             rates[i] = min(soil[0][i], supply[i])
@@ -216,8 +238,9 @@ def put_infiltration(tables, basin, first, y, rates, aging):
         supply[i] = rate
     if basin["frames"] > 0:
         add_frames(tables, basin, first, supply)
-    for i in range(count):
-        supply[i] += max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME)
+    if basin["soil"] != CURVE_NUMBER:
+        for i in range(count):
+            supply[i] += max(depth0[i] + dh[i], 0.0) * (1.0 / DRAIN_TIME)
     limit_infiltration(basin["soil"], soil, (heights, times), supply, rates, aging)
 
 
