@@ -45,7 +45,7 @@ def test_every_file_of_tests_that_is_named_is_there():
 
 HOW_TO_PAGES = sorted(path for path in (DOCS / "how-to").glob("*.md") if path.stem != "index")
 START = DOCS / "start"
-RUN_PAGES = [*HOW_TO_PAGES, START / "first-questions.md", DOCS / "index.md"]
+RUN_PAGES = [*HOW_TO_PAGES, START / "first-questions.md", DOCS / "index.md", DOCS / "syllabus.md"]
 BLOCK = re.compile(r"^```(\w*)[ ]?(\S*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 # optional libraries
 LIBRARIES = {"epanet-to-report": ("wntr", "plotly", "xlsxwriter"), "plastic-main": ("rainflow",)}
