@@ -61,4 +61,4 @@ def test_a_table_counts_in_the_identity_of_a_case_unless_it_states_otherwise(sur
 def test_without_its_package_the_table_is_an_unknown_key():
     with pytest.raises(fvsolve.CaseError, match="survey: unknown key"):
         fvsolve.load("two-tanks", set={"survey.surveyor": "A"})
-    assert declared_tables.DECLARED.own().keys() == {"report"}
+    assert declared_tables.DECLARED.own().keys() == {"report", "gis"}
