@@ -78,7 +78,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/model": (3130, 11),
     "tests/output": (1298, 5),
     "tests/parts": (27482, 61),
-    "tests/reference": (7834, 71),
+    "tests/reference": (7839, 71),
     "tests/report": (2204, 12),
     "tests/repository": (7312, 33),
     "tests/schemes": (669, 2),
