@@ -1,4 +1,4 @@
-"""Cost of a step of Newton's method in networks of pipes, compared with SuperLU and with the figures of numba.md."""
+"""Cost of a step of Newton's method in networks of pipes, compared with SuperLU and with figures of developing.md."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
 SCHEMES = ("upwind", "upwind5")
 # two stages, solved one after the other with one factorisation
 COURANT, METHOD = 20.0, "alexander-2"
-# [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (numba.md)
+# [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (developing.md)
 STUDY = {"factor": 71.0, "solve": 18.0}
 GOAL = 1.5  # greatest ratio to the time of the study
 BUDGET = 0.2  # time of a measurement [s]
@@ -86,7 +86,7 @@ def network_table(quick: bool) -> None:
     """Print the times of the parts of a Newton step, and of whole runs."""
     title = f"{'factor':>9} {'study':>6} {'SuperLU':>8} {'solve':>8} {'study':>6} {'SuperLU':>8} {'f':>7} {'df/dy':>8}"
     print(
-        f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of numba.md, scaled by the unknowns"
+        f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of developing.md, scaled by the unknowns"
     )
     print(f"  {'pipes':>5} {'unknowns':>8} {'scheme':8} {'kind':7} {title}")
     global BUDGET

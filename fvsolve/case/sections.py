@@ -37,7 +37,7 @@ from fvsolve.units import show
 STARTS = ("steady", "equilibrium", "rest")
 CAVITY_SCHEMES = tuple(name for name, entry in SCHEMES.items() if entry.cavities)
 
-# Defaults of [numerics] and [output], chosen in docs/accuracy-and-speed.md. Steps: Courant number with cells, error
+# Defaults of [numerics] and [output], chosen in docs/accuracy.md. Steps: Courant number with cells, error
 # control without cells.
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9

@@ -1,4 +1,4 @@
-"""Features of other packages: the package of docs/features.md, as printed, and headers that are refused."""
+"""Features of other packages: the package of docs/extending.md, as printed, and headers that are refused."""
 
 import ast
 import inspect
@@ -7,14 +7,14 @@ import shutil
 import tomllib
 
 import pytest
-from reference.folders import page
+from reference.folders import section
 from reference.outside_packages import install, python
 
 import fvsolve
 from fvsolve.compile import cache_folders
 from fvsolve.core.assembly import features
 
-TEXT = page("features")
+TEXT = section("extending", "A feature in one folder")
 FILES = dict(re.findall(r"`([\w./]+\.\w+)`:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL))
 ((COMMAND, OUTPUT),) = re.findall(r"```sh\n(.*?)\n```\n\n```text\n(.*?)\n```", TEXT, re.DOTALL)
 

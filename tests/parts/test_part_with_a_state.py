@@ -1,16 +1,16 @@
-"""Package, cases, commands and test of docs/a-part-with-a-state.md, installed and run as they stand."""
+"""Package, cases, commands and test of docs/own-parts.md, installed and run as they stand."""
 
 import re
 import shlex
 import tomllib
 
 import pytest
-from reference.folders import page
+from reference.folders import section
 from reference.outside_packages import install, python
 
 from fvsolve.units import DIMENSIONS
 
-TEXT = page("a-part-with-a-state")
+TEXT = section("own-parts", "A part with a state")
 FILES = dict(re.findall(r"^`([\w./-]+\.\w+)`:\n\n```\w+\n(.*?)```", TEXT, re.DOTALL | re.MULTILINE))
 RUNS = re.findall(r"```sh\n(.*?)```\n\n```text\n(.*?)```", TEXT, re.DOTALL)
 

@@ -1,4 +1,4 @@
-"""Worked example of docs/a-part-from-nothing.md, run as printed from a package outside fvsolve."""
+"""Worked example of docs/own-parts.md, run as printed from a package outside fvsolve."""
 
 import json
 import os
@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.folders import section
 from scipy.integrate import solve_ivp
 
 import fvsolve
 
-PAGE = (Path(fvsolve.__file__).parents[1] / "docs" / "a-part-from-nothing.md").read_text(
-    encoding="utf-8"
-)
+PAGE = section("own-parts", "A part without a state")
 BLOCKS = dict(re.findall(r"`([\w./]+\.\w+)`[^`]*?:\n\n```\w+\n(.*?)```", PAGE, re.DOTALL))
 BLOCKS |= dict(re.findall(r"`(test_runner\.py)`.*?```python\n(.*?)```", PAGE, re.DOTALL))
 RESISTANCE, LOSS, AREA, LEVEL = 2e6, 4e8, 2.0, 20.0

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from reference import lifted_valves
-from reference.folders import CASES
+from reference.folders import CASES, section
 from reference.jacobians import stray
 from reference.refusals import refused
 from reference.resumed_runs import killed_and_resumed, same_files
@@ -725,9 +725,9 @@ def test_a_pilot_of_another_domain_is_refused():
     refused(case, "needs a hydraulic place")
 
 
-# circuits of docs/fluid-power-circuits.md -------------------------------------------------------------------------
+# circuits of docs/fluid-power.md ----------------------------------------------------------------------------------
 
-PAGE = (TOP / "docs/fluid-power-circuits.md").read_text(encoding="utf-8")
+PAGE = section("fluid-power", "Circuits")
 SECTIONS = (section.partition("\n") for section in re.split(r"^##+ ", PAGE, flags=re.MULTILINE)[1:])
 CIRCUITS = {
     title: text.split("```")[1].removeprefix("toml")

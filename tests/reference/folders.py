@@ -13,6 +13,11 @@ def page(name: str) -> str:
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")
 
 
+def section(name: str, title: str) -> str:
+    """Text of the section TITLE of docs/NAME.md, with its subsections."""
+    return page(name).split(f"\n## {title}\n", 1)[1].split("\n## ", 1)[0]
+
+
 def python_of(text: str) -> str:
     """Python blocks of a page or of a part of a page, joined by line breaks."""
     return "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))

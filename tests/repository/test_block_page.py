@@ -1,4 +1,4 @@
-"""Package, case and commands of docs/a-block-of-your-own.md, installed and run as they stand."""
+"""Package, case and commands of docs/own-parts.md, installed and run as they stand."""
 
 import json
 import re
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference.folders import page
+from reference.folders import section
 from reference.outside_packages import files_of, install_page, lines_not_printed, python, runs_of
 
 from fvsolve.compile import cache_folders
@@ -15,7 +15,7 @@ from fvsolve.features.controls.rows import ControlRows, StaticRows
 from fvsolve.parts import plugins
 from fvsolve.parts.control import Control
 
-TEXT = page("a-block-of-your-own")
+TEXT = section("own-parts", "A block of controls")
 FILES, RUNS = files_of(TEXT), runs_of(TEXT)
 FOLDERS = ("watch", "watch/running_max", "watch/lag")
 METHODS = ("dormand-prince", "radau-iia-5", "rodas-5p")  # explicit, implicit, Rosenbrock

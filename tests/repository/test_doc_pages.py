@@ -1,6 +1,6 @@
 """Pages of the documentation: their files, names, links, commands, Python and output are as they state.
 
-The pages are docs/index.md, docs/start, docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/attitudes.md, and
+The pages are docs/index.md, docs/start, docs/how-to, CONTRIBUTING.md, docs/developing.md, docs/bodies.md, and
 docs/course.md, which covers the course.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference.folders import DOCS, page, printed_otherwise, python_of
+from reference.folders import DOCS, page, printed_otherwise, python_of, section
 
 from fvsolve.parts.attitude_keys import Attitude
 
@@ -128,6 +128,11 @@ HEAVY = (
     "lint-imports",
     "ruff",
     "NUMBA_DISABLE_JIT=1",
+    "FVSOLVE_STORE=0",
+    "PYTHONS=",
+    ".ci/release",
+    "pip install",
+    "python -m pytest",
 )
 
 
@@ -195,14 +200,14 @@ def test_two_tanks_without_jit_are_the_same_bytes(copied_files):
 
 @pytest.mark.parametrize("page", CONTRIBUTOR_PAGES)
 def test_files_and_names_of_the_pages_are_there(page):
-    """Each `.py` or `.json` file in backquotes is the end of a path, except summary.json, which a run writes."""
+    """Each `.py` or `.json` file in backquotes is the end of a path, except those of a run or a release."""
     text = re.sub(r"```.*?```", "", CONTRIBUTOR_PAGES[page], flags=re.DOTALL)
     there = [
         f"/{path.as_posix()}"
         for folder in ("fvsolve", "tests", "cases", "docs")
         for path in (TOP / folder).rglob("*.*")
     ]
-    said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json"}
+    said = {*re.findall(r"`([\w/]+\.(?:py|json))`", text)} - {"summary.json", "dist/sbom.json"}
     assert [
         name
         for name in said
@@ -272,7 +277,7 @@ def test_the_changelog_has_the_form_of_keep_a_changelog():
         )
 
 
-ATTITUDES = page("attitudes")
+ATTITUDES = section("bodies", "Attitudes")
 FORMS = re.findall(r"^attitude = .*$", ATTITUDES, re.MULTILINE)
 
 

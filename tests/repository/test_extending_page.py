@@ -13,7 +13,7 @@ from fvsolve.case.sections import SINKS
 from fvsolve.cli import COMMANDS
 from fvsolve.core.fluid import LAWS
 
-TEXT = page("extending")
+TEXT = page("extending").split("\n## A feature in one folder\n")[0]
 FILES, RUNS = files_of(TEXT), runs_of(TEXT)
 
 

@@ -97,7 +97,7 @@ def test_each_column_has_a_meaning():
 
 def test_the_page_of_devices_has_the_table_of_all_functions_of_a_law():
     """The table is that of `python docs/generated_pages.py hooks`; a law of the package names its arguments so."""
-    assert generated_pages.hooks() in (DOCS / "device.md").read_text("utf-8")
+    assert generated_pages.hooks() in (DOCS / "own-parts.md").read_text("utf-8")
     for path in generated_pages.PACKAGE.glob("parts/**/law*.py"):
         for found in ast.parse(path.read_text("utf-8")).body:
             if isinstance(found, ast.FunctionDef) and (hook := HOOKS.get(found.name)):

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from reference.folders import DOCS
+from reference.folders import DOCS, section
 
 import fvsolve
 from fvsolve.core.assembly.lowering import Device, Lowering, Restriction
@@ -17,7 +17,7 @@ STATION = re.compile(r"^ *(\S+\.py) +(?:([A-Za-z_]+)(?:\.(\w+))?[:,] )?", re.MUL
 def test_nine_verbs_order_all_methods_of_a_part():
     rows = {
         verb: re.findall(r"`(\w+)`", names)
-        for verb, names in VERB.findall((DOCS / "device.md").read_text("utf-8"))
+        for verb, names in VERB.findall(section("own-parts", "Nine verbs of a part"))
     }
     for head in ("verb", "function"):
         rows.pop(head, None)

@@ -25,15 +25,9 @@ REST_IS_MISSING = re.compile(
 # A part of the reader, pyproject.toml, a case for another package, and forms that
 # tests/repository/test_doc_pages.py reads.
 OTHER = {
-    ("a-block-of-your-own", 0),
-    ("a-block-of-your-own", 1),
-    ("a-part-from-nothing", 0),
-    ("a-part-from-nothing", 1),
-    *(("a-part-with-a-state", k) for k in range(3)),
-    ("attitudes", 0),
-    ("extending", 0),
-    ("extending", 1),
-    ("features", 0),
+    ("bodies", 1),
+    *(("extending", k) for k in range(3)),
+    *(("own-parts", k) for k in range(7)),
 }
 GIVEN_BY_PIPES = re.compile(r"\.(on|at): unknown key")  # a node on a pipe, whose case has the pipe
 TYPES = {"nodes": "basin", "links": "pipe"}  # of the parts that blocks continue

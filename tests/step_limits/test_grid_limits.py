@@ -412,11 +412,11 @@ def test_growth_a_step_is_the_greatest_amplification():
 
 
 def test_the_page_shows_computed_values():
-    """The first table of docs/stability-grid.md contains the computed limits, and the letters of their waves."""
-    page = folders.page("stability-grid")
+    """The first table of docs/stability.md contains the computed limits, and the letters of their waves."""
+    page = folders.section("stability", "Uniform periodic grid")
     rows = [
         line.strip("| ").split(" | ")
-        for line in page.split("## Runs on")[0].splitlines()
+        for line in page.split("### Runs on")[0].splitlines()
         if line.startswith("| `")
     ]
     shown = {name.strip("` "): row[1:] for row in rows for name in row[0].split(",")}
@@ -431,7 +431,7 @@ def test_the_page_shows_computed_values():
 
 
 def test_all_keys_of_a_limit_are_on_the_page():
-    page = folders.page("stability-grid")
+    page = folders.section("stability", "Uniform periodic grid")
     assert all(f"`{key}`" in page for key in advection_limit("upwind", "euler").plain())
 
 

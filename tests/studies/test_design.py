@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from reference.design_studies import STUDY, throttled
-from reference.folders import CASES, DOCS
+from reference.folders import CASES, DOCS, section
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, ramp, reservoir, scene, valve
 
 import fvsolve
@@ -192,8 +192,8 @@ def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
 
 
 def test_the_commands_of_the_page_print_its_text(fvs, tmp_path, monkeypatch) -> None:
-    """Each command of docs/designs.md prints the results on the page; the study is coarser and shorter here."""
-    text = (DOCS / "designs.md").read_text(encoding="utf-8")
+    """Each command of docs/studies.md prints the results on the page; the study is coarser and shorter here."""
+    text = section("studies", "Designs")
     lines = [
         line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()
     ]
