@@ -2,7 +2,7 @@
 
 The error of the margin of a design limit is bounded from the signals at some places of each part to which the limit
 applies. With column separation no order of convergence is assumed, because peaks after cavity collapse converge slowly
-(docs/cavitation.md). Without cells, a peak between two rows of output is higher than the rows by up to an eighth of
+(docs/fluids.md). Without cells, a peak between two rows of output is higher than the rows by up to an eighth of
 their second difference.
 
 Each error is bounded from the local maxima of a signal. A local maximum has the values c, m and f at half, one and

@@ -515,7 +515,7 @@ class MixtureLaw(DenseLaw, name="mixture"):
             return ""
         return (
             "; where much gas expands, set `cavitation = true` in [fluid] and "
-            "a suitable scheme (see docs/cavitation)"
+            "a suitable scheme (see docs/fluids.md)"
         )
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:

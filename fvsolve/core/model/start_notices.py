@@ -258,7 +258,7 @@ def _others(draft: Any, few: np.ndarray, worst: int) -> str:
     return f"; too few also in {listing(names, 6)}" if names else ""
 
 
-# relative error of the duration of a first cavity: DURATION cells^-RATE (docs/cavitation.md)
+# relative error of the duration of a first cavity: DURATION cells^-RATE (docs/fluids.md)
 DURATION, RATE = 1.03, 0.7
 ENOUGH = 200  # number of cells from which on there is no notice
 

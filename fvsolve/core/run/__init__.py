@@ -54,7 +54,7 @@ def run(
     `case` is a path, a dict shaped like the file, a `Case` or a `Model`; `set` overrides keys, for example
     `{"links.main.cells": 400}`. With `out` a run directory is written (docs/results.md). An earlier run in it is
     replaced with `force` only, and continued from its last checkpoint with `resume`; `pictures` are drawn there.
-    With `threads` above 1, rows of basins are distributed over threads, with identical results (docs/threads.md).
+    With `threads` above 1, rows of basins are distributed over threads, with identical results (docs/command-line.md).
     `progress(t, seconds, steps)` is called about ten times a second; a KeyboardInterrupt raised in it ends the run in
     order. A run that stops early also returns a result, with `ok` False and its `reason`.
     Under MPI rank 0 does all this; the other ranks take part in the computation and return None.
