@@ -4,7 +4,7 @@ The site needs no network: formulas become MathML in the pages; fonts, styles an
 Three rules make a site of the pages of the repository, so that no text is stored twice:
 
 - `<!-- page: PATH -->` on a page stands for a Markdown file outside docs, such as benchmarks/README.md.
-- `<!-- generated: NAME -->` stands for the text of `generated_pages.GENERATED[NAME]`.
+- `<!-- generated: NAME -->` stands for the text of `generated_pages.GENERATED[NAME]`; words behind NAME are its arguments.
 - The pages that the tables of an `index.md` link, in this order, are the contents of its section.
 """
 
@@ -20,7 +20,7 @@ from docutils import nodes
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for generated_pages
-from generated_pages import GENERATED  # noqa: E402
+from generated_pages import filled  # noqa: E402
 
 # tutorials run `fvsolve`
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
@@ -67,7 +67,6 @@ LANGUAGES = {".toml": "toml", ".py": "python"}
 NAMED = re.compile(r"\[([\w-]+)\.md\]\(")  # a link whose text is the name of its file
 LINK = re.compile(r"(?<=\]\()([^)\s:#]+)(#[^)\s]*)?(?=\))")
 ELSEWHERE = re.compile(r"<!-- page: (\S+) -->\n.*", re.DOTALL)
-MARK = re.compile(r"<!-- generated: (\S+) -->\n")
 
 
 def pages_outside() -> dict[Path, str]:
@@ -91,7 +90,7 @@ def read_page(app, page: str, source: list[str]) -> None:
         file = (file.parent / mark[1]).resolve()
         text = ELSEWHERE.sub("", text) + file.read_text(encoding="utf-8")
         app.env.note_dependency(str(file))
-    text = MARK.sub(lambda mark: GENERATED[mark[1]](), text)
+    text = filled(text)
     text = LINK.sub(lambda link: target(link[1], file.parent, page) + (link[2] or ""), text)
     text = NAMED.sub(r"[\1](", text)
     if file.name == "index.md":

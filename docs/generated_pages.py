@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
+import part_pages
 from numba import from_dtype
 
 import fvsolve
@@ -21,6 +22,7 @@ PYTHON_PAGE = (Path(__file__).parent / "python.md").read_text(encoding="utf-8")
 # beginning of a line of a docstring about arguments or fields
 ARGUMENT = re.compile(r"([^\s,]+(?:, [^\s,]+)*) : ")
 CODE = re.compile(r"(`[^`]*`)")
+MARK = re.compile(r"<!-- generated: (\S+)(?: (.+?))? -->\n")  # NAME, or NAME with words
 
 
 def commands() -> str:
@@ -275,24 +277,19 @@ def validation() -> str:
 
 
 def names_of_practice() -> str:
-    """Sections of the types of parts by group, and of the names of practice, each with an example."""
+    """Table of the names of practice with the pages of their parts, and examples of names that differ from those of types."""
     from fvsolve.case import part_names
 
-    types, text = part_names.part_types(), ""
-    for group in dict.fromkeys(entry.group for entry in types.values()):
-        text += f"## {group.capitalize()}\n\n"
-        entries = [entry for entry in types.values() if entry.group == group]
-        text += "".join(
-            f"### {one.names[0]}\n\n{escaped(one.about)}\n\n{toml(one)}" for one in entries
-        )
+    types, places = part_names.part_types(), part_pages.page_of_types()
     rows, examples = [], ""
     for one in part_names.names_of_practice():
-        parts = (" and " if one.composed else " or ").join(f"`{kind}`" for kind in one.parts)
+        links = (f"[{kind}](parts/{places[kind]})" for kind in one.parts)
+        parts = (" and " if one.composed else " or ").join(links)
         rows.append((", ".join(one.names), parts, one.about))
         if one.example != types[one.parts[0]].example:
             examples += f"### {one.names[0]}\n\n{escaped(one.about)}\n\n{toml(one)}"
     head = ("names", "parts", "meaning")
-    return f"{text}## Names\n\n{table(head, rows)}\n## Examples of names\n\n{examples}"
+    return f"## Names\n\n{table(head, rows)}\n## Examples of names\n\n{examples}"
 
 
 def toml(entry) -> str:
@@ -325,7 +322,16 @@ GENERATED = {
     "names_of_practice": names_of_practice,
     "validation": validation,
     "views": views,
+    "part": part_pages.part,
+    "keys": part_pages.keys,
+    "part_index": part_pages.part_index,
 }
 
+
+def filled(text: str) -> str:
+    """Text of a page with its marks `<!-- generated: NAME -->`, or NAME and words, replaced by what they name."""
+    return MARK.sub(lambda mark: GENERATED[mark[1]](*(mark[2] or "").split()), text)
+
+
 if __name__ == "__main__":
-    print(GENERATED[sys.argv[1]]())
+    print(GENERATED[sys.argv[1]](*sys.argv[2:]))

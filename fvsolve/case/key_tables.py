@@ -1,7 +1,7 @@
-"""Key tables of docs/parts.md, generated from the declarations of parts.
+"""Key tables of pages in docs, generated from the declarations of parts.
 
-python -m fvsolve.case.key_tables docs/parts.md    rewrites the tables of a page between their marks
-python -m fvsolve.case.key_tables valve            prints the table of a part
+python -m fvsolve.case.key_tables docs/structures.md    rewrites the tables of a page between their marks
+python -m fvsolve.case.key_tables valve                 prints the table of a part
 """
 
 import re

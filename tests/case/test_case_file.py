@@ -18,6 +18,7 @@ from reference.refusals import refused
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
+from fvsolve.case.key_tables import key_table
 from fvsolve.case.schema import full_schema, schema_text
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
@@ -512,46 +513,41 @@ def test_the_page_of_the_case_file_names_every_key_and_its_example_reads():
     assert load({**example, "fluid": tomllib.loads(DETAILED)["fluid"]}).links["main"].cells == 100
 
 
-def headings(page: str) -> dict[str, str]:
-    """Texts of a page of the docs by heading; a heading may name several kinds."""
-    found = re.findall(r"^## (.*?)\n(.*?)(?=^#|\Z)", page, re.DOTALL | re.MULTILINE)
-    return {name: text for heading, text in found for name in heading.split(", ")}
-
-
-def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
-    found = headings(folders.page("parts"))
-    found["orifice"] += found["valve"]
-    found |= {
-        name: text + found["valve"] for name, text in found.items() if "see [valve](#valve)" in text
+def test_the_tables_of_the_pages_of_parts_have_every_key():
+    """The site makes the pages of docs/parts of these tables; docs/parts/limits.md states its keys itself."""
+    every = {
+        "nodes": key_table("every node") + key_table("riding"),
+        "links": key_table("every link"),
     }
-    every = {"nodes": found["Every node"], "links": found["Every link"]}
-    wanted = {
+    models = {
         kind: (model, every[group]) for group in KINDS for kind, model in KINDS[group].items()
     }
-    wanted |= {"numerics": (Numerics, ""), "output": (Output, ""), "friction": (Friction, "")}
-    for name, (model, shared) in wanted.items():
-        text = shared + found[name]
+    models |= {"numerics": (Numerics, ""), "output": (Output, ""), "friction": (Friction, "")}
+    models |= {"wall": (Wall, "")}
+    for name, (model, shared) in models.items():
+        text = shared + key_table(name)
+        text += key_table("valve") if "see [valve]" in text else ""
+        text += key_table("check-valve") if "see [check valve]" in text else ""
         assert [
             key for key in model.keys() if not re.search(rf"^\|.*`{key}`.*\|", text, re.MULTILINE)
         ] == [], name
-    assert all(key in found["pipe"] for key in Wall.keys())
-    assert all(
-        f"`{key}`" in found["expect and compare"] for key in [*expect_keys("flow"), *COMPARE_KEYS]
-    )
+    limits = folders.page("parts/limits")
+    assert all(f"`{key}`" in limits for key in [*expect_keys("flow"), *COMPARE_KEYS])
 
 
-def test_the_page_of_the_parts_has_the_defaults():
-    page = folders.page("parts")
+def test_the_tables_of_the_pages_of_parts_have_the_defaults():
     said = {
         name: dict(
             re.findall(
-                r"^\| `(\w+)` \| .* \| (.*?) \| (?:value|profile|cells|shape) \|", one, re.MULTILINE
+                r"^\| `(\w+)` \| .* \| (.*?) \| (?:value|profile|cells|shape) \|",
+                key_table(name),
+                re.MULTILINE,
             )
         )
-        for name, one in headings(page).items()
+        for name in ("case", "numerics", "output", "valve")
     }
     case = load(two_tanks())
-    assert [float(said["The case"][key]) for key in ("ambient_pressure", "gravity")] == [
+    assert [float(said["case"][key]) for key in ("ambient_pressure", "gravity")] == [
         101325.0,
         case.gravity,
     ]

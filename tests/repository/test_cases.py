@@ -62,7 +62,7 @@ def oil(fraction: float = 0.01) -> tuple[AirOil, float]:
 
 
 def edge(share: float, up: float, down: float, fluid: AirOil, viscosity: float) -> float:
-    """Mass flow of a sharp edge [kg/s]; below Re = 10 of the full opening, the quintic of docs/parts.md."""
+    """Mass flow of a sharp edge [kg/s]; below Re = 10 of the full opening, the quintic of docs/parts/valve.md."""
     size = 2.0 * fluid.density(max(up, down)) * (HOLE * share) ** 2 * abs(up - down)
     slow = 10.0 * math.pi / 4.0 * math.sqrt(4.0 * 12e-6 / math.pi) * viscosity
     x = size / slow**2

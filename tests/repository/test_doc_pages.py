@@ -157,7 +157,7 @@ def is_test(command: str) -> bool:
 @pytest.fixture
 def copied_files(tmp_path) -> Path:
     """Folder with copies of the files that the commands overwrite."""
-    for name in ("docs/parts.md", "cases/schema.json", "pyproject.toml"):
+    for name in ("docs/structures.md", "cases/schema.json", "pyproject.toml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(TOP / name, tmp_path / name)
     return tmp_path
@@ -178,7 +178,7 @@ def test_a_command_of_the_pages_does_as_it_states(command, copied_files):
         ["bash", "-c", command], cwd=copied_files, env=known, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    for name in ("docs/parts.md", "cases/schema.json"):
+    for name in ("docs/structures.md", "cases/schema.json"):
         assert (copied_files / name).read_text(encoding="utf-8") == (TOP / name).read_text(
             encoding="utf-8"
         )

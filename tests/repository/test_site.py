@@ -213,7 +213,14 @@ def test_every_tutorial_has_run_and_shows_pictures_and_plain_commands_and_files(
 
 
 def test_a_failing_cell_a_lost_link_and_a_page_without_section_stop_the_build(tmp_path):
-    for name in ("conf.py", "generated_pages.py", "kernel_start.py", "python.md", "site.css"):
+    for name in (
+        "conf.py",
+        "generated_pages.py",
+        "part_pages.py",
+        "kernel_start.py",
+        "python.md",
+        "site.css",
+    ):
         shutil.copy(DOCS / name, tmp_path / name)
     (tmp_path / "python.md").write_text("# Alone\n")
     (tmp_path / "index.md").write_text(
