@@ -4,7 +4,7 @@ The site needs no network: formulas become MathML in the pages; fonts, styles an
 Three rules make a site of the pages of the repository, so that no text is stored twice:
 
 - `<!-- page: PATH -->` on a page stands for a Markdown file outside docs, such as benchmarks/README.md.
-- `<!-- generated: NAME -->` stands for the text of `generated_pages.GENERATED[NAME]`; words behind NAME are its arguments.
+- `<!-- generated: NAME -->` stands for the text of `generated_pages.GENERATED[NAME]`; words behind NAME are arguments.
 - The pages that the tables of an `index.md` link, in this order, are the contents of its section.
 """
 
@@ -17,6 +17,7 @@ from pathlib import Path
 
 import latex2mathml.converter
 from docutils import nodes
+from sphinx.addnodes import download_reference
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for generated_pages
@@ -63,6 +64,7 @@ html_theme_options = {
     "pygments_dark_style": "github-dark",
 }
 
+NOTEBOOK = "---\nfile_format: mystnb\n"  # head of a page with cells
 LANGUAGES = {".toml": "toml", ".py": "python"}
 NAMED = re.compile(r"\[([\w-]+)\.md\]\(")  # a link whose text is the name of its file
 LINK = re.compile(r"(?<=\]\()([^)\s:#]+)(#[^)\s]*)?(?=\))")
@@ -128,6 +130,28 @@ def plain_cells(app, document) -> None:
         block.children, block["language"] = [nodes.Text(block.rawsource)], language
 
 
+def notebook_link(app, document) -> None:
+    """Add a link to the notebook, with the output of its cells, below the introduction of a tutorial.
+
+    A link that opens the notebook in a service such as Binder needs a public address of the repository, which does
+    not exist.
+    """
+    page = app.env.docname
+    if not (DOCS / f"{page}.md").read_text(encoding="utf-8").startswith(NOTEBOOK):
+        return
+    path = Path(app.outdir).parent / "jupyter_execute" / f"{page}.ipynb"
+    link = download_reference(
+        "", "", reftarget="/" + os.path.relpath(path, DOCS).replace(os.sep, "/")
+    )
+    link += nodes.literal("", path.name)
+    line = nodes.paragraph("", "Download this page as a notebook with its output: ", link)
+    line += nodes.Text(". It runs in Jupyter with an installed fvsolve.")
+    section = next(document.findall(nodes.section))
+    first = (k for k, child in enumerate(section) if isinstance(child, nodes.section))
+    place = next(first, len(section))
+    section.insert(place, line)
+
+
 def formula(display: str, before: str = "", after: str = ""):
     """Visitor of formula nodes, which writes them as MathML."""
 
@@ -143,6 +167,8 @@ def formula(display: str, before: str = "", after: str = ""):
 def setup(app) -> None:
     app.connect("source-read", read_page)
     app.connect("doctree-read", plain_cells)
+    # before Sphinx copies the files of links
+    app.connect("doctree-read", notebook_link, priority=100)
     app.connect(
         "build-finished", lambda *_: shutil.rmtree(os.environ["IPYTHONDIR"], ignore_errors=True)
     )

@@ -277,7 +277,7 @@ def validation() -> str:
 
 
 def names_of_practice() -> str:
-    """Table of the names of practice with the pages of their parts, and examples of names that differ from those of types."""
+    """Table of the names of practice with the pages of their parts, and their examples."""
     from fvsolve.case import part_names
 
     types, places = part_names.part_types(), part_pages.page_of_types()

@@ -12,7 +12,7 @@ AMBIENT, RHO, BETA, MU = 101325.0, 870.0, 1.2e9, 0.028
 def valve_flow(
     area: float, share: float, p_up: float, p_down: float, rho: float, coefficient: float = 0.61
 ) -> float:
-    """Mass flow [kg/s] by q = share Cd A sqrt(2 dp / rho), and by the polynomial of docs/parts/valve.md in transition flow.
+    """Mass flow [kg/s], q = share Cd A sqrt(2 dp / rho); in transition flow the polynomial of docs/parts/valve.md.
 
     Transition flow is below Reynolds number 10 of the full area.
     """

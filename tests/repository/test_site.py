@@ -3,6 +3,7 @@
 The tests need the extra `docs`. FVSOLVE_SITE is the folder of a site that is already built.
 """
 
+import json
 import os
 import re
 import shutil
@@ -210,6 +211,16 @@ def test_every_tutorial_has_run_and_shows_pictures_and_plain_commands_and_files(
         )
         >= 1
     )
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.startswith("tutorials/") and "index" not in page]
+)
+def test_every_tutorial_has_a_link_to_its_notebook_with_output(page, site):
+    links = [link for link in read(site / f"{page}.html").links if link.endswith(".ipynb")]
+    assert [Path(link).stem for link in links] == [Path(page).name]
+    cells = json.loads(((site / page).parent / links[0]).read_text("utf-8"))["cells"]
+    assert any(cell.get("outputs") for cell in cells)
 
 
 def test_a_failing_cell_a_lost_link_and_a_page_without_section_stop_the_build(tmp_path):

@@ -80,7 +80,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (27481, 61),
     "tests/reference": (7839, 71),
     "tests/report": (2212, 12),
-    "tests/repository": (7415, 34),
+    "tests/repository": (7426, 34),
     "tests/schemes": (669, 2),
     "tests/solve": (3772, 14),
     "tests/step_limits": (1314, 4),
