@@ -80,7 +80,7 @@ FOLDERS: dict[str, tuple[int, int]] = {
     "tests/parts": (27482, 61),
     "tests/reference": (7839, 71),
     "tests/report": (2204, 12),
-    "tests/repository": (7312, 33),
+    "tests/repository": (7317, 33),
     "tests/schemes": (669, 2),
     "tests/solve": (3772, 14),
     "tests/step_limits": (1314, 4),
