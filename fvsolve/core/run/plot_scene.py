@@ -9,6 +9,7 @@ from fvsolve.core.output import network_layout
 from fvsolve.core.output.fields import FIELD_UNITS, read_pipe_lines
 from fvsolve.core.output.unit_columns import column
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.exact.solution import value
 from fvsolve.parts.date_keys import moment_text
 from fvsolve.report.draw.scene import PLAUSIBLE_SCALE, DrawnPart, DrawnScene, DrawnUnit
 
@@ -209,12 +210,18 @@ def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float,
 
 
 def _walls(case, plan: dict[str, np.ndarray]) -> list[np.ndarray]:
-    """Faces of each wall of the basins in the drawing, at the height of its crest : float64[faces, 2, 3] [m]."""
+    """Faces of each wall of the basins in the drawing, at its crest at the start : float64[faces, 2, 3] [m].
+
+    Walls whose crests follow a control are left out, because their crests are known only in a run.
+    """
     found = []
     for name, mesh in case.meshes.items():
         for wall in (getattr(case.nodes[name], "walls", None) or {}).values():
+            if wall.crest.kind == "control":
+                continue
             ends = plan[name] + mesh.points[mesh.ends[wall.chain(mesh).faces]]
-            height = np.full((*ends.shape[:2], 1), wall.crest + (case.nodes[name].elevation or 0.0))
+            crest = float(value(wall.crest, case.numerics.start))
+            height = np.full((*ends.shape[:2], 1), crest + (case.nodes[name].elevation or 0.0))
             found.append(np.concatenate([ends, height], axis=2))
     return found
 

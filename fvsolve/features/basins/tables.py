@@ -109,7 +109,14 @@ BASIN = record(
     mark_rows=i8,  # number of rows of faces there
     marks=i8,  # number of marks; on a mesh each face has two
     marked_faces=i8,  # number of marked faces
-    crests=i8,  # offset in `plane` of their crests, heights and sizes
+    # offset of their crests, heights and sizes, in `work` if a crest moves, else in `plane`
+    crests=i8,
+    moving_crests=i8,  # number of walls if a crest moves, else 0, see `free_surface.moving_crests`
+    # offset in `integers` of their schedules, then of the first candidate of each marked face, then of the walls
+    # of the candidates
+    candidates=i8,
+    candidate_numbers=i8,  # offset in `plane` of beds of marked faces, then of sizes and normals of candidates
+    present_crests=i8,  # offset in `work` of the present crests of walls
     marked_work=i8,  # offset in `work` of flows through marked faces
     sections=i8,  # 1 if there are sections, whose flows rows need
 )

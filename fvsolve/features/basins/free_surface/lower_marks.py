@@ -14,13 +14,15 @@ from fvsolve.features.basins.lower_motion import sides_of_cells
 
 # greatest factor on the flow over a wall by which its faces pass that over its line
 MOST_STRETCH = 2.0
+# numbers of each marked face that change with crests: crest, height, size and normal
+MARK_NUMBERS = 5
 
 
 class Marks(NamedTuple):
     """Marked faces of a basin, see `marked_faces`.
 
-    faces : int64[k]  faces; crest : float64[k]  crests above the elevation [m]
-    height : float64[k]  of walls above both beds, 0 without a wall [m]; coefficient : float64[k]  C of the weir
+    faces : int64[k]  faces; crest : float64[k]  greatest crests in time above the elevation [m]
+    height : float64[k]  of these above both beds, 0 without a wall [m]; coefficient : float64[k]  C of the weir
     cosine, sine : float64[k]  normal of the wall in the frame of the face, see `FaceChain`
     """
 
@@ -33,14 +35,24 @@ class Marks(NamedTuple):
 
     @property
     def walls(self) -> np.ndarray:
-        """Faces with a wall : int64[:]."""
+        """Faces with a wall at some time : int64[:]."""
         return self.faces[self.height > 0.0]
+
+
+def beds_of(basin) -> np.ndarray:
+    """Higher bed of the cells on both sides of each face between cells above the elevation : float64[inner] [m]."""
+    mesh = basin.mesh
+    return np.maximum(*(basin.bed[cells[: mesh.inner]] for cells in (mesh.left, mesh.right)))
+
+
+def coefficient_of(wall, chain) -> float:
+    """Coefficient C of the weir on the faces of a wall, which may be longer than its line."""
+    return wall.coefficient * min(max(chain.stretch, 1.0 / MOST_STRETCH), MOST_STRETCH)
 
 
 def marks_of(basin) -> Marks:
     """Marked faces of a basin: those of its sections, and those of walls above both beds; the highest wall counts."""
-    mesh = basin.mesh
-    beds = np.maximum(*(basin.bed[cells[: mesh.inner]] for cells in (mesh.left, mesh.right)))
+    mesh, beds = basin.mesh, beds_of(basin)
     crest, marked, (factor, cosine, sine) = (
         beds.copy(),
         np.zeros(mesh.inner, bool),
@@ -48,10 +60,11 @@ def marks_of(basin) -> Marks:
     )
     for wall in (basin.part.walls or {}).values():
         chain = wall.chain(mesh)
-        highest = wall.crest > crest[chain.faces]
+        greatest = float(wall.crest.value.max())
+        highest = greatest > crest[chain.faces]
         faces = chain.faces[highest]
-        crest[faces], marked[faces] = wall.crest, True
-        factor[faces] = wall.coefficient * min(max(chain.stretch, 1.0 / MOST_STRETCH), MOST_STRETCH)
+        crest[faces], marked[faces] = greatest, True
+        factor[faces] = coefficient_of(wall, chain)
         cosine[faces], sine[faces] = chain.cosine[highest], chain.sine[highest]
     for chain in basin.sections.values():
         marked[chain.faces] = True
@@ -65,7 +78,8 @@ def lower_marks(draft, basin, row) -> None:
         faces = wall.chain(basin.mesh).faces
         if not np.isin(faces, basin.marks.walls).any():
             text = f"basin {basin.name}: wall {name} has no effect, its crest is nowhere above the bed or another wall"
-            draft.warnings.append(Notice("range", f"nodes.{basin.name}", text, "walls", wall.crest))
+            greatest = float(wall.crest.value.max())
+            draft.warnings.append(Notice("range", f"nodes.{basin.name}", text, "walls", greatest))
     marks = basin.marks
     if not marks.faces.size:
         return
@@ -75,10 +89,52 @@ def lower_marks(draft, basin, row) -> None:
     row["marked_faces"], row["sections"] = marks.faces.size, bool(basin.sections)
     first = np.searchsorted(rows[order], np.arange(count + 1))
     draft.integers += [*first.tolist(), *place[order].tolist(), *number[order].tolist()]
-    size = 2.0 / 3.0 * math.sqrt(2.0 * basin.case.gravity) * marks.coefficient
+    row["marked_work"] = draft.to_work(marks.faces.size + max(marks.faces.size, SUM_COUNT * BLOCK))
+    if any(not wall.crest.constant for wall in (basin.part.walls or {}).values()):
+        lower_moving_crests(draft, basin, row)
+        return
+    size = weir_size(basin, marks.coefficient)
     numbers = marks.crest - basin.part.level, marks.height, size, marks.cosine, marks.sine
     row["crests"] = draft.to_plane(np.array(numbers))
-    row["marked_work"] = draft.to_work(marks.faces.size + max(marks.faces.size, SUM_COUNT * BLOCK))
+
+
+def weir_size(basin, coefficient: np.ndarray) -> np.ndarray:
+    """2/3 C sqrt(2 g) of weirs with the coefficients C [m^0.5/s]."""
+    return 2.0 / 3.0 * math.sqrt(2.0 * basin.case.gravity) * coefficient
+
+
+def lower_moving_crests(draft, basin, row) -> None:
+    """Fill the columns of the row of a basin for walls with crests that move, see `moving_crests`."""
+    marks = basin.marks
+    beds = beds_of(basin)
+    schedules = []
+    candidates = []
+    for k, wall in enumerate(basin.part.walls.values()):
+        schedules.append(draft.schedules.add(wall.crest))
+        chain = wall.chain(basin.mesh)
+        above = float(wall.crest.value.max()) > beds[chain.faces]
+        columns = [
+            np.searchsorted(marks.faces, chain.faces[above]),
+            np.full(above.sum(), k),
+            np.full(above.sum(), coefficient_of(wall, chain)),
+            chain.cosine[above],
+            chain.sine[above],
+        ]
+        candidates.append(np.array(columns, float))
+    face, wall_of, coefficient, cosine, sine = np.concatenate(candidates, axis=1)
+    order = np.argsort(face, kind="stable")
+    first = np.searchsorted(face[order], np.arange(marks.faces.size + 1))
+    row["moving_crests"] = len(schedules)
+    row["candidates"] = len(draft.integers)
+    draft.integers += schedules
+    draft.integers += first.tolist()
+    draft.integers += wall_of[order].astype(int).tolist()
+    size = weir_size(basin, coefficient)
+    numbers = [np.array([basin.part.level]), beds[marks.faces]]
+    numbers += [values[order] for values in (size, cosine, sine)]
+    row["candidate_numbers"] = draft.to_plane(np.concatenate(numbers))
+    row["present_crests"] = draft.to_work(len(schedules))
+    row["crests"] = draft.to_work(MARK_NUMBERS * marks.faces.size)
 
 
 def rows_of_grid(basin) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -116,8 +172,12 @@ def chain_texts(basin) -> Iterator[str]:
             if np.isin(faces, marks.faces).any()
             else np.zeros(1)
         )
+        if not np.isfinite(height).all():
+            yield f"wall {name}: {faces.size} faces, {length} long, crest by a control without `limits`"
+            continue
         low, high = (amount(value, "length", 3) for value in (height.min(), height.max()))
-        yield f"wall {name}: {faces.size} faces, {length} long, crest {low} to {high} above the bed"
+        text = "" if wall.crest.constant else " at its highest in time"
+        yield f"wall {name}: {faces.size} faces, {length} long, crest {low} to {high} above the bed{text}"
     for name, chain in basin.sections.items():
         yield f"section {name}: {chain.faces.size} faces"
     yield from crest_texts(basin)

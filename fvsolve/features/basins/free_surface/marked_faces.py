@@ -17,6 +17,7 @@ import numpy as np
 from fvsolve.core.kernels.dtypes import SECTION_FLOW
 from fvsolve.core.kernels.structures import weir_flow
 from fvsolve.features.basins.cell_sides import BLOCK, CELL, INDICES
+from fvsolve.features.basins.free_surface.moving_crests import write_crests
 from fvsolve.features.basins.free_surface.surface_rows import (
     AFTER,
     ALONG,
@@ -64,30 +65,33 @@ class MarkedFaces(NamedTuple):
 
 
 @njit
-def marked_faces(tables, basin):
-    """`MarkedFaces` of a basin."""
+def marked_faces(tables, basin, t):
+    """`MarkedFaces` of a basin at time t [s]."""
     rows = basin["mark_rows"]
     marks = basin["marks"]
     faces = basin["marked_faces"]
     integers = tables.integers[basin["marked"] :]
-    plane = tables.plane[basin["crests"] :]
+    numbers = tables.plane[basin["crests"] :]
+    if basin["moving_crests"] > 0:
+        write_crests(tables, basin, t)
+        numbers = tables.work[basin["crests"] :]
     work = basin["marked_work"]
     return MarkedFaces(
         integers[: rows + 1],
         integers[rows + 1 :][:marks],
         integers[rows + 1 + marks :][:marks],
-        plane[:faces],
-        plane[faces : 2 * faces],
-        plane[2 * faces : 3 * faces],
-        plane[3 * faces : 4 * faces],
-        plane[4 * faces : 5 * faces],
+        numbers[:faces],
+        numbers[faces : 2 * faces],
+        numbers[2 * faces : 3 * faces],
+        numbers[3 * faces : 4 * faces],
+        numbers[4 * faces : 5 * faces],
         tables.work[work : work + faces],
         tables.work[work + faces :],
     )
 
 
 @njit
-def no_marks(tables, basin):
+def no_marks(tables, basin, t):
     """Return None: no face is marked."""
 
 

@@ -10,7 +10,7 @@ from fvsolve.parts.field_series import ScheduledField, SpatialSeries
 from fvsolve.parts.formula import NumberOrField, SpatialField, SpatialFieldKey, samples
 from fvsolve.parts.mesh_fields import NODES, NodeElevations
 from fvsolve.parts.nodes_and_links import TwoPort
-from fvsolve.parts.schedule import Schedule
+from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import NamedTables, Nested, Table
 from fvsolve.parts.value import (
     SHAPE,
@@ -149,8 +149,8 @@ class FaceWall(Table):
         str | None, Text("group of lines of the mesh file on which the wall is, instead of `line`")
     ] = None
     crest: Annotated[
-        float,
-        Quantity("level", anything, "height of its crest above the elevation of the basin [m]"),
+        Schedule,
+        Scheduled("level", anything, "height of its crest above the elevation of the basin [m]"),
     ]
     coefficient: Annotated[
         float, Number(between(0.01, 1.0), "coefficient C of the weir [-]", WEIR_COEFFICIENTS)

@@ -368,7 +368,7 @@ def _rates(t, y, dydt, out, handle):
                 out,
                 MOTION(tables, basin),
                 FACES(tables, basin),
-                MARKS(tables, basin),
+                MARKS(tables, basin, t),
             )
             put_open_flows(tables, b, tables.settings[0]["rho"], out)
             if basin["soil"] != NO_SOIL:  # steps keep all depths above 0
